@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from warpbrain.kernels.tetrahedron import PAIRS
 from warpbrain.mesh import TetMesh
+from warpbrain.simulation.equilibrium import Equilibrium
 from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.sensitivity import Sensitivities, SensitivitySolver
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -51,3 +53,8 @@ def matrix_of(system: System) -> sparse.bsr_matrix:
     nnz = int(A.offsets.numpy()[-1])
     parts = (A.values.numpy()[:nnz].astype(float), A.columns.numpy()[:nnz], A.offsets.numpy())
     return sparse.bsr_matrix(parts, shape=(3 * system.size, 3 * system.size))
+
+
+def sensitivities(system: System, equilibrium: Equilibrium, *at: Any) -> Sensitivities:
+    """Derivatives of an equilibrium; see `SensitivitySolver.solve`."""
+    return SensitivitySolver(system).solve(equilibrium.u, *at)

@@ -19,12 +19,11 @@ from shapes import cube
 
 from warpbrain.mesh import QuadraticMesh, TetMesh, surface_forces
 from warpbrain.mesh.integrals import shape_values, volume_forces
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import EDGES
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.model import Material, Model, with_mechanisms
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]

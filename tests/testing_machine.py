@@ -10,6 +10,7 @@ from warpbrain.physics.laws import NeoHookean
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.model import Material
+from warpbrain.simulation.specimen import STEPS, Rig, TestResult
 
 QUANTITIES = {
     "axial": ("displacement", "force"),
@@ -50,3 +51,15 @@ def recorded(mode: str, imposed: list[float] | np.ndarray, response: list[float]
         imposed=values,
         response=answer,
     )
+
+
+def simulate_test(
+    case: Case,
+    recording: TestRecording,
+    device: str | None = None,
+    precision: str = "double",
+    options: EquilibriumOptions | None = None,
+    steps: int = STEPS,
+) -> TestResult:
+    """One test on the specimen of a case."""
+    return Rig(case, device, precision, options).run(recording, steps)

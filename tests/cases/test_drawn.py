@@ -14,7 +14,7 @@ from warpbrain.gp.sampling import draw_laws, law_of_curve
 from warpbrain.gp.trained import trained
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.readiness import why_not
+from warpbrain.simulation.run import why_not
 
 GREY, WHITE, BRAIN = (f"hyperelastic/{anatomy}" for anatomy in ("grey matter", "white matter", "brain"))
 SOFT = ("mu = 1000.0", f'mu = 1000.0\nprior = "{GREY}"')

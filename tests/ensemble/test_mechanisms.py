@@ -20,9 +20,8 @@ from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.traction import Traction
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import solve_equilibrium
-from warpbrain.simulation.model import Model
+from warpbrain.simulation.model import Model, with_mechanisms
 from warpbrain.simulation.relaxation import RelaxationOptions
 from warpbrain.simulation.system import System
 

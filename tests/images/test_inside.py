@@ -7,7 +7,7 @@ from shapes import box
 
 from warpbrain.images.grid import MILLIMETRES, Grid
 from warpbrain.images.inside import voxels_inside
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import EDGES
 from warpbrain.recordings.location import locate
 
 

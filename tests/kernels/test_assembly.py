@@ -10,7 +10,7 @@ from shapes import cube, distorted
 
 from warpbrain.kernels.precision import DOUBLE, Precision
 from warpbrain.simulation.model import Material
-from warpbrain.simulation.pattern import build_pattern
+from warpbrain.simulation.placed import build_pattern
 from warpbrain.simulation.system import System
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from shapes import box
 
-from warpbrain.mesh.extent import extent, principal_axes
+from warpbrain.mesh.quality import extent, principal_axes
 
 
 def test_it_is_the_same_however_a_body_lies():

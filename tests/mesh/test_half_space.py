@@ -7,7 +7,7 @@ from scipy.spatial import ConvexHull, Delaunay, HalfspaceIntersection
 from shapes import box, distorted, oriented
 
 from warpbrain.mesh import QuadraticMesh, TetMesh, integrals_above, integrals_of_shapes, integrals_on_plane
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import EDGES
 
 RNG = np.random.default_rng(22)
 

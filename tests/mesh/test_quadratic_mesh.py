@@ -7,7 +7,7 @@ from shapes import box, distorted, tetrahedron
 
 from warpbrain.mesh import QuadraticMesh, TetMesh, face_vectors, surface_forces, volume_forces
 from warpbrain.mesh.integrals import shape_values, tetrahedron_rule, triangle_rule
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import EDGES
 
 MESH = distorted(box((2, 2, 2)), 0.05)
 NODES = QuadraticMesh(MESH)

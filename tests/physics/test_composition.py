@@ -17,8 +17,7 @@ from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanism import Facts, Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.regions import elements_with
-from warpbrain.simulation.assumed import with_mechanisms
-from warpbrain.simulation.model import ELEMENTS, Material, Model
+from warpbrain.simulation.model import ELEMENTS, Material, Model, with_mechanisms
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]

@@ -12,8 +12,7 @@ from warpbrain.physics.mechanisms.drainage import Drainage
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.equilibrium import EquilibriumOptions
-from warpbrain.simulation.factored import FactoredSolver
-from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.factored import FactoredSolver, KeptFactors
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System

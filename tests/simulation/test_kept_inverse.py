@@ -5,13 +5,12 @@ import warp as wp
 from bodies import model_of
 from shapes import cube
 
+from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation import kept_inverse as module
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.factored import FactoredSolver
-from warpbrain.simulation.keeping import kept_for, with_kept
-from warpbrain.simulation.kept_factors import KeptFactors
-from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
+from warpbrain.simulation.factored import FactoredSolver, KeptFactors
+from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse, kept_for
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
 
@@ -38,14 +37,13 @@ def test_a_cpu_keeps_factors():
     kept = kept_for(wp.get_device("cpu"))
     assert type(kept) is KeptFactors
     system = System(body(), "cpu")
-    captured = system.linear_solver(tolerance=1e-3, max_iterations=100)
-    assert type(with_kept(system, captured, kept, 1e-3)) is FactoredSolver
+    assert type(system.linear_solver(tolerance=1e-3, max_iterations=100, factors=kept)) is FactoredSolver
 
 
 def test_single_precision_is_for_the_captured_loop():
     system = System(body(), "cpu", "single")
-    captured = system.linear_solver(tolerance=1e-3, max_iterations=100)
-    assert with_kept(system, captured, KeptInverse(wp.get_device("cpu")), 1e-3) is captured
+    kept = KeptInverse(wp.get_device("cpu"))
+    assert type(system.linear_solver(tolerance=1e-3, max_iterations=100, factors=kept)) is ConjugateGradient
 
 
 def test_it_finds_the_same_in_fewer_iterations(gpu):
@@ -88,8 +86,7 @@ def test_an_unstable_state_is_told(gpu):
     system.evaluate_tangents()
     system.assemble(-1.0, 0.0)
     system.load.assign(np.random.default_rng(0).normal(size=(system.size, 3)) * ~system.model.constrained)
-    captured = system.linear_solver(tolerance=1e-6, max_iterations=500, watch_curvature=True)
-    solver = with_kept(system, captured, kept_for(gpu), 1e-6)
+    solver = system.linear_solver(tolerance=1e-6, max_iterations=500, watch_curvature=True, factors=kept_for(gpu))
     assert isinstance(solver, InvertedSolver)
     solver.prepare()
     system.solution.zero_()

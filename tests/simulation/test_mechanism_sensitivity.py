@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bodies import sensitivities
 from numpy.typing import NDArray
 from shapes import cube, distorted
 from verification_rows import Row
@@ -15,10 +16,9 @@ from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean, Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import contact, mechanisms
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.model import Material, Model
-from warpbrain.simulation.sensitivity import SensitivitySolver, sensitivities
+from warpbrain.simulation.model import Material, Model, with_mechanisms
+from warpbrain.simulation.sensitivity import SensitivitySolver
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]

@@ -21,9 +21,9 @@ from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, solve_equilibrium
 from warpbrain.simulation.finer import FinerCase, GivenForces, prolongation
-from warpbrain.simulation.mesh_error import Found, estimate, mesh_error
+from warpbrain.simulation.mesh_error import estimate, mesh_error
 from warpbrain.simulation.model import Material
-from warpbrain.simulation.result import result_of
+from warpbrain.simulation.result import NodalState, result_of
 from warpbrain.simulation.system import System
 
 #: Tip of Cook's membrane [mm]: P2-P1 elements by DOLFINx, 32 a side (tests/verification).
@@ -37,7 +37,7 @@ def membrane(n: int) -> TetMesh:
     return replace(mesh, points=np.stack([x, (1.0 - y / 44.0) * low + y / 44.0 * high, z], axis=1))
 
 
-def bend(mesh: TetMesh, poisson: float, elements: str, start: np.ndarray | None = None) -> Found:
+def bend(mesh: TetMesh, poisson: float, elements: str, start: np.ndarray | None = None) -> NodalState:
     """Under 1 N spread over the right edge."""
     constrained = np.zeros(mesh.points.shape, dtype=bool)
     constrained[:, 2] = True
@@ -53,7 +53,7 @@ def bend(mesh: TetMesh, poisson: float, elements: str, start: np.ndarray | None 
     step = 0.2 if start is None else 1.0
     solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=1e-6, max_load_step=step))
     found = solver.solve(external=force, start=start)
-    return Found(mesh, found.u, np.where(constrained, found.internal, 0.0))
+    return NodalState(mesh, found.u, np.where(constrained, found.internal, 0.0))
 
 
 @pytest.mark.parametrize(("poisson", "elements"), [(0.45, "tet4"), (0.49, "tet4"), (0.49, "tet4-averaged")])
@@ -63,7 +63,7 @@ def test_cook(poisson: float, elements: str) -> None:
     finer, ends = refined(mesh)
     state = bend(mesh, poisson, elements)
 
-    def solve(other: str, small: bool, start: np.ndarray) -> Found:
+    def solve(other: str, small: bool, start: np.ndarray) -> NodalState:
         return bend(finer if small else mesh, poisson, other, start)
 
     found = estimate(state, elements, solve, prolongation(ends, len(mesh.points)))
@@ -96,17 +96,17 @@ def test_thick_sphere(n: int) -> None:
     """
     material = Material(NeoHookean(1000.0), 0.45, "uncoupled")
 
-    def inflate(mesh: TetMesh, elements: str) -> Found:
+    def inflate(mesh: TetMesh, elements: str) -> NodalState:
         constrained = np.abs(mesh.points) < 1e-9
         acting = [Pressure(nodes="inner", value=100.0)]
         model = model_of(mesh, material, constrained=constrained, mechanisms=acting, elements=elements)
         found = solve_equilibrium(System(model, "cpu"), EquilibriumOptions(tolerance=1e-6))
-        return Found(mesh, found.u, found.u)
+        return NodalState(mesh, found.u, found.u)
 
     mesh = octant(n)
     finer, ends = refined(mesh)
 
-    def solve(other: str, small: bool, start: np.ndarray) -> Found:
+    def solve(other: str, small: bool, start: np.ndarray) -> NodalState:
         return inflate(finer if small else mesh, other)
 
     state = inflate(mesh, "tet4")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import model_of
+from bodies import model_of, sensitivities
 from shapes import box, distorted
 
 from warpbrain.errors import InputError
@@ -17,11 +17,10 @@ from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, solve_equilibrium
-from warpbrain.simulation.keeping import kept_for
+from warpbrain.simulation.kept_inverse import kept_for
 from warpbrain.simulation.model import QUADRATIC, Damping, Material, Model, Motion
 from warpbrain.simulation.relaxation import relax_to_rest
 from warpbrain.simulation.result import result_of
-from warpbrain.simulation.sensitivity import sensitivities
 from warpbrain.simulation.system import System
 
 SOFT = Material(NeoHookean(1000.0))

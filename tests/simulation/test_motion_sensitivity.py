@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bodies import sensitivities
 from numpy.typing import NDArray
 from shapes import cube
 from verification_rows import Row
@@ -18,13 +19,11 @@ from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.traction import Traction
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
-from warpbrain.simulation.model import Damping, Material, Model
+from warpbrain.simulation.model import Damping, Material, Model, with_mechanisms
 from warpbrain.simulation.motion_sensitivity import MotionSensitivity, follow
 from warpbrain.simulation.quasi_static import follow_slowly
-from warpbrain.simulation.sensitivity import sensitivities
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]

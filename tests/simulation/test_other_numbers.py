@@ -25,9 +25,8 @@ from warpbrain.physics.mechanisms.residual_stress import ResidualStress
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.physics.term import Term
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.dynamics import Simulator
-from warpbrain.simulation.model import ELEMENTS, QUADRATIC, Material, Model
+from warpbrain.simulation.model import ELEMENTS, QUADRATIC, Material, Model, with_mechanisms
 from warpbrain.simulation.system import System
 
 FIRST: tuple[Mechanism, ...] = (

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from command import run as run_command
 from folders import write_folder, write_recorded
-from testing_machine import CUBE, case_of, recorded
+from testing_machine import CUBE, case_of, recorded, simulate_test
 
 from warpbrain.cases.reading import read_case
 from warpbrain.errors import InputError
@@ -15,7 +15,6 @@ from warpbrain.simulation.courses import Course, Watching
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.run import Running, run
-from warpbrain.simulation.specimen import simulate_test
 from warpbrain.simulation.system import System
 
 

@@ -10,10 +10,9 @@ from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanisms.contact import Contact
 from warpbrain.physics.mechanisms.falx import Falx
 from warpbrain.physics.mechanisms.resection import Resection
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import solve_equilibrium
-from warpbrain.simulation.model import Material, Model
-from warpbrain.simulation.secant import secant
+from warpbrain.simulation.model import Material, Model, with_mechanisms
+from warpbrain.simulation.sensitivity import secant
 from warpbrain.simulation.system import System
 
 

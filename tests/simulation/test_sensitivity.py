@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import forces_at
+from bodies import forces_at, sensitivities
 from numpy.typing import NDArray
 from shapes import box
 from verification_rows import Row
@@ -20,7 +20,7 @@ from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.result import result_of
-from warpbrain.simulation.sensitivity import SensitivitySolver, sensitivities
+from warpbrain.simulation.sensitivity import SensitivitySolver
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from material_point import LAWS, MATERIALS
 from scipy.optimize import brentq, minimize_scalar
-from testing_machine import BRAIN, CUBE, EXACT, case_of, recorded
+from testing_machine import BRAIN, CUBE, EXACT, case_of, recorded, simulate_test
 from verification_rows import Row
 
 from warpbrain.cases import specimen as specimens
@@ -21,7 +21,7 @@ from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
-from warpbrain.simulation.specimen import Rig, compare_test, imposed_values, simulate_test
+from warpbrain.simulation.specimen import Rig, compare_test, imposed_values
 from warpbrain.simulation.system import System
 
 DISC = Specimen("cylinder", (8e-3, 8e-3, 4.541e-3), "glued")

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from testing_machine import CUBE, EXACT, case_of, recorded
+from testing_machine import CUBE, EXACT, case_of, recorded, simulate_test
 from verification_rows import Row
 
 from warpbrain.cases import specimen as specimens
@@ -23,8 +23,8 @@ from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.history import corners_of, history_of
 from warpbrain.simulation.model import Material
-from warpbrain.simulation.readiness import why_not
-from warpbrain.simulation.specimen import Rig, TestResult, simulate_test
+from warpbrain.simulation.run import why_not
+from warpbrain.simulation.specimen import Rig, TestResult
 
 MU, LAM = 1000.0, 9000.0
 PLATE = Specimen("block", (5e-3, 4e-3, 3e-3), "lubricated")

@@ -17,7 +17,7 @@ from verification_rows import Row
 
 from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.mesh.integrals import shape_values
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import EDGES
 from warpbrain.physics.load import Load
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.system import System

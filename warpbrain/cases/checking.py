@@ -13,7 +13,7 @@ from warpbrain.cases.enough import too_few_for_noise, too_few_to_diagnose
 from warpbrain.cases.reading import examine_case
 from warpbrain.errors import require_kind
 from warpbrain.mesh import Quality, measure
-from warpbrain.mesh.extent import extent
+from warpbrain.mesh.quality import extent
 from warpbrain.problems import Problem, Problems
 from warpbrain.recordings.recording import PointsRecording
 

@@ -141,7 +141,7 @@ def _check(options: argparse.Namespace) -> None:
     from warpbrain.cases.checking import check_case
     from warpbrain.cases.shipped import files_of
     from warpbrain.report.case_text import check_lines
-    from warpbrain.simulation.readiness import why_not
+    from warpbrain.simulation.run import why_not
 
     wrong = 0
     for file in files_of(options.folder):

@@ -22,11 +22,12 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.ensemble.sample import Sample
 from warpbrain.errors import InputError
 from warpbrain.kernels.batched.assembly import batched_assembly_kernels
-from warpbrain.kernels.batched.elements import BatchedElementKernels, batched_element_kernels
+from warpbrain.kernels.batched.elements import batched_element_kernels
 from warpbrain.kernels.batched.layout import stages
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
 from warpbrain.kernels.batched.motion import batched_motion_kernels
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.tetrahedron import PAIRS
 from warpbrain.physics.laws import Law
 from warpbrain.simulation.dynamics import finest_tolerance
@@ -43,7 +44,7 @@ def code_of(material: Material) -> tuple[type[Law], str]:
 class BatchGroup:
     """Elements that share a law and formulation."""
 
-    kernels: BatchedElementKernels
+    kernels: KernelSet
     elements: wp.array  # elements, and which tissue of the group each is of
     tissue: wp.array
     parameters: wp.array  # one row for a tissue and a slot, slots fastest

@@ -18,8 +18,7 @@ from warpbrain.arrays import Floats
 from warpbrain.ensemble.batch import Batch, States
 from warpbrain.ensemble.sample import Outcome, Sample, failure
 from warpbrain.kernels.precision import Precision
-from warpbrain.simulation.held import require_held
-from warpbrain.simulation.model import Model
+from warpbrain.simulation.model import Model, require_held
 from warpbrain.simulation.relaxation import LINEAR_TOLERANCE, RelaxationOptions, least_residual
 from warpbrain.simulation.system import System
 

@@ -13,9 +13,8 @@ from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.shown import Shown
-from warpbrain.simulation.mesh_error import Found
 from warpbrain.simulation.observation import observe
-from warpbrain.simulation.result import Statistics, displacement_statistics
+from warpbrain.simulation.result import NodalState, Statistics, displacement_statistics
 
 #: Percentiles of the fields.
 PERCENTILES = (5, 50, 95)
@@ -116,7 +115,7 @@ def results_of(
         if not outcome.failed:
             states[outcome.number] = outcome.u
             displacement = displacement_statistics(mesh, outcome.u)
-            observed = observe(case, Found(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time)
+            observed = observe(case, NodalState(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time)
             comparisons = observed.comparisons
             not_compared.update(dict.fromkeys(observed.skipped))
         ended = replace(outcome, u=_NOTHING, reactions=_NOTHING)

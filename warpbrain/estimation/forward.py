@@ -16,9 +16,8 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
 from warpbrain.errors import SolveError
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.model import Model
+from warpbrain.simulation.model import Model, with_mechanisms
 from warpbrain.simulation.of_case import plain_model_of
 from warpbrain.simulation.sensitivity import SensitivitySolver
 from warpbrain.simulation.system import System

@@ -24,7 +24,7 @@ from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
 from warpbrain.estimation.within_element import change_over_element
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.feature_normals import feature_normals
+from warpbrain.mesh.surface import feature_normals
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.comparison import faces_of_set
 from warpbrain.recordings.copies import distinct_rows

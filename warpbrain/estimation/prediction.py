@@ -16,8 +16,8 @@ from warpbrain.estimation.observations import Observations, Sensors
 from warpbrain.estimation.registration import realigned
 from warpbrain.recordings.agreement import by_unit
 from warpbrain.recordings.comparison import Comparison
-from warpbrain.simulation.mesh_error import Found
 from warpbrain.simulation.observation import observe
+from warpbrain.simulation.result import NodalState
 
 #: Probabilities of the intervals whose coverage is told.
 INTERVALS = (0.5, 0.95)
@@ -138,7 +138,7 @@ def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapp
     """Recordings by name beside displacement and reactions (s N, 3) at moments, as `warpbrain run` compares them."""
     count = len(moments.cases)
     pairs = zip(np.split(u, count), np.split(reactions, count), strict=True)
-    states = [Found(case.remaining[0], *state) for state in pairs]
+    states = [NodalState(case.remaining[0], *state) for state in pairs]
     others = {time: states[number] for time, number in zip(moments.times, moments.numbers, strict=True)}
     return {one.name: one for one in observe(case, states[-1], others=others).comparisons}
 

@@ -52,7 +52,7 @@ class VoxelsInside:
 
     def interpolate(self, values: Floats, middles: Floats | None = None) -> Floats:
         """A field of the mesh at these voxels (k, c), given at the nodes (n, c) and for quadratic elements in the
-        middle of the edges of each tetrahedron (m, 6, c), in the order of `warpbrain.mesh.quality.EDGES`."""
+        middle of the edges of each tetrahedron (m, 6, c), in the order of `warpbrain.mesh.surface.EDGES`."""
         corners = self.mesh.tetrahedra[self.elements]
         if middles is None:
             return np.asarray(np.einsum("ka,kac->kc", self.weights, values[corners]))

@@ -4,35 +4,13 @@ Every sum is a gather, one thread for a result, over a list of contributions in 
 bits come out of every run on a device.
 """
 
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
-
-
-@dataclass(frozen=True)
-class AssemblyKernels:
-    """Assembly kernels of one precision.
-
-    Attributes
-    ----------
-    gather_matrix : wp.Kernel
-        One thread for a pair of nodes i <= j: `A_ij = k K_ij + m M_ij`, with the rows and columns of constrained
-        components replaced by those of the identity. Writes both `A_ij` and `A_ji`.
-    gather_forces : wp.Kernel
-        One thread for a node: the sum of the element forces on it.
-    constrained_load : wp.Kernel
-        One thread for a node: subtract `k K d`, of prescribed increments `d`, from the right-hand side. The matrix
-        itself cannot be used: it has lost the columns of constrained components.
-    """
-
-    gather_matrix: Any
-    gather_forces: Any
-    constrained_load: Any
 
 
 @wp.func
@@ -45,12 +23,12 @@ def force_on(first: wp.array[int], corners: wp.array[int], element_forces: wp.ar
 
 
 @cache
-def assembly_kernels(precision: Precision) -> AssemblyKernels:
+def assembly_kernels(precision: Precision) -> KernelSet:
     """Make (once) the assembly kernels of a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"assembly_{precision.name}")
+    kernels = KernelSet(f"assembly_{precision.name}")
 
-    @wp.kernel(module=module)
+    @kernels.add
     def gather_matrix(
         start: int,
         pairs: wp.array[wp.vec2i],
@@ -64,6 +42,8 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
         m: scalar,
         values: wp.array[mat33],
     ):
+        """One thread for a pair of nodes i <= j: `A_ij = k K_ij + m M_ij`, with the rows and columns of constrained
+        components replaced by those of the identity. Writes both `A_ij` and `A_ji`."""
         p = start + wp.tid()
         K = mat33()
         for c in range(first[p], first[p + 1]):
@@ -81,7 +61,7 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
         if i != j:
             values[positions[p][1]] = wp.transpose(A)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def gather_forces(
         start: int,
         first: wp.array[int],
@@ -89,10 +69,11 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
         element_forces: wp.array[vec3],
         forces: wp.array[vec3],
     ):
+        """One thread for a node: the sum of the element forces on it."""
         i = start + wp.tid()
         forces[i] = force_on(first, corners, element_forces, i)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def constrained_load(
         start: int,
         offsets: wp.array[int],
@@ -106,6 +87,8 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
         k: scalar,
         load: wp.array[vec3],
     ):
+        """One thread for a node: subtract `k K d`, of prescribed increments `d`, from the right-hand side. The matrix
+        itself cannot be used: it has lost the columns of constrained components."""
         i = start + wp.tid()
         f = vec3()
         for block in range(offsets[i], offsets[i + 1]):
@@ -124,4 +107,4 @@ def assembly_kernels(precision: Precision) -> AssemblyKernels:
                 f += K * d
         load[i] = load[i] - wp.cw_mul(free[i], k * f)
 
-    return AssemblyKernels(gather_matrix, gather_forces, constrained_load)
+    return kernels

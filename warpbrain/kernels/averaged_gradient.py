@@ -9,55 +9,36 @@ acts like an element of many nodes:
 Stress and moduli are those of the law's own pointwise kernels (`warpbrain.kernels.tetrahedron.ElementKernels`).
 """
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
 
-@dataclass(frozen=True)
-class AveragedKernels:
-    """Kernels of one precision.
-
-    Attributes
-    ----------
-    gradient : wp.Kernel
-        ``(nodes, gradients, u) -> F``, one thread for a patch.
-    forces : wp.Kernel
-        ``(gradients, volume, P) -> forces``, one thread for a node of a patch.
-    tangents : wp.Kernel
-        ``(rows, columns, gradients, volume, moduli) -> blocks``, one thread for a pair of nodes of a patch.
-    """
-
-    gradient: Any
-    forces: Any
-    tangents: Any
-
-
 @cache
-def averaged_kernels(precision: Precision) -> AveragedKernels:
+def averaged_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"averaged_gradient_{precision.name}")
+    kernels = KernelSet(f"averaged_gradient_{precision.name}")
 
-    @wp.kernel(module=module)
+    @kernels.add
     def gradient(nodes: wp.array2d[int], gradients: wp.array2d[vec3], u: wp.array[vec3], F: wp.array[mat33]):
+        """``(nodes, gradients, u) -> F``, one thread for a patch."""
         t = wp.tid()
         found = wp.identity(n=3, dtype=scalar)
         for b in range(nodes.shape[1]):
             found += wp.outer(u[nodes[t, b]], gradients[t, b])
         F[t] = found
 
-    @wp.kernel(module=module)
+    @kernels.add
     def forces(gradients: wp.array2d[vec3], volume: wp.array[scalar], P: wp.array[mat33], out: wp.array2d[vec3]):
+        """``(gradients, volume, P) -> forces``, one thread for a node of a patch."""
         t, b = wp.tid()
         out[t, b] = volume[t] * (P[t] * gradients[t, b])
 
-    @wp.kernel(module=module)
+    @kernels.add
     def tangents(
         rows: wp.array[int],
         columns: wp.array[int],
@@ -66,6 +47,7 @@ def averaged_kernels(precision: Precision) -> AveragedKernels:
         moduli: wp.array3d[mat33],
         out: wp.array2d[mat33],
     ):
+        """``(rows, columns, gradients, volume, moduli) -> blocks``, one thread for a pair of nodes of a patch."""
         t, pair = wp.tid()
         g = volume[t] * gradients[t, rows[pair]]
         h = gradients[t, columns[pair]]
@@ -75,4 +57,4 @@ def averaged_kernels(precision: Precision) -> AveragedKernels:
                 K += g[j] * h[k] * moduli[t, j, k]
         out[t, pair] = K
 
-    return AveragedKernels(gradient, forces, tangents)
+    return kernels

@@ -6,7 +6,6 @@ which have converged. Preconditioned by the inverse diagonal blocks, as the syst
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from warp.sparse import BsrMatrix
 
 from warpbrain.kernels.linear import LinearResult, linear_kernels
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.multicore import Graph, launch
 from warpbrain.kernels.precision import Precision
 
@@ -26,26 +25,14 @@ ROUND = 16
 _CHUNK = 64
 
 
-@dataclass(frozen=True)
-class BlockKernels:
-    """Kernels of one precision; arrays of vectors are (rows, right-hand sides)."""
-
-    multiply: Any
-    partial_dots: Any
-    sum_dots: Any
-    descend: Any
-    turn: Any
-    begin: Any
-
-
 @cache
-def block_kernels(precision: Precision) -> BlockKernels:
-    """Make (once) the kernels of a precision."""
+def block_kernels(precision: Precision) -> KernelSet:
+    """Make (once) the kernels of a precision; arrays of vectors are (rows, right-hand sides)."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"block_linear_{precision.name}")
+    kernels = KernelSet(f"block_linear_{precision.name}")
     chunk = wp.constant(_CHUNK)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def multiply(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -59,7 +46,7 @@ def block_kernels(precision: Precision) -> BlockKernels:
             s += values[k] * x[columns[k], r]
         y[i, r] = s
 
-    @wp.kernel(module=module)
+    @kernels.add
     def partial_dots(x: wp.array2d[vec3], y: wp.array2d[vec3], z: wp.array2d[vec3], partial: wp.array3d[scalar]):
         """Of `x . y` and `x . z`."""
         t, r = wp.tid()
@@ -71,7 +58,7 @@ def block_kernels(precision: Precision) -> BlockKernels:
         partial[t, r, 0] = first
         partial[t, r, 1] = second
 
-    @wp.kernel(module=module)
+    @kernels.add
     def sum_dots(partial: wp.array3d[scalar], dots: wp.array2d[scalar]):
         r, which = wp.tid()
         total = scalar(0.0)
@@ -79,7 +66,7 @@ def block_kernels(precision: Precision) -> BlockKernels:
             total += partial[t, r, which]
         dots[r, which] = total
 
-    @wp.kernel(module=module)
+    @kernels.add
     def descend(
         inverse: wp.array[mat33],
         p: wp.array2d[vec3],
@@ -107,7 +94,7 @@ def block_kernels(precision: Precision) -> BlockKernels:
         b[i, r] = left
         z[i, r] = inverse[i] * left
 
-    @wp.kernel(module=module)
+    @kernels.add
     def turn(z: wp.array2d[vec3], before: wp.array2d[scalar], residual: wp.array2d[scalar], p: wp.array2d[vec3]):
         i, r = wp.tid()
         beta = scalar(0.0)
@@ -115,31 +102,20 @@ def block_kernels(precision: Precision) -> BlockKernels:
             beta = residual[r, 1] / before[r, 1]
         p[i, r] = z[i, r] + beta * p[i, r]
 
-    @wp.kernel(module=module)
+    @kernels.add
     def begin(inverse: wp.array[mat33], b: wp.array2d[vec3], z: wp.array2d[vec3], p: wp.array2d[vec3]):
         i, r = wp.tid()
         z[i, r] = inverse[i] * b[i, r]
         p[i, r] = z[i, r]
 
-    return BlockKernels(multiply, partial_dots, sum_dots, descend, turn, begin)
+    return kernels
 
 
 class BlockConjugateGradient:
-    """Preconditioned CG for a symmetric matrix, whose pattern does not change, and several right-hand sides.
+    """Preconditioned CG for a symmetric matrix, whose pattern does not change, and `count` right-hand sides.
 
-    Parameters
-    ----------
-    matrix : warp.sparse.BsrMatrix
-        Symmetric, 3 x 3 blocks, every diagonal block present.
-    diagonal : wp.array of int, shape (n,)
-        Position of each diagonal block in ``matrix.values``.
-    count : int
-        Number of right-hand sides.
-    precision : Precision
-    tolerance : float
-        Relative, of each: it has converged when ``|b - A x| <= tolerance |b|``.
-    max_iterations : int
-        Rounded up to whole rounds.
+    `diagonal` (n,) says where each diagonal block is in ``matrix.values``. A right-hand side has converged when ``|b -
+    A x| <= tolerance |b|``; `max_iterations` is rounded up to whole rounds.
     """
 
     def __init__(
@@ -180,19 +156,7 @@ class BlockConjugateGradient:
     def solve(
         self, right_hand_sides: Sequence[NDArray[np.float64]], tolerance: float | None = None
     ) -> NDArray[np.float64]:
-        """Solve from zero.
-
-        Parameters
-        ----------
-        right_hand_sides : sequence of (n, 3) arrays
-            As many as the solver was made for.
-        tolerance : float, optional
-            In place of the solver's own.
-
-        Returns
-        -------
-        (count, n, 3) array
-        """
+        """Solve from zero, for as many (n, 3) arrays as the solver was made for: (count, n, 3)."""
         self._b.assign(np.stack(right_hand_sides, axis=1))
         self._x.zero_()
         self._least.fill_(float("inf"))

@@ -1,41 +1,26 @@
 """Kernels of linear systems of displacements and of a scalar at each node; see `warpbrain.simulation.coupled`."""
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.linear import linear_kernels
 from warpbrain.kernels.minimal_residual import four_vector
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
 
-@dataclass(frozen=True)
-class CoupledKernels:
-    """Kernels of one precision, each with one thread for a node; the scalar is the fourth component."""
-
-    multiply: Any
-    invert_diagonal: Any
-    invert_coupled_diagonal: Any
-    apply_diagonal: Any
-    pack: Any
-    unpack: Any
-
-
 @cache
-def coupled_kernels(precision: Precision) -> CoupledKernels:
-    """Make (once) the kernels of a precision."""
+def coupled_kernels(precision: Precision) -> KernelSet:
+    """Make (once) the kernels of a precision, one thread for a node; the scalar is the fourth component."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     vec4 = four_vector(precision)
-    module = compiled_module(f"coupled_{precision.name}")
+    kernels = KernelSet(f"coupled_{precision.name}")
 
     @wp.func
     def displacement(x: vec4):
         return vec3(x[0], x[1], x[2])
 
-    @wp.kernel(module=module)
+    @kernels.add
     def multiply(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -66,7 +51,7 @@ def coupled_kernels(precision: Precision) -> CoupledKernels:
         f -= root[0] * wp.cw_mul(free[i], pushed)
         y[i] = vec4(f[0], f[1], f[2], -root[0] * taken - flow)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def invert_coupled_diagonal(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -89,21 +74,20 @@ def coupled_kernels(precision: Precision) -> CoupledKernels:
         if total > scalar(0.0):
             out[i] = scalar(1.0) / total
 
-    @wp.kernel(module=module)
+    @kernels.add
     def apply_diagonal(inverse: wp.array[mat33], diagonal: wp.array[scalar], x: wp.array[vec4], y: wp.array[vec4]):
         i = wp.tid()
         f = inverse[i] * displacement(x[i])
         y[i] = vec4(f[0], f[1], f[2], diagonal[i] * x[i][3])
 
-    @wp.kernel(module=module)
+    @kernels.add
     def pack(x: wp.array[vec3], y: wp.array[vec4]):
         i = wp.tid()
         y[i] = vec4(x[i][0], x[i][1], x[i][2], scalar(0.0))
 
-    @wp.kernel(module=module)
+    @kernels.add
     def unpack(x: wp.array[vec4], y: wp.array[vec3]):
         i = wp.tid()
         y[i] = displacement(x[i])
 
-    invert_diagonal = linear_kernels(precision).invert_diagonal
-    return CoupledKernels(multiply, invert_diagonal, invert_coupled_diagonal, apply_diagonal, pack, unpack)
+    return kernels

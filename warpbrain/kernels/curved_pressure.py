@@ -26,11 +26,7 @@ from warpbrain.kernels.ten_nodes import UNROLL
 def curved_pressure_kernels(precision: Precision, rule: tuple[tuple[float, ...], ...]) -> tuple[Any, Any, Any]:
     """Make (once) kernels for forces, tangent blocks and energies, with one thread for a triangle.
 
-    Parameters
-    ----------
-    precision : Precision
-    rule : tuple of six points
-        Barycentric coordinates of each and its weight; the weights add up to one.
+    `rule` has the barycentric coordinates of six points and their weights, which add up to one.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"curved_pressure_{precision.name}", unroll=UNROLL)

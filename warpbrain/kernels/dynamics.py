@@ -1,31 +1,21 @@
 """Kernels of implicit backward Euler: the right-hand side and the update of velocity and displacement."""
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import warp as wp
 
 from warpbrain.kernels.assembly import force_on
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
 
-@dataclass(frozen=True)
-class DynamicsKernels:
-    """Kernels of a time step in one precision, one thread for a node; see `warpbrain.simulation.dynamics`."""
-
-    right_hand_side: Any
-    update: Any
-
-
 @cache
-def dynamics_kernels(precision: Precision) -> DynamicsKernels:
-    """Make (once) the kernels of a time step in a precision."""
+def dynamics_kernels(precision: Precision) -> KernelSet:
+    """Make (once) the kernels of a time step in a precision, one thread for a node."""
     scalar, vec3 = precision.scalar, precision.vec3
-    module = compiled_module(f"dynamics_{precision.name}")
+    kernels = KernelSet(f"dynamics_{precision.name}")
 
-    @wp.kernel(module=module)
+    @kernels.add
     def right_hand_side(
         start: int,
         first: wp.array[int],
@@ -49,7 +39,7 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
         momentum = mass[i] * (v_start[i] + along_Mv * v[i])
         b[i] = wp.cw_mul(free[i], momentum + h * (external[i] - f) + along_Av * Av[i])
 
-    @wp.kernel(module=module)
+    @kernels.add
     def update(
         start: int,
         u_start: wp.array[vec3],
@@ -65,4 +55,4 @@ def dynamics_kernels(precision: Precision) -> DynamicsKernels:
         v[i] = w
         u[i] = u_start[i] + h * w
 
-    return DynamicsKernels(right_hand_side, update)
+    return kernels

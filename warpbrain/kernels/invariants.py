@@ -19,7 +19,7 @@ import warp as wp
 
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.kernels.tetrahedron import ElementKernels, element_kernels
+from warpbrain.kernels.tetrahedron import ElementKernels, law_kernels
 
 
 @wp.func
@@ -32,20 +32,11 @@ def cofactor(F: Any):
 def invariant_kernels(
     key: str, energy_density: Any, derivatives: Any, second_invariant: bool, precision: Precision
 ) -> ElementKernels:
-    """Make (once) the element kernels of a law in invariants.
+    """Make (once) the element kernels of a law in invariants, whose name `key` is part of that of its compiled module.
 
-    Parameters
-    ----------
-    key : str
-        Name of the law, part of the name of its compiled module.
-    energy_density, derivatives : wp.func
-        The law, as above.
-    second_invariant : bool
-        False leaves every term of `I2` out of the compiled code (`I2` is then passed as zero).
-    precision : Precision
+    Without `second_invariant` every term of `I2` is left out of the compiled code (`I2` is then passed as zero).
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"{key}_{precision.name}")
     pointwise = compiled_module(f"{key}_{precision.name}_pointwise")
 
     @wp.func
@@ -171,7 +162,4 @@ def invariant_kernels(
             )
         blocks[e, j, k] = K
 
-    forces, forces_and_tangents, energy, stress = element_kernels(
-        stress_of, energy_of, tangents_of, precision, module, pointwise
-    )
-    return ElementKernels(forces, forces_and_tangents, energy, stress, moduli, tangents_of, stress_of, energy_of)
+    return law_kernels(key, stress_of, energy_of, tangents_of, moduli, precision)

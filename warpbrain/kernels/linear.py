@@ -31,7 +31,8 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from warp.sparse import BsrMatrix
 
-from warpbrain.kernels.module import compiled_module
+from warpbrain.arrays import Floats
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together, team_kernels
 from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernels, sync_words
 from warpbrain.kernels.persistent import PersistentSolve, blocks_stay
@@ -74,30 +75,18 @@ class LinearResult:
         return self.curvature <= 0.0
 
 
-@dataclass(frozen=True)
-class LinearKernels:
-    """Kernels of the linear solver in one precision."""
-
-    multiply: Any
-    invert_diagonal: Any
-    apply_diagonal: Any
-    partial_curvature: Any
-    least_curvature: Any
-    test_convergence: Any
-
-
 #: Rows that one thread sums in the first stage of the curvature's reduction.
 _CHUNK = 64
 
 
 @cache
-def linear_kernels(precision: Precision) -> LinearKernels:
+def linear_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of the linear solver in a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"linear_{precision.name}")
+    kernels = KernelSet(f"linear_{precision.name}")
     chunk = wp.constant(_CHUNK)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def multiply(
         start: int,
         offsets: wp.array[int],
@@ -119,12 +108,12 @@ def linear_kernels(precision: Precision) -> LinearKernels:
             s += beta * y[i]
         z[i] = s
 
-    @wp.kernel(module=module)
+    @kernels.add
     def invert_diagonal(start: int, diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
         i = start + wp.tid()
         inverse[i] = wp.inverse(values[diagonal[i]])
 
-    @wp.kernel(module=module)
+    @kernels.add
     def apply_diagonal(
         start: int,
         inverse: wp.array[mat33],
@@ -140,7 +129,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
             s += beta * y[i]
         z[i] = s
 
-    @wp.kernel(module=module)
+    @kernels.add
     def partial_curvature(p: wp.array[vec3], Ap: wp.array[vec3], partial: wp.array2d[scalar]):
         t = wp.tid()
         pAp = scalar(0.0)
@@ -151,7 +140,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         partial[t, 0] = pAp
         partial[t, 1] = pp
 
-    @wp.kernel(module=module)
+    @kernels.add
     def least_curvature(partial: wp.array2d[scalar], least: wp.array[scalar]):
         pAp = scalar(0.0)
         pp = scalar(0.0)
@@ -162,7 +151,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         if pp > scalar(0.0):
             least[0] = wp.min(least[0], pAp / pp)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def test_convergence(
         max_iterations: int,
         residual_squared: wp.array[scalar],
@@ -180,9 +169,7 @@ def linear_kernels(precision: Precision) -> LinearKernels:
         if not (residual_squared[0] > tolerance_squared[0]) or iterations[0] >= max_iterations:
             go_on[0] = 0
 
-    return LinearKernels(
-        multiply, invert_diagonal, apply_diagonal, partial_curvature, least_curvature, test_convergence
-    )
+    return kernels
 
 
 def solver_kernels(precision: Precision, device: wp.Device) -> list[Any]:
@@ -233,22 +220,6 @@ def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
         warp_linear_internals._run_capturable_loop = original
 
 
-@dataclass(frozen=True)
-class Nodes:
-    """Where the rows of a matrix are, for the coarse space of `warpbrain.kernels.multicore_gradients`.
-
-    Attributes
-    ----------
-    points : (n, 3) array
-        [m]
-    free : wp.array of vec3, shape (n,)
-        1 for free components, 0 for constrained ones.
-    """
-
-    points: NDArray[np.float64]
-    free: wp.array
-
-
 #: Aggregates of the coarse space, and rows of a matrix from which on it pays: the inverse of its matrix takes as long
 #: as some iterations, of which it saves more than half.
 _AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
@@ -257,7 +228,9 @@ _AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
 class _OnCores:
     """Solves with one matrix's pattern on the cores of a CPU; see `warpbrain.kernels.multicore_gradients`."""
 
-    def __init__(self, size: int, precision: Precision, device: Any, nodes: Nodes | None) -> None:
+    def __init__(
+        self, size: int, precision: Precision, device: Any, nodes: tuple[NDArray[np.float64], wp.array] | None
+    ) -> None:
         self._kernel, self._coarse_matrix = gradients_kernels(precision)
         self._precision, self._device = precision, device
         self._scratch = [self._zeros(size, precision.vec3) for _ in range(3)]
@@ -272,8 +245,8 @@ class _OnCores:
         self._free = self._places = self._zeros(0, precision.vec3)
         if nodes is not None and size >= _WORTH_A_COARSE_SPACE:
             self._count = -(-chunks // self._aggregate)
-            self._free = nodes.free
-            self._places = wp.array(self._affine(nodes.points), dtype=precision.vec3, device=device)
+            points, self._free = nodes
+            self._places = wp.array(self._affine(points), dtype=precision.vec3, device=device)
         self._coarse = self._zeros((self._count, 16 * self._count), precision.mat33)
         self._inverse = self._zeros((12 * self._count, 12 * self._count), precision.scalar)
         self._left, self._found = (self._zeros(12 * self._count, precision.scalar) for _ in range(2))
@@ -353,9 +326,9 @@ class ConjugateGradient:
     beyond : callable, optional
         ``beyond(x, factor, y)`` adds to `y` a factor times the product of `x` with what belongs to `A` and is in no
         block, whose diagonal blocks are in the matrix (and are taken off again there).
-    nodes : Nodes, optional
-        Where the rows are: on the CPU block-Jacobi has a coarse space then, if the matrix is large. `solve` cannot be
-        captured in a graph then.
+    nodes : pair of (n, 3) array and wp.array of vec3, shape (n,), optional
+        Where the rows are [m], and 1 for free components, 0 for constrained ones: on the CPU block-Jacobi has a coarse
+        space then, if the matrix is large. `solve` cannot be captured in a graph then.
     """
 
     def __init__(
@@ -371,7 +344,7 @@ class ConjugateGradient:
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
         beyond: Callable[[wp.array, float, wp.array], None] | None = None,
-        nodes: Nodes | None = None,
+        nodes: tuple[NDArray[np.float64], wp.array] | None = None,
     ) -> None:
         if preconditioner not in PRECONDITIONERS:
             raise ValueError(f"preconditioner {preconditioner!r}: expected one of {', '.join(PRECONDITIONERS)}")
@@ -452,13 +425,8 @@ class ConjugateGradient:
         x, y, z = self._vectors(x), self._vectors(y), self._vectors(z)
         self._launch_product(x, y, z, alpha, beta)
         if self._watch and beta == 0.0:
-            wp.launch(
-                self._kernels.partial_curvature,
-                dim=self._partial.shape[0],
-                inputs=[x, z, self._partial],
-                device=self._device,
-            )
-            wp.launch(self._kernels.least_curvature, dim=1, inputs=[self._partial, self._least], device=self._device)
+            launch(self._kernels.partial_curvature, self._partial.shape[0], [x, z, self._partial], self._device)
+            launch(self._kernels.least_curvature, 1, [self._partial, self._least], self._device)
 
     def _launch_product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         """`z = alpha A x + beta y`."""
@@ -473,19 +441,9 @@ class ConjugateGradient:
 
     def _apply_diagonal(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         scalar = self._precision.scalar
-        launch(
-            self._kernels.apply_diagonal,
-            dim=self._size,
-            inputs=[
-                self._inverse,
-                self._vectors(x),
-                self._vectors(y),
-                self._vectors(z),
-                scalar(alpha),
-                scalar(beta),
-            ],
-            device=self._device,
-        )
+        vectors = map(self._vectors, (x, y, z))
+        inputs = [self._inverse, *vectors, scalar(alpha), scalar(beta)]
+        launch(self._kernels.apply_diagonal, self._size, inputs, self._device)
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         """`z = A x`."""
@@ -500,12 +458,8 @@ class ConjugateGradient:
         if self._persistent is not None:
             return
         if self._kind == "block-jacobi":
-            launch(
-                self._kernels.invert_diagonal,
-                dim=self._size,
-                inputs=[self._diagonal, self._matrix.values, self._inverse],
-                device=self._device,
-            )
+            inputs = [self._diagonal, self._matrix.values, self._inverse]
+            launch(self._kernels.invert_diagonal, self._size, inputs, self._device)
             if self._on_cores is not None:
                 # who solves in another way, and only prepares, does without a coarse space
                 self._on_cores.is_stale = True
@@ -581,3 +535,43 @@ class ConjugateGradient:
         iterations, residual, tolerance = (float(values.numpy().ravel()[0]) for values in self._outcome)
         curvature = float(self._least.numpy()[0]) if self._watch else float("nan")
         return LinearResult(int(iterations), residual**0.5, tolerance**0.5, curvature)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def host_gradients(
+    multiply: Callable[[Floats], Floats],
+    precondition: Callable[[Floats], Floats],
+    x: Floats,
+    r: Floats,
+    goal: float,
+    most: int,
+) -> LinearResult:
+    """Preconditioned conjugate gradients on the host (Hestenes and Stiefel 1952) that watch the curvature.
+
+    They go on until the norm of the residual is at most the `goal`, and leave what they find in `x` (n,) and its
+    residual in `r`. They also end where the matrix or the preconditioner is not positive definite, or what they make is
+    not finite: so does a search that went too far.
+    """
+    p = np.zeros_like(r)
+    before, least = math.inf, math.inf
+    for iteration in range(most + 1):
+        # as a product, since NumPy hands a norm of CuPy's over to three kernels
+        left = math.sqrt(float(r @ r))
+        if not left > goal or iteration == most:
+            break
+        z = precondition(r)
+        along = float(r @ z)
+        if not 0.0 < along < math.inf:
+            break
+        p *= along / before
+        p += z
+        Ap = multiply(p)
+        curvature = float(p @ Ap)
+        least = min(least, curvature / float(p @ p))
+        # written so that what is not a number ends here, too
+        if not curvature > 0.0:
+            break
+        x += along / curvature * p
+        r -= along / curvature * Ap
+        before = along
+    return LinearResult(iteration, left, goal, least if math.isfinite(least) else math.nan)

@@ -6,13 +6,12 @@ convergence: a solve is a graph with a loop in it, captured once, on the CPU and
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.multicore import Graph, launch
 from warpbrain.kernels.precision import Precision
 
@@ -28,22 +27,11 @@ def four_vector(precision: Precision) -> Any:
     return wp.types.vector(length=4, dtype=precision.scalar)
 
 
-@dataclass(frozen=True)
-class _Kernels:
-    subtract: Any
-    partial_dot: Any
-    start: Any
-    keep_dot: Any
-    orthogonalise: Any
-    rotate: Any
-    update: Any
-
-
 @cache
-def _kernels(precision: Precision, unknown: Any) -> _Kernels:
+def _kernels(precision: Precision, unknown: Any) -> KernelSet:
     scalar = precision.scalar
     is_scalar = unknown is scalar
-    module = compiled_module(f"minimal_residual_{'scalar' if is_scalar else 'four'}_{precision.name}")
+    kernels = KernelSet(f"minimal_residual_{'scalar' if is_scalar else 'four'}_{precision.name}")
     chunk = wp.constant(_CHUNK)
     GAMMA_BEFORE, GAMMA, DELTA, ETA = (wp.constant(k) for k in (_GAMMA_BEFORE, _GAMMA, _DELTA, _ETA))
     C_BEFORE, C, S_BEFORE, S = (wp.constant(k) for k in (_C_BEFORE, _C, _S_BEFORE, _S))
@@ -60,12 +48,12 @@ def _kernels(precision: Precision, unknown: Any) -> _Kernels:
         def product(x: unknown, y: unknown):
             return wp.dot(x, y)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def subtract(b: wp.array[unknown], Ax: wp.array[unknown], r: wp.array[unknown]):
         i = wp.tid()
         r[i] = b[i] - Ax[i]
 
-    @wp.kernel(module=module)
+    @kernels.add
     def partial_dot(x: wp.array[unknown], y: wp.array[unknown], partial: wp.array[scalar]):
         t = wp.tid()
         total = scalar(0.0)
@@ -73,14 +61,14 @@ def _kernels(precision: Precision, unknown: Any) -> _Kernels:
             total += product(x[i], y[i])
         partial[t] = total
 
-    @wp.kernel(module=module)
+    @kernels.add
     def keep_dot(partial: wp.array[scalar], place: int, state: wp.array[scalar]):
         total = scalar(0.0)
         for t in range(partial.shape[0]):
             total += partial[t]
         state[place] = total
 
-    @wp.kernel(module=module)
+    @kernels.add
     def start(
         tolerance: wp.array[scalar],
         state: wp.array[scalar],
@@ -105,7 +93,7 @@ def _kernels(precision: Precision, unknown: Any) -> _Kernels:
         if gamma > tolerance[0] * state[NORM] and most > 0:
             go_on[0] = 1
 
-    @wp.kernel(module=module)
+    @kernels.add
     def orthogonalise(
         Az: wp.array[unknown], state: wp.array[scalar], v_before: wp.array[unknown], v: wp.array[unknown]
     ):
@@ -117,7 +105,7 @@ def _kernels(precision: Precision, unknown: Any) -> _Kernels:
         v[i] = Az[i] / gamma - delta / gamma * now - gamma / state[GAMMA_BEFORE] * v_before[i]
         v_before[i] = now
 
-    @wp.kernel(module=module)
+    @kernels.add
     def rotate(
         partial: wp.array[scalar],
         tolerance: wp.array[scalar],
@@ -153,7 +141,7 @@ def _kernels(precision: Precision, unknown: Any) -> _Kernels:
         if not (wp.abs(state[ETA]) > tolerance[0] * state[NORM]) or iterations[0] >= most:
             go_on[0] = 0
 
-    @wp.kernel(module=module)
+    @kernels.add
     def update(
         state: wp.array[scalar],
         z_next: wp.array[unknown],
@@ -170,7 +158,7 @@ def _kernels(precision: Precision, unknown: Any) -> _Kernels:
         x[i] = x[i] + state[DELTA] * new
         z[i] = z_next[i]
 
-    return _Kernels(subtract, partial_dot, start, keep_dot, orthogonalise, rotate, update)
+    return kernels
 
 
 #: ``(x, y)``: write a linear function of `x` to `y`.
@@ -180,21 +168,8 @@ Function = Callable[[wp.array, wp.array], None]
 class MinimalResidual:
     """MINRES for one symmetric operator and one symmetric positive definite preconditioner.
 
-    Parameters
-    ----------
-    size : int
-    unknown : type
-        Warp's type of an element of `b` and `x`: the scalar of the precision, or its `four_vector`.
-    precision : Precision
-    device : wp.Device
-    operator, preconditioner : callable
-        ``(x, y)`` writes `A x`, or `M^-1 x`, to `y` by launches alone.
-    max_iterations : int
-
-    Attributes
-    ----------
-    b, x : wp.array, shape (size,)
-        Right-hand side; first guess and result.
+    An element of `b` (right-hand side) and `x` (first guess and result), both (size,), is an `unknown`: the scalar of
+    the precision, or its `four_vector`. `operator` and `preconditioner` write `A x` and `M^-1 x` by launches alone.
     """
 
     def __init__(

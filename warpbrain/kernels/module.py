@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
@@ -25,11 +25,7 @@ _begun: list[Future[None]] = []
 def compiled_module(name: str, unroll: int | None = None) -> Any:
     """The Warp module of a name, with this package's compiler flags; pass it to ``wp.kernel(module=...)``.
 
-    Parameters
-    ----------
-    name : str
-    unroll : int, optional
-        Longest loop that is unrolled; Warp's default if absent.
+    Loops of at most `unroll` turns are unrolled; as many as Warp's default if absent.
     """
     module = wp.get_module(f"warpbrain_{name}")
     module.options["cpu_compiler_flags"] = _CPU_FLAGS
@@ -39,16 +35,28 @@ def compiled_module(name: str, unroll: int | None = None) -> Any:
     return module
 
 
+class KernelSet:
+    """Kernels of one module, by their names: each is one that `add` decorates; see `compiled_module`."""
+
+    def __init__(self, name: str, unroll: int | None = None) -> None:
+        self.module = compiled_module(name, unroll)
+
+    def add(self, function: Callable[..., None]) -> Any:
+        """Make a kernel of a function."""
+        kernel = wp.kernel(function, module=self.module)
+        setattr(self, function.__name__, kernel)
+        return kernel
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
+
+
 def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], None]:
     """Begin to compile the modules of kernels, or to find them in Warp's cache, beside what else is to be done.
 
-    All that is begun in a process is compiled in one thread: Warp precompiles its header once for each thread, and that
-    takes longer than four of our modules.
-
-    Returns
-    -------
-    callable
-        Waits for them, and raises what went wrong.
+    What is returned waits for them, and raises what went wrong. All that is begun in a process is compiled in one
+    thread: Warp precompiles its header once for each thread, and that takes longer than four of our modules.
     """
     modules = {kernel.module.name: kernel.module for kernel in kernels}
     begun = [_compiler(os.getpid()).submit(wp.force_load, device, [module]) for module in modules.values()]

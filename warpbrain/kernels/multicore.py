@@ -212,16 +212,7 @@ def _team() -> _Team | None:
 def launch(kernel: Any, dim: Any, inputs: Sequence[Any], device: Any, least: int = _LEAST) -> None:
     """Launch a kernel on a device; on a CPU on all its cores, if its first argument is called ``start``.
 
-    Parameters
-    ----------
-    kernel : wp.Kernel
-    dim : int or sequence of int
-        Items; ranges are of the first dimension.
-    inputs : sequence
-        Its arguments, without ``start``.
-    device : wp.Device
-    least : int
-        Items that are worth a part.
+    `inputs` are without ``start``; ranges are of the first dimension of `dim`, and `least` items are worth a part.
     """
     divides = kernel.adj.args[0].label == "start"
     inputs = [0, *inputs] if divides else inputs
@@ -240,16 +231,8 @@ def launch(kernel: Any, dim: Any, inputs: Sequence[Any], device: Any, least: int
 def launch_together(kernel: Any, items: int, inputs: Sequence[Any], device: Any) -> None:
     """Run a kernel of the CPU once for each of as many threads as so many items are worth.
 
-    It must not matter how many of the threads ever come.
-
-    Parameters
-    ----------
-    kernel : wp.Kernel
-        Its first arguments are ``thread, threads``.
-    items : int
-    inputs : sequence
-        Its further arguments.
-    device : wp.Device
+    Its first arguments are ``thread, threads``, `inputs` those after them. It must not matter how many of the threads
+    ever come.
     """
     team = _team()
     count = 1 if team is None else min(team.count, items // _LEAST)
@@ -286,12 +269,7 @@ def _run(
 
 
 class Graph:
-    """Launches that are captured once and replayed.
-
-    Parameters
-    ----------
-    device : wp.Device
-    """
+    """Launches on a device that are captured once and replayed."""
 
     _being_recorded = threading.local()
 

@@ -11,51 +11,15 @@ where `[v]_x` is the matrix of `v x`, from the derivative of the cofactor. The l
 patch. It is not assembled: of it there are diagonal blocks, for preconditioners, and products with vectors.
 """
 
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import warp as wp
 
 from warpbrain.kernels.invariants import cofactor
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
-from warpbrain.kernels.ten_nodes import FAR, NEAR, POINTS, UNROLL, gradient_at, shape_gradient
-
-
-@dataclass(frozen=True)
-class NodalVolumeKernels:
-    """Kernels of one precision.
-
-    Attributes
-    ----------
-    moments : wp.Kernel
-        ``(nodes, inverse_edges, volume, u) -> moments``, what an element adds to `M_a` of its corners.
-    pressures : wp.Kernel
-        ``(first, corners, moments, volumes, moduli, logarithmic) -> ratio, p, c``, one thread for a patch.
-    forces : wp.Kernel
-        ``(nodes, patches, inverse_edges, volume, p, u) -> forces``, one thread for an element.
-    tangents : wp.Kernel
-        The same with blocks, and the parts of an element of `g_ab`.
-    gather : wp.Kernel
-        ``(first, parts, of_elements) -> g``, one thread for a node of a patch.
-    diagonal : wp.Kernel
-        ``(first, entries, patches, c, g) -> g in the order of nodes, blocks``, one thread for a node.
-    taken_up : wp.Kernel
-        ``(first, nodes, c, g, columns, x) -> change of p_a``, one thread for a patch.
-    push : wp.Kernel
-        ``(first, patches, g in the order of nodes, change, diagonal, columns, rows, x, factor, scale) -> y``, one
-        thread for a node: without the diagonal blocks, added to `y`.
-    """
-
-    moments: Any
-    pressures: Any
-    forces: Any
-    tangents: Any
-    gather: Any
-    diagonal: Any
-    taken_up: Any
-    push: Any
+from warpbrain.kernels.ten_nodes import FAR, NEAR, POINTS, UNROLL, add_forces, gradient_at, shape_gradient
 
 
 @wp.func
@@ -76,14 +40,14 @@ def _pressure_at(p: wp.array[Any], patches: wp.array2d[int], e: int, point: int,
 
 
 @cache
-def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
+def nodal_volume_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"nodal_volume_{precision.name}", unroll=UNROLL)
+    kernels = KernelSet(f"nodal_volume_{precision.name}", unroll=UNROLL)
     share = wp.constant(scalar(1.0 / POINTS))
     vec4 = wp.types.vector(4, scalar)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def moments(
         nodes: wp.array2d[int],
         inverse_edges: wp.array[mat33],
@@ -91,6 +55,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         u: wp.array[vec3],
         out: wp.array2d[scalar],
     ):
+        """``(nodes, inverse_edges, volume, u) -> moments``, what an element adds to `M_a` of its corners."""
         e = wp.tid()
         found = vec4()
         for point in range(POINTS):
@@ -100,7 +65,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         for a in range(4):
             out[e, a] = found[a]
 
-    @wp.kernel(module=module)
+    @kernels.add
     def pressures(
         first: wp.array[int],
         corners: wp.array[int],
@@ -112,6 +77,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         p: wp.array[scalar],
         c: wp.array[scalar],
     ):
+        """``(first, corners, moments, volumes, moduli, logarithmic) -> ratio, p, c``, one thread for a patch."""
         a = wp.tid()
         sum = scalar(0.0)
         for k in range(first[a], first[a + 1]):
@@ -127,7 +93,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         p[a] = moduli[a] * slope
         c[a] = moduli[a] * curvature / volumes[a]
 
-    @wp.kernel(module=module)
+    @kernels.add
     def forces(
         nodes: wp.array2d[int],
         patches: wp.array2d[int],
@@ -137,18 +103,14 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         u: wp.array[vec3],
         out: wp.array2d[vec3],
     ):
+        """``(nodes, patches, inverse_edges, volume, p, u) -> forces``, one thread for an element."""
         e = wp.tid()
         G = inverse_edges[e]
         for point in range(POINTS):
             cof = cofactor(gradient_at(u, nodes, e, point, G))
-            cof = _pressure_at(p, patches, e, point, share * volume[e]) * cof
-            for b in range(10):
-                f = cof * shape_gradient(b, point, G)
-                if point > 0:
-                    f += out[e, b]
-                out[e, b] = f
+            add_forces(_pressure_at(p, patches, e, point, share * volume[e]) * cof, point, G, out, e)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def tangents(
         nodes: wp.array2d[int],
         patches: wp.array2d[int],
@@ -160,6 +122,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         blocks: wp.array2d[mat33],
         of_elements: wp.array2d[vec3],
     ):
+        """The same with blocks, and the parts of an element of `g_ab`."""
         e = wp.tid()
         G = inverse_edges[e]
         w = share * volume[e]
@@ -186,15 +149,16 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
                         K += blocks[e, block]
                     blocks[e, block] = K
 
-    @wp.kernel(module=module)
+    @kernels.add
     def gather(first: wp.array[int], parts: wp.array[int], of_elements: wp.array[vec3], g: wp.array[vec3]):
+        """``(first, parts, of_elements) -> g``, one thread for a node of a patch."""
         k = wp.tid()
         found = vec3()
         for part in range(first[k], first[k + 1]):
             found += of_elements[parts[part]]
         g[k] = found
 
-    @wp.kernel(module=module)
+    @kernels.add
     def diagonal(
         first: wp.array[int],
         entries: wp.array[int],
@@ -204,6 +168,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         by_node: wp.array[vec3],
         blocks: wp.array2d[mat33],
     ):
+        """``(first, entries, patches, c, g) -> g in the order of nodes, blocks``, one thread for a node."""
         b = wp.tid()
         found = mat33()
         for k in range(first[b], first[b + 1]):
@@ -213,7 +178,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
             found += wp.outer(c[patches[k]] * own, own)
         blocks[b, 0] = found
 
-    @wp.kernel(module=module)
+    @kernels.add
     def taken_up(
         first: wp.array[int],
         nodes: wp.array[int],
@@ -223,6 +188,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         x: wp.array[vec3],
         change: wp.array[scalar],
     ):
+        """``(first, nodes, c, g, columns, x) -> change of p_a``, one thread for a patch."""
         a = wp.tid()
         found = scalar(0.0)
         for k in range(first[a], first[a + 1]):
@@ -230,7 +196,7 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
             found += wp.dot(g[k], wp.cw_mul(columns[b], x[b]))
         change[a] = c[a] * found
 
-    @wp.kernel(module=module)
+    @kernels.add
     def push(
         first: wp.array[int],
         patches: wp.array[int],
@@ -244,10 +210,12 @@ def nodal_volume_kernels(precision: Precision) -> NodalVolumeKernels:
         scale: wp.array[scalar],
         y: wp.array[vec3],
     ):
+        """``(first, patches, g in the order of nodes, change, diagonal, columns, rows, x, factor, scale) -> y``, one
+        thread for a node: without the diagonal blocks, added to `y`."""
         b = wp.tid()
         found = -(own[b, 0] * wp.cw_mul(columns[b], x[b]))
         for k in range(first[b], first[b + 1]):
             found += change[patches[k]] * by_node[k]
         y[b] += factor * scale[0] * wp.cw_mul(rows[b], found)
 
-    return NodalVolumeKernels(moments, pressures, forces, tangents, gather, diagonal, taken_up, push)
+    return kernels

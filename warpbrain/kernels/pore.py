@@ -15,69 +15,24 @@ pressures is not constant in an element (Dohrmann and Bochev 2004). It is zero f
 lost, and zero in a steady flow, which has no rate.
 """
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import warp as wp
 
 from warpbrain.kernels.invariants import cofactor
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import PAIRS, deformation_gradient, store_blocks, store_forces
-
-
-@dataclass(frozen=True)
-class PoreKernels:
-    """Kernels of one precision.
-
-    Attributes
-    ----------
-    compliance : wp.Kernel
-        One thread for an element: the ten entries of its part of `S M + N + h (H + k_c M)`.
-    gather_compliance : wp.Kernel
-        One thread for an entry of the sparse matrix of all nodes; rows and columns of drained nodes are those of the
-        identity.
-    volumes : wp.Kernel
-        One thread for an element: `b_a`, the same for each of its nodes.
-    content : wp.Kernel
-        One thread for a node: the fluid `b + (S M + N) p` around it.
-    supply : wp.Kernel
-        One thread for a node: right-hand side of the pressure beyond that of the drained nodes.
-    forces, tangents : wp.Kernel
-        One thread for an element: forces of the pressure; with tangent blocks and `db/du` of its nodes too.
-    gather_coupling : wp.Kernel
-        One thread for an entry: `db_i/du_j` and `db_j/du_i`, zero for the `b` of drained nodes.
-    taken_up, push : wp.Kernel
-        One thread for a node: `db/du x`, and `y += factor (db/du)^T p`.
-    multiply, invert_diagonal, apply_diagonal : wp.Kernel
-        One thread for a row of a sparse matrix of scalars.
-    """
-
-    compliance: Any
-    gather_compliance: Any
-    volumes: Any
-    content: Any
-    supply: Any
-    forces: Any
-    tangents: Any
-    gather_coupling: Any
-    taken_up: Any
-    push: Any
-    multiply: Any
-    invert_diagonal: Any
-    apply_diagonal: Any
-
 
 #: Place of the entry (a, b) of an element among its ten.
 PLACES = tuple(PAIRS.index((min(a, b), max(a, b))) for a in range(4) for b in range(4))
 
 
 @cache
-def pore_kernels(precision: Precision) -> PoreKernels:
+def pore_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"pore_{precision.name}")
+    kernels = KernelSet(f"pore_{precision.name}")
     vec16i = wp.types.vector(length=16, dtype=int)
     places = wp.constant(vec16i(*PLACES))
 
@@ -88,7 +43,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
             g = G[a - 1]
         return g
 
-    @wp.kernel(module=module)
+    @kernels.add
     def compliance(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -102,6 +57,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         u: wp.array[vec3],
         out: wp.array2d[scalar],
     ):
+        """One thread for an element: the ten entries of its part of `S M + N + h (H + k_c M)`."""
         t = wp.tid()
         e = elements[t]
         G = inverse_edges[e]
@@ -120,7 +76,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
                     entry += even
                 out[t, places[4 * a + b]] = entry
 
-    @wp.kernel(module=module)
+    @kernels.add
     def gather_compliance(
         rows: wp.array[int],
         columns: wp.array[int],
@@ -130,6 +86,8 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         closed: wp.array[scalar],
         values: wp.array[scalar],
     ):
+        """One thread for an entry of the sparse matrix of all nodes; rows and columns of drained nodes are those of the
+        identity."""
         k = wp.tid()
         i = rows[k]
         j = columns[k]
@@ -142,7 +100,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
             total += scalar(1.0) - closed[i]
         values[k] = total
 
-    @wp.kernel(module=module)
+    @kernels.add
     def volumes(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -151,6 +109,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         u: wp.array[vec3],
         out: wp.array[scalar],
     ):
+        """One thread for an element: `b_a`, the same for each of its nodes."""
         t = wp.tid()
         e = elements[t]
         F = deformation_gradient(u, nodes[e], inverse_edges[e])
@@ -160,7 +119,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         second = scalar(0.5) * (tr * tr - wp.ddot(D, wp.transpose(D)))
         out[t] = volume[t] / scalar(4.0) * (tr + second + wp.determinant(D))
 
-    @wp.kernel(module=module)
+    @kernels.add
     def content(
         corner_first: wp.array[int],
         corners: wp.array[int],
@@ -173,6 +132,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         scale: wp.array[scalar],
         out: wp.array[scalar],
     ):
+        """One thread for a node: the fluid `b + (S M + N) p` around it."""
         i = wp.tid()
         total = scalar(0.0)
         for c in range(corner_first[i], corner_first[i + 1]):
@@ -184,7 +144,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
                 total += entries[t, places[4 * a + b]] * (beyond[near[b]] + numbers[0] * scale[0])
         out[i] = total
 
-    @wp.kernel(module=module)
+    @kernels.add
     def supply(
         corner_first: wp.array[int],
         corners: wp.array[int],
@@ -196,6 +156,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         scale: wp.array[scalar],
         out: wp.array[scalar],
     ):
+        """One thread for a node: right-hand side of the pressure beyond that of the drained nodes."""
         i = wp.tid()
         total = scalar(0.0)
         for c in range(corner_first[i], corner_first[i + 1]):
@@ -207,7 +168,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         total = beyond[near[0]] + beyond[near[1]] + beyond[near[2]] + beyond[near[3]]
         return pressure + total / scalar(4.0)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def forces(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -219,6 +180,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         u: wp.array[vec3],
         element_forces: wp.array2d[vec3],
     ):
+        """One thread for an element: forces of the pressure."""
         t = wp.tid()
         e = elements[t]
         G = inverse_edges[e]
@@ -230,7 +192,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         """`g . d(cof F)/dF . h`, times `J`, from `cof F g` and `cof F h`."""
         return wp.outer(c, d) - wp.outer(d, c)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def tangents(
         elements: wp.array[int],
         nodes: wp.array[wp.vec4i],
@@ -244,6 +206,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         element_blocks: wp.array2d[mat33],
         element_coupling: wp.array2d[vec3],
     ):
+        """Forces of the pressure, tangent blocks, and `db/du` of the nodes of an element."""
         t = wp.tid()
         e = elements[t]
         G = inverse_edges[e]
@@ -272,7 +235,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         element_coupling[t, 2] = quarter * b
         element_coupling[t, 3] = quarter * c
 
-    @wp.kernel(module=module)
+    @kernels.add
     def gather_coupling(
         rows: wp.array[int],
         columns: wp.array[int],
@@ -283,6 +246,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         own: wp.array[vec3],
         others: wp.array[vec3],
     ):
+        """One thread for an entry: `db_i/du_j` and `db_j/du_i`, zero for the `b` of drained nodes."""
         k = wp.tid()
         total = vec3()
         other = vec3()
@@ -294,7 +258,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         own[k] = closed[rows[k]] * total
         others[k] = closed[columns[k]] * other
 
-    @wp.kernel(module=module)
+    @kernels.add
     def taken_up(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -303,6 +267,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         x: wp.array[vec3],
         out: wp.array[scalar],
     ):
+        """One thread for a node: `db/du x`."""
         i = wp.tid()
         total = scalar(0.0)
         for k in range(offsets[i], offsets[i + 1]):
@@ -310,7 +275,7 @@ def pore_kernels(precision: Precision) -> PoreKernels:
             total += wp.dot(own[k], wp.cw_mul(mask[j], x[j]))
         out[i] = total
 
-    @wp.kernel(module=module)
+    @kernels.add
     def push(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -320,13 +285,14 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         mask: wp.array[vec3],
         y: wp.array[vec3],
     ):
+        """One thread for a node: `y += factor (db/du)^T p`."""
         i = wp.tid()
         total = vec3()
         for k in range(offsets[i], offsets[i + 1]):
             total += p[columns[k]] * others[k]
         y[i] = y[i] + factor * wp.cw_mul(mask[i], total)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def multiply(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -334,13 +300,14 @@ def pore_kernels(precision: Precision) -> PoreKernels:
         x: wp.array[scalar],
         y: wp.array[scalar],
     ):
+        """One thread for a row of a sparse matrix of scalars."""
         i = wp.tid()
         total = scalar(0.0)
         for k in range(offsets[i], offsets[i + 1]):
             total += values[k] * x[columns[k]]
         y[i] = total
 
-    @wp.kernel(module=module)
+    @kernels.add
     def invert_diagonal(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -354,12 +321,9 @@ def pore_kernels(precision: Precision) -> PoreKernels:
             if columns[k] == i:
                 inverse[i] = scalar(1.0) / values[k]
 
-    @wp.kernel(module=module)
+    @kernels.add
     def apply_diagonal(inverse: wp.array[scalar], x: wp.array[scalar], y: wp.array[scalar]):
         i = wp.tid()
         y[i] = inverse[i] * x[i]
 
-    return PoreKernels(
-        compliance, gather_compliance, volumes, content, supply, forces, tangents, gather_coupling, taken_up, push,
-        multiply, invert_diagonal, apply_diagonal,
-    )  # fmt: skip
+    return kernels

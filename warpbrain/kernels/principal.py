@@ -23,23 +23,13 @@ import warp as wp
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.svd import singular_value_decomposition
-from warpbrain.kernels.tetrahedron import ElementKernels, element_kernels
+from warpbrain.kernels.tetrahedron import ElementKernels, law_kernels
 
 
 @cache
 def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision: Precision) -> ElementKernels:
-    """Make (once) the element kernels of a law in principal stretches.
-
-    Parameters
-    ----------
-    key : str
-        Name of the law, part of the name of its compiled module.
-    energy_density, derivatives : wp.func
-        The law, as above.
-    precision : Precision
-    """
+    """Make (once) the element kernels of a law in principal stretches; `key` is part of the compiled module's name."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"{key}_{precision.name}")
     pointwise = compiled_module(f"{key}_{precision.name}_pointwise")
     small = wp.constant(scalar(precision.epsilon**2))
 
@@ -115,7 +105,4 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
         # row j of V is V^T e_j
         blocks[e, j, k] = block(V[j], V[k], H, same, swap, U)
 
-    forces, forces_and_tangents, energy, stress = element_kernels(
-        stress_of, energy_of, tangents_of, precision, module, pointwise
-    )
-    return ElementKernels(forces, forces_and_tangents, energy, stress, moduli, tangents_of, stress_of, energy_of)
+    return law_kernels(key, stress_of, energy_of, tangents_of, moduli, precision)

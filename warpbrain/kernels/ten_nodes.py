@@ -11,15 +11,18 @@ exactly, keeps the order of the element for any law (Ciarlet 1978, theorem 4.1.6
 points only, where more would lock sooner near incompressibility.
 """
 
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import warp as wp
 
+from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.tetrahedron import DeviceLaw, ElementKernels, Stencil, element_kernels
+
 #: Quadrature points of an element; their barycentric coordinates are `NEAR` at one corner and `FAR` at the others.
 POINTS = 4
 NEAR, FAR = 0.5854101966249685, 0.1381966011250105
-#: Local node pairs (a, b), a <= b, of the stored blocks, row by row.
-BLOCKS = 55
 #: Longest loop to unroll: pairs of ten nodes at four points would be compiled 220 times over.
 UNROLL = 3
 
@@ -108,3 +111,24 @@ def add_blocks(
             if point > 0:
                 K += element_blocks[t, block]
             element_blocks[t, block] = K
+
+
+@wp.func
+def _axes(G: Any):
+    return wp.identity(n=3, dtype=G.dtype)
+
+
+#: Tetrahedra of ten nodes.
+TEN_NODES = Stencil("_quadratic", POINTS, wp.array2d[int], gradient_at, _axes, add_forces, add_blocks, UNROLL)
+
+
+@cache
+def quadratic_kernels(law: DeviceLaw, precision: Precision) -> ElementKernels:
+    """Make (once) the element kernels of a law for elements of ten nodes, (m, 10) arrays of int.
+
+    ``energy`` also gives the smallest `J` of an element's quadrature points.
+    """
+    linear = law.kernels(precision)
+    functions = linear.stress_at, linear.energy_at, linear.tangents
+    forces, tangents, energy = element_kernels(law.key, *functions, precision, TEN_NODES)
+    return replace(linear, forces=forces, forces_and_tangents=tangents, energy=energy)

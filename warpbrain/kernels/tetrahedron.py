@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 import warp as wp
 
+from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 
 #: Local node pairs (a, b) of the ten stored blocks, in storage order.
@@ -106,28 +107,83 @@ def store_blocks(K11: Any, K12: Any, K13: Any, K22: Any, K23: Any, K33: Any, ele
     element_blocks[e, 9] = K33
 
 
-def element_kernels(
-    stress_of: Any, energy_of: Any, tangents_of: Any, precision: Precision, module: Any, pointwise: Any
-) -> tuple[Any, Any, Any, Any]:
-    """Make the kernels that every law has alike: forces, forces and tangents, energy and stress of `ElementKernels`.
+@wp.func
+def _gradient(u: wp.array[Any], nodes: wp.array[wp.vec4i], e: int, point: int, G: Any):
+    return deformation_gradient(u, nodes[e], G)
 
-    Parameters
+
+@wp.func
+def _directions(G: Any):
+    return G
+
+
+@wp.func
+def _forces(VP: Any, point: int, G: Any, element_forces: wp.array2d[Any], e: int):
+    store_forces(VP, G, element_forces, e)
+
+
+@wp.func
+def _blocks(
+    K11: Any, K12: Any, K13: Any, K22: Any, K23: Any, K33: Any, point: int, G: Any, out: wp.array2d[Any], e: int
+):
+    store_blocks(K11, K12, K13, K22, K23, K33, out, e)
+
+
+@dataclass(frozen=True)
+class Stencil:
+    """How kernels see elements of one shape: at each quadrature point as a linear tetrahedron.
+
+    Attributes
     ----------
-    stress_of, energy_of : wp.func
-        ``stress_of(F, parameters, e) -> P`` and ``energy_of(F, parameters, e) -> Psi``.
-    tangents_of : wp.func
-        See `ElementKernels.tangents`.
-    precision : Precision
-    module, pointwise : Module
-        Where the kernels over a mesh, and those at given deformation gradients, are compiled.
+    suffix : str
+        Of the names of compiled modules.
+    points : int
+        Quadrature points, of equal weights.
+    nodes : type
+        Of the array of nodes.
+    gradient : wp.func
+        ``(u, nodes, e, point, G) -> F``; the rows of `G` are the gradients of the barycentric coordinates 1 to 3.
+    directions : wp.func
+        ``(G) -> D``: the rows `d_j` of the six `w d_j . dP/dF . d_k`, j <= k, that `blocks` takes.
+    forces, blocks : wp.func
+        ``(w P, point, G, element_forces, row)`` and ``(six blocks, point, G, element_blocks, row)``: store what a point
+        adds.
+    unroll : int or None
+        See `warpbrain.kernels.module.compiled_module`.
+    """
+
+    suffix: str
+    points: int
+    nodes: Any
+    gradient: Any
+    directions: Any
+    forces: Any
+    blocks: Any
+    unroll: int | None = None
+
+
+#: Linear tetrahedra.
+FOUR_NODES = Stencil("", 1, wp.array[wp.vec4i], _gradient, _directions, _forces, _blocks)
+
+
+def element_kernels(
+    key: str, stress_of: Any, energy_of: Any, tangents_of: Any, precision: Precision, stencil: Stencil
+) -> tuple[Any, Any, Any]:
+    """Make the kernels that every law has alike: forces, forces and tangents, and energy of `ElementKernels`.
+
+    `key` is the name of the law; `stress_of`, `energy_of` and `tangents_of` are as there.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"{key}_{precision.name}{stencil.suffix}", stencil.unroll)
+    nodes_type, points, share = stencil.nodes, stencil.points, wp.constant(scalar(1.0 / stencil.points))
+    gradient_at, directions_of = stencil.gradient, stencil.directions
+    add_forces, add_blocks = stencil.forces, stencil.blocks
 
     @wp.kernel(module=module)
     def forces(
         start: int,
         elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
+        nodes: nodes_type,
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
         parameters: wp.array2d[scalar],
@@ -136,14 +192,15 @@ def element_kernels(
     ):
         e = elements[start + wp.tid()]
         G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
-        store_forces(volume[e] * stress_of(F, parameters, e), G, element_forces, e)
+        for point in range(points):
+            F = gradient_at(u, nodes, e, point, G)
+            add_forces(share * volume[e] * stress_of(F, parameters, e), point, G, element_forces, e)
 
     @wp.kernel(module=module)
     def forces_and_tangents(
         start: int,
         elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
+        nodes: nodes_type,
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
         parameters: wp.array2d[scalar],
@@ -153,16 +210,18 @@ def element_kernels(
     ):
         e = elements[start + wp.tid()]
         G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
-        VP, K11, K12, K13, K22, K23, K33 = tangents_of(F, G, volume[e], parameters, e)
-        store_forces(VP, G, element_forces, e)
-        store_blocks(K11, K12, K13, K22, K23, K33, element_blocks, e)
+        D = directions_of(G)
+        for point in range(points):
+            F = gradient_at(u, nodes, e, point, G)
+            VP, K11, K12, K13, K22, K23, K33 = tangents_of(F, D, share * volume[e], parameters, e)
+            add_forces(VP, point, G, element_forces, e)
+            add_blocks(K11, K12, K13, K22, K23, K33, point, G, element_blocks, e)
 
     @wp.kernel(module=module)
     def energy(
         start: int,
         elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
+        nodes: nodes_type,
         inverse_edges: wp.array[mat33],
         volume: wp.array[scalar],
         parameters: wp.array2d[scalar],
@@ -171,15 +230,30 @@ def element_kernels(
         element_J: wp.array[scalar],
     ):
         e = elements[start + wp.tid()]
-        F = deformation_gradient(u, nodes[e], inverse_edges[e])
-        J = wp.determinant(F)
-        element_J[e] = J
-        # An inverted element has no energy: the caller rejects the state by its J.
-        element_energy[e] = scalar(0.0)
-        if J > scalar(0.0):  # noqa: SIM300  (a scalar of the device, not a constant)
-            element_energy[e] = volume[e] * energy_of(F, parameters, e)
+        stored = scalar(0.0)
+        smallest = scalar(0.0)
+        for point in range(points):
+            F = gradient_at(u, nodes, e, point, inverse_edges[e])
+            J = wp.determinant(F)
+            # so that a J that is no number counts as smallest
+            if point == 0 or not (smallest <= J):
+                smallest = J
+            # an inverted element has no energy: the caller rejects the state by its J
+            if J > scalar(0.0):  # noqa: SIM300  (a scalar of the device, not a constant)
+                stored += share * volume[e] * energy_of(F, parameters, e)
+        element_energy[e] = stored
+        element_J[e] = smallest
 
-    @wp.kernel(module=pointwise)
+    return forces, forces_and_tangents, energy
+
+
+def law_kernels(
+    key: str, stress_of: Any, energy_of: Any, tangents_of: Any, moduli: Any, precision: Precision
+) -> ElementKernels:
+    """The kernels of a law on linear tetrahedra; those at given `F` are in the module of `moduli`."""
+    scalar, mat33 = precision.scalar, precision.mat33
+
+    @wp.kernel(module=moduli.module)
     def stress(
         elements: wp.array[int],
         F: wp.array[mat33],
@@ -191,4 +265,5 @@ def element_kernels(
         density[e] = energy_of(F[e], parameters, e)
         P[e] = stress_of(F[e], parameters, e)
 
-    return forces, forces_and_tangents, energy, stress
+    of_elements = element_kernels(key, stress_of, energy_of, tangents_of, precision, FOUR_NODES)
+    return ElementKernels(*of_elements, stress, moduli, tangents_of, stress_of, energy_of)

@@ -18,12 +18,9 @@ from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
-from warpbrain.kernels.host_gradients import host_gradients
-from warpbrain.kernels.linear import ConjugateGradient, LinearResult
-
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Floats
+from warpbrain.kernels.linear import ConjugateGradient, LinearResult, host_gradients
 
 #: Eigenvalues that are smoothed: from this part of the largest one.
 _SMOOTHED_FROM = 0.125
@@ -41,19 +38,11 @@ class CoarseSolver(Protocol):
 
 
 class TwoLevelGradient:
-    """Solves as a `ConjugateGradient` does, in fewer iterations.
+    """Solves as the `plain` `ConjugateGradient` does, in fewer iterations.
 
-    Parameters
-    ----------
-    plain : ConjugateGradient
-        Of the finer mesh, on the CPU, in double precision, preconditioned by diagonal blocks.
-    right_hand_side, solution : wp.array of vec3, shape (n,)
-        Those of `plain`.
-    coarse : CoarseSolver
-    prolongation : SciPy CSR (3 n, k)
-        From free components of the coarser mesh to those of the finer one; rows of constrained ones are zero.
-    tolerance : float
-        Relative. What `solve` takes if it is given no other.
+    `plain` is of the finer mesh, on the CPU, in double precision, preconditioned by diagonal blocks; right-hand side
+    and solution are its own. `prolongation`, SciPy CSR (3 n, k), goes from free components of the coarser mesh to those
+    of the finer one; rows of constrained ones are zero.
 
     Attributes
     ----------

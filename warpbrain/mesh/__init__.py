@@ -4,9 +4,9 @@ Importing this package costs NumPy and nothing else; SciPy and meshio are import
 """
 
 from warpbrain.mesh.files import MeshInFile, read_mesh, read_mesh_file, write_mesh
+from warpbrain.mesh.free_surfaces import faces_of, vertex_normals, wall_nodes
 from warpbrain.mesh.half_space import integrals_above, integrals_of_shapes, integrals_on_plane, summed_at_nodes
 from warpbrain.mesh.integrals import surface_forces, volume_forces
-from warpbrain.mesh.ordering import ordered
 from warpbrain.mesh.patches import patch_around
 from warpbrain.mesh.quadratic import QuadraticMesh
 from warpbrain.mesh.quality import Quality, components, dihedral_angles, measure
@@ -14,7 +14,6 @@ from warpbrain.mesh.surface import (
     boundary_faces,
     closed_surfaces,
     face_vectors,
-    faces_of,
     interface_faces,
     node_areas,
     nodes_of,
@@ -22,10 +21,8 @@ from warpbrain.mesh.surface import (
     rim_edges,
     split_boundary,
     tangents,
-    vertex_normals,
-    wall_nodes,
 )
-from warpbrain.mesh.tet_mesh import MeshError, TetMesh
+from warpbrain.mesh.tet_mesh import MeshError, TetMesh, ordered
 
 __all__ = [
     "MeshError",

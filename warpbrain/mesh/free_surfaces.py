@@ -1,4 +1,4 @@
-"""The connected surfaces of a body that nothing holds: its outside, the walls of its voids, the wall of a cut."""
+"""Surfaces of a body: of sets of nodes, and what nothing holds, its outside, the walls of its voids, that of a cut."""
 
 from __future__ import annotations
 
@@ -9,8 +9,17 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.surface import closed_surfaces, face_vectors, faces_of, in_rows, nodes_of
-from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+from warpbrain.mesh.surface import (
+    Bools,
+    Floats,
+    Ints,
+    closed_surfaces,
+    face_vectors,
+    in_rows,
+    interface_faces,
+    nodes_of,
+)
+from warpbrain.mesh.tet_mesh import TetMesh
 
 #: The outside of a body, the wall of a void within it, and what was inside until tetrahedra were taken out.
 Origin = Literal["outer", "inner", "cut"]
@@ -123,3 +132,41 @@ def rim_corners(mesh: TetMesh) -> Ints:
     """Triangles (k, 3) of the cut whose nodes are all on its rim: a set of nodes of the surface beside holds them."""
     beside = mesh.boundary[~in_rows(mesh.boundary, mesh.cut)]
     return np.asarray(mesh.cut[nodes_of(beside, len(mesh.points))[mesh.cut].all(axis=1)])
+
+
+def faces_of(mesh: TetMesh, members: Bools) -> Ints:
+    """Triangles of the boundary that a set of nodes holds.
+
+    A triangle of the surface beside a cut can have all its nodes on the cut's rim. It is no part of the wall: where all
+    members on the boundary are nodes of the cut, the set has triangles of the cut alone.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    members : (n,) bool array
+
+    Returns
+    -------
+    (k, 3) int32 array
+        Node ids, oriented outwards: triangles all of whose nodes are members.
+    """
+    faces = mesh.boundary
+    held = faces[members[faces].all(axis=1)]
+    beside = members & nodes_of(faces, len(members)) & ~nodes_of(mesh.cut, len(members))
+    if not len(mesh.cut) or beside.any():
+        return held
+    return np.asarray(held[in_rows(held, mesh.cut)])
+
+
+def wall_nodes(mesh: TetMesh, elements: str) -> Bools:
+    """Nodes (n,) of the wall that taking out an element set leaves: of its faces with tetrahedra that stay."""
+    return nodes_of(interface_faces(mesh.tetrahedra, mesh.element_sets[elements]), len(mesh.points))
+
+
+def vertex_normals(mesh: TetMesh) -> Floats:
+    """Outward unit normals (n, 3) at the nodes of the boundary, means over their faces; zero at all other nodes."""
+    faces = mesh.boundary
+    normals = np.zeros_like(mesh.points)
+    np.add.at(normals, faces.ravel(), np.repeat(face_vectors(mesh.points, faces), 3, axis=0))
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0))

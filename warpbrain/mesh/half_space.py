@@ -15,11 +15,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.arrays import Ints
 from warpbrain.mesh.integrals import shape_values, triangle_rule
 from warpbrain.mesh.quadratic import QuadraticMesh
-from warpbrain.mesh.tet_mesh import Floats, TetMesh
-
-Ints = NDArray[np.int64]
+from warpbrain.mesh.surface import Floats
+from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Barycentric points of a rule of degree 2 on a tetrahedron, of equal weights (Keast 1986); exact for quadratic shapes.
 _ALPHA = (5.0 - np.sqrt(5.0)) / 20.0

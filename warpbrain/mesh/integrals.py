@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.mesh.quadratic import QuadraticMesh
-from warpbrain.mesh.surface import face_vectors
-from warpbrain.mesh.tet_mesh import Floats, TetMesh
+from warpbrain.mesh.surface import Floats, face_vectors
+from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Values (k, 3) of a field at points (k, 3).
 Field = Callable[[Floats], Floats]
@@ -46,7 +46,7 @@ def shape_values(bary: Floats) -> Floats:
     """Quadratic shape functions (q, 6) on triangles or (q, 10) on tetrahedra, at barycentric points (q, 3) or (q, 4).
 
     Those of corners, `L (2 L - 1)`, then those of edges, `4 L_a L_b`: 01, 02, 12 of a triangle, in the order of
-    `warpbrain.mesh.quality.EDGES` of a tetrahedron.
+    `warpbrain.mesh.surface.EDGES` of a tetrahedron.
     """
     triangle = bary.shape[1] == 3
     first, second = ((0, 0, 1), (1, 2, 2)) if triangle else ((0, 0, 0, 1, 1, 2), (1, 2, 3, 2, 3, 3))

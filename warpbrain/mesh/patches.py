@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.surface import face_vectors
-from warpbrain.mesh.tet_mesh import Bools, Floats
+from warpbrain.mesh.surface import SIDES, Floats, closed_surfaces, face_vectors
 
-_SIDES = np.array([[0, 1], [1, 2], [2, 0]])
 #: Cosine of the angle between two triangles that face different ways: a right angle, but for rounding.
 _ASIDE = 1e-6
 
@@ -54,7 +52,8 @@ def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     facing = normals @ normals[start] > _ASIDE
     taken = np.flatnonzero((distance < radius) & facing)
-    together = _connected(triangles[near[taken]], corners[near[taken]], radius)
+    within = _nearest_on_sides(corners[near[taken]][:, SIDES])[1].ravel() < radius
+    together = closed_surfaces(triangles[near[taken]], within)
     return np.asarray(near[taken[together == together[np.searchsorted(taken, start)]]])
 
 
@@ -66,12 +65,12 @@ def nearest_to_origin(corners: Floats) -> Floats:
     found = np.column_stack([1.0 - inner.sum(axis=1), inner])
     outside = np.flatnonzero((found < 0.0).any(axis=1))
     # beyond the triangle the nearest point is on a side
-    ends = corners[outside][:, _SIDES]
+    ends = corners[outside][:, SIDES]
     part, distance = _nearest_on_sides(ends)
     side, every = np.argmin(distance, axis=1), np.arange(len(outside))
     found[outside] = 0.0
-    found[outside, _SIDES[side, 0]] = 1.0 - part[every, side]
-    found[outside, _SIDES[side, 1]] = part[every, side]
+    found[outside, SIDES[side, 0]] = 1.0 - part[every, side]
+    found[outside, SIDES[side, 1]] = part[every, side]
     return found
 
 
@@ -80,19 +79,3 @@ def _nearest_on_sides(ends: Floats) -> tuple[Floats, Floats]:
     along = ends[..., 1, :] - ends[..., 0, :]
     part = np.clip(-(ends[..., 0, :] * along).sum(axis=-1) / (along**2).sum(axis=-1), 0.0, 1.0)
     return part, np.linalg.norm(ends[..., 0, :] + part[..., None] * along, axis=-1)
-
-
-def _connected(faces: NDArray[np.integer], corners: Floats, radius: float) -> NDArray[np.int64]:
-    """Number (k,) of the piece that each triangle belongs to; triangles share a piece through edges in the radius."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    within: Bools = _nearest_on_sides(corners[:, _SIDES])[1].ravel() < radius
-    edges = np.sort(faces[:, _SIDES].reshape(-1, 2), axis=1)
-    number = np.unique(edges, axis=0, return_inverse=True)[1].ravel()
-    owner = np.repeat(np.arange(len(faces)), 3)
-    # triangles and edges are the two sides of one graph
-    size = len(faces) + int(number.max()) + 1
-    links = np.ones(int(within.sum()), dtype=bool)
-    graph = coo_array((links, (owner[within], len(faces) + number[within])), shape=(size, size))
-    return np.asarray(connected_components(graph, directed=False)[1][: len(faces)], dtype=np.int64)

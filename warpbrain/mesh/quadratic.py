@@ -12,10 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.quality import EDGES
 from warpbrain.mesh.refinement import inherited, refined
-from warpbrain.mesh.surface import nodes_of
-from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+from warpbrain.mesh.surface import EDGES, Bools, Floats, Ints, nodes_of
+from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Parts of a tetrahedron's mass for each corner and each midside node: the diagonal of the consistent mass matrix,
 #: `V/70` and `8 V/105`, scaled to the mass of the element (Hinton, Rock and Zienkiewicz 1976).
@@ -40,7 +39,7 @@ class QuadraticMesh:
         Corners between which each node lies in the middle; a corner lies between itself and itself.
     elements : (m, 10) int array
         Nodes of each tetrahedron, ascending: its corners, then its midside nodes in the order of
-        `warpbrain.mesh.quality.EDGES`.
+        `warpbrain.mesh.surface.EDGES`.
     """
 
     corners: TetMesh
@@ -124,7 +123,7 @@ def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> 
     corners : (n, 4, c) array
         Values at the corners of its tetrahedron.
     middles : (n, 6, c) array
-        Values in the middle of the edges, in the order of `warpbrain.mesh.quality.EDGES`.
+        Values in the middle of the edges, in the order of `warpbrain.mesh.surface.EDGES`.
 
     Returns
     -------

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh.quality import EDGES
-from warpbrain.mesh.surface import in_rows, nodes_of
-from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+from warpbrain.mesh.surface import EDGES, Bools, Floats, Ints, in_rows, nodes_of
+from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Corners 0 to 3 and the midpoints of edges 01, 02, 03, 12, 13, 23 as 4 to 9: what is cut off at each corner.
 _CORNERS = np.array([[0, 4, 5, 6], [4, 1, 7, 8], [5, 7, 2, 9], [6, 8, 9, 3]])

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools
 from warpbrain.mesh.abaqus import MATERIAL_SETS
 from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_of, read_raw
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
@@ -30,8 +31,6 @@ MOST_VALUES = 256
 _BOOKKEEPING = re.compile(r"gmsh:geometrical|gmsh:dim_tags|vtk\w+|Global\w*Ids?|Ids?|rank|partition\w*", re.IGNORECASE)
 _PHYSICAL = "gmsh:physical"
 _DIMENSION = {"vertex": 0, "line": 1, "line3": 1}
-
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

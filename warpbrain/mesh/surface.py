@@ -1,14 +1,34 @@
-"""Surfaces of a tetrahedral mesh: its boundary, the closed surfaces that make it up, and interfaces between tissues."""
+"""Surfaces of tetrahedra, as arrays of node ids: boundary, closed surfaces that make it up, interfaces of tissues."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.tet_mesh import Bools, Floats, Ints, TetMesh
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Bools = NDArray[np.bool_]
 
 # corners of the four faces of a positive tetrahedron, each seen counter-clockwise from outside; face i is opposite i
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+#: Corners of the edges of a tetrahedron.
+EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+#: Corners of the sides of a triangle, one way around.
+SIDES = np.array([[0, 1], [1, 2], [2, 0]])
+
+
+def connected(links: NDArray[np.integer], count: int) -> NDArray[np.int32]:
+    """Number (count,) of the connected part that each of some things is in, by pairs (k, 2) of things that touch."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(links), dtype=bool), (links[:, 0], links[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def edges_of(faces: ArrayLike) -> NDArray[np.int64]:
+    """Sides (3 b, 2) of triangles (b, 3), one triangle after the other, ends ascending."""
+    return np.sort(np.asarray(faces, dtype=np.int64)[:, SIDES].reshape(-1, 2), axis=1)
 
 
 def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -112,30 +132,6 @@ def in_rows(faces: ArrayLike, others: ArrayLike) -> Bools:
     return np.asarray(np.isin(number[: len(rows[0])], number[len(rows[0]) :]))
 
 
-def faces_of(mesh: TetMesh, members: Bools) -> Ints:
-    """Triangles of the boundary that a set of nodes holds.
-
-    A triangle of the surface beside a cut can have all its nodes on the cut's rim. It is no part of the wall: where all
-    members on the boundary are nodes of the cut, the set has triangles of the cut alone.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    members : (n,) bool array
-
-    Returns
-    -------
-    (k, 3) int32 array
-        Node ids, oriented outwards: triangles all of whose nodes are members.
-    """
-    faces = mesh.boundary
-    held = faces[members[faces].all(axis=1)]
-    beside = members & nodes_of(faces, len(members)) & ~nodes_of(mesh.cut, len(members))
-    if not len(mesh.cut) or beside.any():
-        return held
-    return np.asarray(held[in_rows(held, mesh.cut)])
-
-
 def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
     """Edges at which an oriented surface ends.
 
@@ -151,36 +147,32 @@ def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
         touches itself.
     """
     triangles = np.asarray(faces, dtype=np.int64)
-    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    sides = triangles[:, SIDES].reshape(-1, 2)
     edges, number = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
     along = np.bincount(number.ravel(), weights=np.where(sides[:, 0] < sides[:, 1], 1.0, -1.0), minlength=len(edges))
     return np.asarray(edges[along != 0.0])
 
 
-def closed_surfaces(faces: ArrayLike) -> Ints:
+def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Ints:
     """Number of the edge-connected surface each triangle belongs to.
 
     Parameters
     ----------
     faces : (b, 3) array
         Node ids.
+    joins : (3 b,) bool array, optional
+        Which of their sides, see `edges_of`, connect; all by default.
 
     Returns
     -------
     (b,) int32 array
         Surface numbers 0, 1, ...
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    triangles = np.asarray(faces)
-    edges = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    number = np.unique(edges, axis=0, return_inverse=True)[1].ravel()
-    owner = np.repeat(np.arange(len(triangles)), 3)
+    count = len(np.asarray(faces))
+    number = np.unique(edges_of(faces), axis=0, return_inverse=True)[1].ravel()
     # triangles and edges are the two sides of one graph, so an edge of any number of triangles is no special case
-    size = len(triangles) + int(number.max()) + 1
-    graph = coo_array((np.ones(len(owner), dtype=bool), (owner, len(triangles) + number)), shape=(size, size))
-    labels: Ints = connected_components(graph, directed=False)[1][: len(triangles)]
+    links = np.column_stack([np.repeat(np.arange(count), 3), count + number])
+    labels = connected(links if joins is None else links[joins], count + int(number.max()) + 1)[:count]
     return np.asarray(np.unique(labels, return_inverse=True)[1].ravel(), dtype=np.int32)
 
 
@@ -198,22 +190,17 @@ def pinched_nodes(faces: ArrayLike) -> Ints:
         Ids of nodes on an edge of more than two triangles, and of nodes whose triangles form more than one fan.
         Empty for smooth closed surfaces.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     triangles = np.asarray(faces)
-    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    sides = triangles[:, SIDES].reshape(-1, 2)
     # number of the triangle's own corner at either end of each side, sides turned so that equal ones look equal
-    own = (3 * np.arange(len(triangles))[:, None, None] + np.array([[0, 1], [1, 2], [2, 0]])).reshape(-1, 2)
+    own = (3 * np.arange(len(triangles))[:, None, None] + SIDES).reshape(-1, 2)
     turned = sides[:, 0] > sides[:, 1]
     sides[turned], own[turned] = sides[turned, ::-1], own[turned, ::-1]
     order = np.lexsort(sides.T)
     same = (sides[order][1:] == sides[order][:-1]).all(axis=1)
     first, second = own[order][:-1][same], own[order][1:][same]
     links = np.concatenate([np.stack([first[:, k], second[:, k]], axis=1) for k in (0, 1)])
-    size = triangles.size
-    graph = coo_array((np.ones(len(links), dtype=bool), (links[:, 0], links[:, 1])), shape=(size, size))
-    fan = connected_components(graph, directed=False)[1]
+    fan = connected(links, triangles.size)
     node_of_fan = np.unique(np.stack([triangles.ravel(), fan], axis=1), axis=0)[:, 0]
     nodes, fans = np.unique(node_of_fan, return_counts=True)
     edges, owners = np.unique(sides, axis=0, return_counts=True)
@@ -256,11 +243,6 @@ def nodes_of(faces: ArrayLike, count: int) -> Bools:
     return members
 
 
-def wall_nodes(mesh: TetMesh, elements: str) -> Bools:
-    """Nodes (n,) of the wall that taking out an element set leaves: of its faces with tetrahedra that stay."""
-    return nodes_of(interface_faces(mesh.tetrahedra, mesh.element_sets[elements]), len(mesh.points))
-
-
 def face_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:
     """Area vectors (b, 3) of triangles (b, 3): along the normal, as long as the area is large."""
     corner = np.asarray(points, dtype=np.float64)[np.asarray(faces)]
@@ -270,15 +252,6 @@ def face_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:
 def tangents(normals: ArrayLike) -> Floats:
     """Two unit vectors (..., 2, 3) at right angles to directions (..., 3), and to each other."""
     return np.asarray(np.linalg.svd(np.asarray(normals, dtype=np.float64)[..., None, :])[2][..., 1:, :])
-
-
-def vertex_normals(mesh: TetMesh) -> Floats:
-    """Outward unit normals (n, 3) at the nodes of the boundary, means over their faces; zero at all other nodes."""
-    faces = mesh.boundary
-    normals = np.zeros_like(mesh.points)
-    np.add.at(normals, faces.ravel(), np.repeat(face_vectors(mesh.points, faces), 3, axis=0))
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0))
 
 
 def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
@@ -300,3 +273,50 @@ def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
     triangles = np.asarray(faces)
     lumped = np.bincount(triangles.ravel(), weights=np.repeat(share, 3), minlength=len(np.asarray(points)))
     return np.asarray(lumped, dtype=np.float64)
+
+
+def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.bool_]]:
+    """Angle-weighted normals (Baerentzen and Aanaes 2005) of each triangle's features, and which are on a rim.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    faces : (k, 3) int array
+        Oriented outwards.
+
+    Returns
+    -------
+    normals : (k, 7, 3) array
+        Unit normals of the face, of its edges ab, bc, ca and of its corners. The closest point `p` of a closed surface
+        to `x` has `x` outside if `(x - p) . n > 0` with the normal of the feature that `p` is on.
+    on_rim : (k, 7) bool array
+        True for an edge of one triangle only and its corners, whose normal is that of the face.
+    """
+    normals = np.empty((len(faces), 7, 3))
+    normals[:, 0] = _unit(face_vectors(points, faces))
+    on_rim = np.zeros((len(faces), 7), dtype=bool)
+
+    edges = edges_of(faces)
+    _, edge, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    edge = edge.reshape(-1, 3)
+    sums = np.zeros((len(count), 3))
+    np.add.at(sums, edge.ravel(), np.repeat(normals[:, 0], 3, axis=0))
+    normals[:, 1:4] = _unit(sums)[edge]
+    on_rim[:, 1:4] = (count == 1)[edge]
+
+    sums = np.zeros_like(points)
+    for i in range(3):
+        here, ahead, behind = (points[faces[:, (i + k) % 3]] for k in range(3))
+        cosine = np.einsum("kj,kj->k", _unit(ahead - here), _unit(behind - here))
+        np.add.at(sums, faces[:, i], np.arccos(np.clip(cosine, -1.0, 1.0))[:, None] * normals[:, 0])
+    normals[:, 4:] = _unit(sums)[faces]
+    rim = np.zeros(len(points), dtype=bool)
+    rim[edges[(count == 1)[edge.ravel()]].ravel()] = True
+    on_rim[:, 4:] = rim[faces]
+
+    return np.where(on_rim[:, :, None], normals[:, :1], normals), on_rim
+
+
+def _unit(vectors: Floats) -> Floats:
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(lengths > 0.0, lengths, 1.0)

@@ -12,11 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import InputError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
-
+from warpbrain.mesh.surface import FACES, Bools, Floats, Ints, boundary_faces, in_rows, interface_faces
 
 #: A coordinate [m] beyond this is no place.
 LARGEST = 1e12
@@ -183,8 +179,6 @@ class TetMesh:
     @cached_property
     def boundary(self) -> Ints:
         """Triangles (b, 3) of the boundary, oriented outwards; found once."""
-        from warpbrain.mesh.surface import boundary_faces
-
         return boundary_faces(self.tetrahedra)
 
     @cached_property
@@ -297,9 +291,15 @@ class TetMesh:
             mesh = mesh.with_node_sets({name: members[node_ids] for name, members in self.node_sets.items()})
         return mesh, node_ids, element_ids
 
-    def _left(self, kept: Bools) -> tuple[TetMesh, Ints, Ints]:
-        from warpbrain.mesh.surface import FACES, in_rows, interface_faces
+    def _named(self, nodes: Any, elements: Any) -> tuple[dict[str, Bools], dict[str, Bools], dict[str, Floats]]:
+        """Sets and vectors of some nodes and elements, by their ids."""
+        return (
+            {name: members[nodes] for name, members in self.node_sets.items()},
+            {name: members[elements] for name, members in self.element_sets.items()},
+            {name: vectors[elements] for name, vectors in self.element_vectors.items()},
+        )
 
+    def _left(self, kept: Bools) -> tuple[TetMesh, Ints, Ints]:
         element_ids = np.flatnonzero(kept).astype(np.int32)
         tetrahedra = self.tetrahedra[element_ids]
         node_ids = np.unique(tetrahedra).astype(np.int32)
@@ -313,9 +313,7 @@ class TetMesh:
             self.points[node_ids],
             new_id[tetrahedra],
             self.tissue[element_ids],
-            {name: members[node_ids] for name, members in self.node_sets.items()},
-            {name: members[element_ids] for name, members in self.element_sets.items()},
-            {name: vectors[element_ids] for name, vectors in self.element_vectors.items()},
+            *self._named(node_ids, element_ids),
             cut,
         )
         # of all who ask
@@ -387,3 +385,29 @@ def _flat_or_inverted(points: Floats, tetrahedra: Ints, numbers: NDArray[np.int6
             "swap two nodes of each"
         )
     return found
+
+
+def ordered(mesh: TetMesh) -> TetMesh:
+    """The same mesh with nodes in reverse Cuthill-McKee order and tetrahedra sorted by their nodes.
+
+    Meshers number as they go. In this order the entries that an element or a matrix row touches lie close together,
+    which saves a fifth of the time of assembly (`docs/benchmarks.md`).
+    """
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    count = len(mesh.points)
+    rows = np.repeat(mesh.tetrahedra, 4, axis=1).ravel()
+    columns = np.tile(mesh.tetrahedra, (1, 4)).ravel()
+    graph = csr_matrix((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(count, count))
+    nodes = np.asarray(reverse_cuthill_mckee(graph, symmetric_mode=True))
+    number = np.empty(count, dtype=np.int64)
+    number[nodes] = np.arange(count)
+    tetrahedra = number[mesh.tetrahedra].astype(np.int32)
+    elements = np.lexsort(np.sort(tetrahedra, axis=1).T[::-1])
+    return TetMesh(
+        mesh.points[nodes],
+        tetrahedra[elements],
+        mesh.tissue[elements],
+        *mesh._named(nodes, elements),
+    )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Floats
 from warpbrain.kernels.distance_field import distance_kernels
 from warpbrain.kernels.precision import Precision
-from warpbrain.mesh.feature_normals import feature_normals
+from warpbrain.mesh.surface import feature_normals
 
 #: Nodes of the largest grid; a finer one is made coarser.
 LARGEST_GRID = 2_000_000

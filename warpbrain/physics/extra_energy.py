@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
-from warpbrain.kernels.extra_energy import extra_kernels, quadratic_extra_kernels
+from warpbrain.kernels.extra_energy import extra_kernels
+from warpbrain.kernels.ten_nodes import TEN_NODES
+from warpbrain.kernels.tetrahedron import FOUR_NODES
 from warpbrain.physics.term import Body, KernelTerm
 
 
@@ -42,8 +44,8 @@ class ExtraEnergyTerm(KernelTerm):
         data: Floats,
         ramp: Callable[[float], float],
     ) -> None:
-        made = extra_kernels if body.quadratic is None else quadratic_extra_kernels
-        kernels = made(code.key, code.energy, code.stress, code.moduli, body.precision)
+        stencil = FOUR_NODES if body.quadratic is None else TEN_NODES
+        kernels = extra_kernels(code.key, code.energy, code.stress, code.moduli, body.precision, stencil)
         super().__init__(body, body.stencils[elements], kernels, ramp)
         scalar = body.precision.scalar
         self.elements, self.of_moduli = elements, code.goes_with == "moduli"

@@ -40,7 +40,7 @@ class ClosestPoints:
 
     @property
     def features(self) -> NDArray[np.int64]:
-        """On which feature (n,) of its triangle each lies, as `warpbrain.mesh.feature_normals` numbers them."""
+        """On which feature (n,) of its triangle each lies, as `warpbrain.mesh.surface` numbers them."""
         zero = self.weights <= _ON
         edges = np.select([zero[:, 2], zero[:, 0], zero[:, 1]], [1, 2, 3], 0)
         return np.asarray(np.where(zero.sum(axis=1) == 2, 4 + np.argmax(self.weights, axis=1), edges))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh.surface import faces_of
+from warpbrain.mesh.free_surfaces import faces_of
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.recordings.agreement import lengths, root_mean_square
 from warpbrain.recordings.closest import closest_points

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh.extent import extent
+from warpbrain.mesh.quality import extent
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.problems import Problems
 from warpbrain.recordings.closest import closest_points

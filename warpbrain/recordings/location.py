@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.quality import EDGES
-from warpbrain.mesh.surface import FACES, paired_faces
+from warpbrain.mesh.surface import EDGES, FACES, paired_faces
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.spheres import Spheres
 

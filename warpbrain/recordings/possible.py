@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.extent import extent
+from warpbrain.mesh.quality import extent
 from warpbrain.problems import Problems
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.recordings.text import collected

@@ -18,14 +18,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.kernels.averaged_gradient import averaged_kernels
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.physics.term import Body, Term
 from warpbrain.simulation.model import Material
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 #: `s`, and the largest volumetric modulus [shear moduli] in `Psi'`.
 PART, KEPT = 0.05, 5.0
@@ -42,17 +40,8 @@ def averaged_modulus(material: Material) -> float:
 
 
 class AveragedTerm(Term):
-    """Patches of as many nodes each, under one law.
-
-    Parameters
-    ----------
-    body : Body
-    nodes : (k, s) int array
-        Nodes of each patch, ascending.
-    elements : list of k int arrays
-        Elements of each patch.
-    kernels : ElementKernels
-        Of the law.
+    """Patches of as many nodes each, under the law of some kernels: nodes (k, s), ascending, and elements of each
+    patch.
     """
 
     def __init__(self, body: Body, nodes: Ints, elements: list[Ints], kernels: ElementKernels) -> None:
@@ -92,14 +81,8 @@ class AveragedTerm(Term):
         return found.astype(np.float64)
 
     def set_elements(self, parameters: Floats, weight: Floats) -> None:
-        """Take what the elements have.
-
-        Parameters
-        ----------
-        parameters : (m, c) array
-            Of the law; each patch takes the mean of its elements.
-        weight : (m,) array
-            Factor on the energy of each element.
+        """Take what the elements have: parameters (m, c) of the law, of which each patch takes the mean, and a factor
+        (m,) on the energy of each.
         """
         volumes = self._sum(np.ones(len(weight)))
         means = np.stack([self._sum(column) / volumes for column in parameters.T], axis=1)

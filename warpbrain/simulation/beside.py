@@ -20,13 +20,12 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats
 from warpbrain.physics.term import Term
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: What a vector of parameters means: a model that differs in numbers only; see `System.set_model`.
 ModelOf = Callable[[Floats], Model]
@@ -88,10 +87,13 @@ class Beside:
 
     def derivative(self, k: int, look: Looked) -> Floats:
         """The derivative by parameter k of what `look` finds; call it inside `away`."""
+        return self._weighted(k, lambda distance: look(*self._go(k, distance)))
+
+    def _weighted(self, k: int, value: Callable[[int], Floats]) -> Floats:
+        """Derivative by parameter k of what is known at each distance."""
         total: Floats | float = 0.0
         for distance, weight in _STENCIL.items():
-            offset, model = self._go(k, distance)
-            total = total + weight * look(offset, model)
+            total = total + weight * value(distance)
         return np.asarray(total) / self.steps[k]
 
     @property
@@ -153,18 +155,15 @@ class Beside:
         ]
         return factors + self.model.external_forces(time, rates)
 
+    def _of_loads(self, k: int, number: int, of: Callable[[Any], Floats]) -> Floats:
+        """Derivative by parameter k of what a function finds for a load, by its number."""
+        return self._of_models(k, lambda model: of(model.loads[number]))
+
     def by_prescribed(self, k: int) -> Floats:
         """Derivative of the prescribed displacements [m] by parameter k; nothing is asked of a system."""
         # differences from here, so that what does not change is zero and no rounding
         return self._of_models(k, lambda model: model.prescribed - self.model.prescribed)
 
-    def _of_loads(self, k: int, number: int, of: Callable[[Any], Floats]) -> Floats:
-        """Derivative by parameter k of what a function finds for a load, by its number."""
-        return self._of_models(k, lambda model: of(model.loads[number]))
-
     def _of_models(self, k: int, of: Callable[[Model], Floats]) -> Floats:
         """Derivative by parameter k of what a function finds for a model."""
-        total: Floats | float = 0.0
-        for distance, weight in _STENCIL.items():
-            total = total + weight * of(self._places[k][distance])
-        return np.asarray(total) / self.steps[k]
+        return self._weighted(k, lambda distance: of(self._places[k][distance]))

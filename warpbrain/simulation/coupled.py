@@ -13,15 +13,14 @@ second row is a force many times larger. So a solve ends only when the residual 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from warpbrain.kernels.coupled import coupled_kernels
-from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.kernels.linear import ConjugateGradient, LinearResult, linear_kernels
 from warpbrain.kernels.minimal_residual import MinimalResidual, four_vector
 from warpbrain.kernels.multicore import launch
 from warpbrain.physics.term import Coupling, Term
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from warpbrain.simulation.system import System
 
 #: What MINRES is asked for, relative to what is asked of the solve, in the first place; and how often it may go on.
-FIRST, ROUNDS = 0.3, 6
+_FIRST, _ROUNDS = 0.3, 6
 
 
 class LinearSolver(Protocol):
@@ -49,57 +48,10 @@ class LinearSolver(Protocol):
         """How the last solve ended."""
 
 
-class InTurn:
-    """Solves the system's linear systems for several right-hand sides, one after the other.
-
-    Parameters
-    ----------
-    system : System
-    tolerance : float
-        Relative, of each.
-    max_iterations : int
-    """
-
-    def __init__(self, system: System, tolerance: float, max_iterations: int) -> None:
-        self._system, self._tolerance = system, tolerance
-        self._solver = system.linear_solver(tolerance=tolerance, max_iterations=max_iterations, watch_curvature=True)
-        self._results: list[LinearResult] = []
-
-    def prepare(self) -> None:
-        """Take notice of new values of the matrix, and of what terms keep of their own."""
-        self._solver.prepare()
-
-    def solve(
-        self, right_hand_sides: Sequence[NDArray[np.float64]], tolerance: float | None = None
-    ) -> NDArray[np.float64]:
-        """Solve from zero for right-hand sides (n, 3), which are zero on constrained components: (count, n, 3)."""
-        found, self._results = [], []
-        for b in right_hand_sides:
-            self._system.load.assign(b)
-            self._system.solution.zero_()
-            self._solver.solve(tolerance)
-            self._results.append(self._solver.result())
-            found.append(self._system.solution.numpy().astype(np.float64))
-        return np.array(found)
-
-    def results(self) -> list[LinearResult]:
-        """How the last solve ended, for each right-hand side."""
-        return self._results
-
-
 class CoupledSolver:
-    """Solves the system's matrix together with what a term adds to it.
+    """Solves the system's matrix together with what a term with unknowns of its own adds to it: one of them.
 
-    Parameters
-    ----------
-    system : System
-    terms : sequence of Term
-        Those with unknowns of their own: one.
-    conjugate_gradient : ConjugateGradient
-        For times when these do not follow the displacement.
-    tolerance : float
-        Relative.
-    max_iterations : int
+    `conjugate_gradient` is for times when these do not follow the displacement; the tolerance is relative.
     """
 
     def __init__(
@@ -145,16 +97,14 @@ class CoupledSolver:
         return self._term.coupling
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
-        """See `LinearSolver`."""
         self._plain.multiply(x, z)
 
     def prepare(self) -> None:
-        """See `LinearSolver`."""
         if not self._term.coupled:
             self._plain.prepare()
             return
         s, c = self._system, self.coupling
-        self._launch(self._kernels.invert_diagonal, s.diagonal, s.matrix.values, self._inverse)
+        self._launch(linear_kernels(s.precision).invert_diagonal, s.diagonal, s.matrix.values, self._inverse)
         self._launch(
             self._kernels.invert_coupled_diagonal, c.offsets, c.columns, c.compliance, c.own, s.free, s.coupling_root,
             self._inverse, self._diagonal,
@@ -170,18 +120,35 @@ class CoupledSolver:
         wanted = self._tolerance if tolerance is None else tolerance
         self._launch(self._kernels.pack, s.load, self._solver.b)
         self._solver.x.zero_()
-        tighter, iterations = FIRST, 0
-        for _ in range(1 if s.device.is_capturing else ROUNDS):
-            self._solver.solve(tighter * wanted)
+
+        def go_on(tolerance: float) -> None:
+            self._solver.solve(tolerance)
             self._launch(self._kernels.unpack, self._solver.x, s.solution)
-            if s.device.is_capturing:
-                return
-            steps, _, _ = self._solver.result()
-            iterations += steps
-            self._result = self.look(iterations, wanted)
-            if self._result.converged or steps == 0 or not np.isfinite(self._result.residual):
+
+        def steps(tolerance: float, _done: int) -> int:
+            go_on(tolerance)
+            return self._solver.result()[0]
+
+        if s.device.is_capturing:
+            go_on(_FIRST * wanted)
+        else:
+            self._result = self.in_rounds(steps, wanted)
+
+    def in_rounds(self, steps: Callable[[float, int], int], wanted: float) -> LinearResult:
+        """Solve ever closer until what is left of the eliminated system is at most `wanted` times the load.
+
+        `steps` goes on to a relative tolerance of the whole system, given the iterations that are done, and leaves what
+        it finds in the solution array; it returns how many it took, 0 if it can do no more.
+        """
+        tighter, iterations = _FIRST, 0
+        for _ in range(_ROUNDS):
+            taken = steps(tighter * wanted, iterations)
+            iterations += taken
+            result = self.look(iterations, wanted)
+            if result.converged or taken == 0 or not np.isfinite(result.residual):
                 break
-            tighter *= 0.3 * self._result.tolerance / self._result.residual
+            tighter *= 0.3 * result.tolerance / result.residual
+        return result
 
     def look(self, iterations: int, wanted: float) -> LinearResult:
         """The residual of the eliminated system with what is in the solution array, and the curvature along that."""
@@ -197,7 +164,6 @@ class CoupledSolver:
         return LinearResult(iterations, residual, wanted * float(np.linalg.norm(load)), curvature)
 
     def result(self) -> LinearResult:
-        """See `LinearSolver`."""
         if not self._term.coupled:
             return self._plain.result()
         # of a captured solve there is nothing but what it left

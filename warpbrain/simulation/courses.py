@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from warpbrain.cases.case import Case
-from warpbrain.cases.moments import recorded_times
+from warpbrain.cases.moments import Moments, recorded_times
 from warpbrain.errors import InputError
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep
+from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.quasi_static import follow_slowly, growing_times
 from warpbrain.simulation.relaxation import RelaxationOptions, RelaxationStep, relax_to_rest
@@ -234,3 +235,38 @@ def _slowly(case: Case, system: System, until: float, course: Course, watching: 
     solution = {"kind": "slow change", "time_s": until, "history": history}
     begun = first[0] if first else time.perf_counter()
     return Followed(solution, until, begun, clock.seconds, clock.counts, states)
+
+
+def states_at_rest(case: Case, system: System, end: NodalState, tolerance: float) -> dict[float, NodalState]:
+    """The state of each time at which something was recorded, or from which it is counted.
+
+    Parameters
+    ----------
+    case : Case
+    system : System
+        Of the case.
+    end : NodalState
+        Its state long after everything.
+    tolerance : float
+        Of the other equilibria; see `EquilibriumOptions`.
+
+    Raises
+    ------
+    SolveError
+        If there is no equilibrium at one of the times.
+    """
+    moments = Moments.recorded(case)
+    states, near = {math.inf: end}, end.u
+    reached: dict[int, NodalState] = {}
+    if len(moments.cases) == 1 and moments.cases[0] is case:
+        reached[0] = end
+    for at, number in zip(moments.times, moments.numbers, strict=True):
+        if number not in reached:
+            model = replace(model_of(moments.cases[number]), elements=system.model.elements)
+            other = System(model, str(system.device), system.precision.name)
+            found = EquilibriumSolver(other, EquilibriumOptions(tolerance=tolerance)).solve(start=near)
+            other.u.assign(found.u)
+            reached[number] = nodal_state_of(other)
+            near = found.u
+        states[at] = reached[number]
+    return states

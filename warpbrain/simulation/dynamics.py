@@ -12,6 +12,10 @@ implicit equation itself, with `K v = (A v - (1 + h m_d) M v) / (h k_d + h^2)` i
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
@@ -86,11 +90,7 @@ class Simulator:
         self._u_start = system.u if newton == 1 else wp.zeros_like(self.v)
         self._v_prescribed = wp.zeros_like(self.v)
         self._moving = False
-        self._cg = system.linear_solver(
-            tolerance=self.tolerance,
-            max_iterations=max_cg,
-            preconditioner=preconditioner,
-        )
+        self._cg = system.linear_solver(tolerance=self.tolerance, max_iterations=max_cg, preconditioner=preconditioner)
         self._graph: Graph | None = None
         self._graph_moves = False
         system.solution.zero_()
@@ -167,15 +167,9 @@ class Simulator:
             s.add_coupling(self.v, h * h, s.increment)
         along_Av = -1.0 if first else -damping.stiffness / (damping.stiffness + h)
         along_Mv = 0.0 if first else -m - along_Av * m
-        launch(
-            self._kernels.right_hand_side,
-            s.size,
-            [
-                *s.forces_on_nodes, s.external, s.mass, self._v_start, self.v, s.increment, s.free,
-                scalar(h), scalar(along_Mv), scalar(along_Av), s.internal, s.load,
-            ],
-            s.device,
-        )  # fmt: skip
+        inputs = [*s.forces_on_nodes, s.external, s.mass, self._v_start, self.v, s.increment, s.free]
+        inputs += [scalar(h), scalar(along_Mv), scalar(along_Av), s.internal, s.load]
+        launch(self._kernels.right_hand_side, s.size, inputs, s.device)
         if self._moving:
             # later iterations have the motion in v and lack only its share of the damping force
             share = h * damping.stiffness
@@ -191,14 +185,9 @@ class Simulator:
     def integrate(self) -> None:
         """Phase 4: velocity and displacement at the end of the step."""
         s = self.system
-        launch(
-            self._kernels.update,
-            s.size,
-            [
-                self._u_start, s.solution, self._v_prescribed, s.free, s.precision.scalar(self._h), self.v, s.u,
-            ],
-            s.device,
-        )  # fmt: skip
+        h = s.precision.scalar(self._h)
+        inputs = [self._u_start, s.solution, self._v_prescribed, s.free, h, self.v, s.u]
+        launch(self._kernels.update, s.size, inputs, s.device)
 
     def _begin(self) -> None:
         if self.newton > 1:
@@ -212,13 +201,18 @@ class Simulator:
             self._v_prescribed.zero_()
             self._moving = False
 
-    def _run_phases(self) -> None:
+    def _run_phases(self, clock: PhaseClock | None = None) -> None:
+        phase: Callable[[str], AbstractContextManager[Any]] = nullcontext if clock is None else clock.phase
         self._begin()
         for iteration in range(self.newton):
-            self.internal_forces()
-            self.assemble_system(first=iteration == 0)
-            self.solve_system(first=iteration == 0)
-            self.integrate()
+            with phase(PHASES[0]):
+                self.internal_forces()
+            with phase(PHASES[1]):
+                self.assemble_system(first=iteration == 0)
+            with phase(PHASES[2]):
+                self.solve_system(first=iteration == 0)
+            with phase(PHASES[3]):
+                self.integrate()
 
     def _remember(self) -> None:
         """Let terms with a memory keep what they need of the last step: only now is it known that it stands."""
@@ -240,16 +234,7 @@ class Simulator:
         """Advance by one time step with the clock stopped between phases; slower than `step`."""
         self._remember()
         self.apply_loads()
-        self._begin()
-        for iteration in range(self.newton):
-            with clock.phase(PHASES[0]):
-                self.internal_forces()
-            with clock.phase(PHASES[1]):
-                self.assemble_system(first=iteration == 0)
-            with clock.phase(PHASES[2]):
-                self.solve_system(first=iteration == 0)
-            with clock.phase(PHASES[3]):
-                self.integrate()
+        self._run_phases(clock)
         self._finish()
 
     def capture(self) -> None:

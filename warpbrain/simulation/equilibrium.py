@@ -14,19 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.coupled import LinearSolver
-from warpbrain.simulation.held import require_held
-from warpbrain.simulation.keeping import with_kept
-from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.model import require_held
 from warpbrain.simulation.multisecant import Multisecant
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: Out-of-balance force, relative, from which on steps say something of the steps to come.
 _NEAR = 0.1
@@ -190,9 +187,8 @@ class EquilibriumSolver:
             preconditioner=self.options.preconditioner,
             watch_curvature=True,
             at_rest=True,
+            factors=factors,
         )
-        if factors is not None:
-            self._linear = with_kept(system, self._linear, factors, self.options.cg_tolerance)
         self._history: list[NewtonStep] = []
         self._free = 1.0 - system.model.constrained
         # residuals cannot fall below the rounding of the sums of element forces

@@ -10,18 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Removing
-from warpbrain.simulation.assumed import with_mechanisms
-from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.model import Material, Model, with_mechanisms
 from warpbrain.simulation.of_case import plain_model_of
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,11 +71,13 @@ class FinerCase:
         if not forces.any():
             return np.zeros(mesh.points.shape)
         loaded = forces.any(axis=1)
-        surface = nodes_of(self._coarse.boundary, len(self._coarse.points))
-        share = _surface_of_nodes if surface[loaded].all() else _volume_of_nodes
+        if nodes_of(self._coarse.boundary, len(self._coarse.points))[loaded].all():
+            coarse, fine = (node_areas(each.points, each.boundary) for each in (self._coarse, mesh))
+        else:
+            coarse, fine = self._coarse.node_volumes, mesh.node_volumes
         density = np.zeros_like(forces)
-        density[loaded] = forces[loaded] / share(self._coarse)[loaded, None]
-        return np.asarray(share(mesh)[:, None] * (self.prolongation @ density))
+        density[loaded] = forces[loaded] / coarse[loaded, None]
+        return np.asarray(fine[:, None] * (self.prolongation @ density))
 
     def model(self, model: Model, materials: Mapping[int, Material] | None = None) -> Model:
         """The finer model of what `model_of` makes of the case, with the same elements; of other materials if given."""
@@ -130,11 +129,3 @@ def restricted(prolong: Any, u: Floats, reactions: Floats) -> tuple[Floats, Floa
     A reaction between two nodes goes to both of them, so that resultants stay.
     """
     return u[: prolong.shape[1]], np.asarray(prolong.T @ reactions)
-
-
-def _surface_of_nodes(mesh: TetMesh) -> Floats:
-    return node_areas(mesh.points, mesh.boundary)
-
-
-def _volume_of_nodes(mesh: TetMesh) -> Floats:
-    return mesh.node_volumes

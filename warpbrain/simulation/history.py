@@ -13,10 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from warpbrain.arrays import Floats, Ints
 
 #: How far the polygon may miss a row, relative to the largest imposed value.
 MISSED = 0.005
@@ -40,7 +38,7 @@ class History:
 
     time: Floats
     imposed: Floats
-    corners: Integers
+    corners: Ints
 
     def interpolated(self, response: Floats, time: Floats) -> Floats:
         """A computed response (k,) at any times between the first and the last; smooth between corners, not at them."""

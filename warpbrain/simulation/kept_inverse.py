@@ -1,36 +1,74 @@
 """The inverse of one stiffness on a GPU, kept to precondition the systems of many states near to it.
 
-What `kept_factors` does on the CPU. A GPU has no use for sparse factors, whose rows wait for each other; but it reads a
+What `KeptFactors` does on the CPU. A GPU has no use for sparse factors, whose rows wait for each other; but it reads a
 dense matrix of 15,000 rows in a fifth of a millisecond, and three to six products with the inverse of a factor do what
 takes a captured loop hundreds of iterations. By CuPy, which is an extra, and as far as memory goes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.kernels.host_gradients import host_gradients
-from warpbrain.kernels.linear import LinearResult
-from warpbrain.simulation.cupy_on import require_memory, stream_of
-from warpbrain.simulation.factored import MOST, FactoredSolver
-from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.kernels.linear import LinearResult, host_gradients
+from warpbrain.simulation.factored import MOST, FactoredSolver, KeptFactors
+
+
+def has_cupy(device: Any) -> bool:
+    """Whether a Warp device is a GPU for which CuPy is installed, and finds the libraries that it calls."""
+    return bool(device.is_cuda) and _works()
+
+
+@cache
+def _works() -> bool:
+    try:
+        import cupy
+        import cupyx.scipy.linalg  # noqa: F401
+
+        cupy.linalg.cholesky(cupy.eye(2))
+    except Exception:
+        # whatever keeps an extra from working is no reason to stop: the same is done without it
+        return False
+    return True
+
+
+def require_memory(device: Any, needed: int) -> None:
+    """Raise `MemoryError` if a GPU has fewer bytes than these that are free, or that CuPy holds and does not use."""
+    import cupy
+
+    with cupy.cuda.Device(device.ordinal) as gpu:
+        pool = cupy.get_default_memory_pool()
+        free = gpu.mem_info[0] + pool.total_bytes() - pool.used_bytes()
+    if needed > free:
+        raise MemoryError(f"{needed / 1e9:.1f} GB of memory of {device.alias} are needed, {free / 1e9:.1f} GB are free")
+
+
+@contextmanager
+def stream_of(device: Any) -> Iterator[None]:
+    """While it lasts, CuPy works on a GPU in the order in which Warp does."""
+    import cupy
+    import warp as wp
+
+    # a stream of another GPU than the present one is refused
+    with (
+        cupy.cuda.Device(device.ordinal),
+        cupy.cuda.ExternalStream(wp.get_stream(device).cuda_stream, device.ordinal),
+    ):
+        yield
+
 
 #: Dense matrices in single precision for which there has to be memory.
 _MATRICES = 3
 
 
 class KeptInverse(KeptFactors):
-    """Of the stiffness of the last state that it was renewed at; of none at first.
-
-    Parameters
-    ----------
-    device : warp.Device
-        A GPU for which there is CuPy.
-    """
+    """Of the stiffness of the last state that it was renewed at, of none at first, on a GPU for which there is CuPy."""
 
     _worth = 60
 
@@ -68,20 +106,9 @@ class KeptInverse(KeptFactors):
 
 
 class InvertedSolver(FactoredSolver):
-    """Solves a system's linear systems on a GPU with a kept inverse.
-
-    Parameters
-    ----------
-    system : System
-        On a GPU, in double precision, without unknowns beside the displacement.
-    captured : LinearSolver
-    factors : KeptInverse
-    tolerance : float
-        Relative.
-    """
+    """Solves with a kept inverse, on a GPU, in double precision, without unknowns beside the displacement."""
 
     def prepare(self) -> None:
-        """See `LinearSolver`."""
         self._captured.prepare()
         self._K = self._system.matrix
 
@@ -119,3 +146,10 @@ def _dense(matrix: Any) -> Any:
     at = rows[:, None, None] + within[:, None], columns[:, None, None] + within
     found[at] = cupy.asarray(matrix.values)[: int(offsets[-1])]
     return found
+
+
+def kept_for(device: Any) -> KeptFactors | None:
+    """What is kept where states are solved on a Warp device; None on a GPU for which there is no CuPy."""
+    if device.is_cpu:
+        return KeptFactors()
+    return KeptInverse(device) if has_cupy(device) else None

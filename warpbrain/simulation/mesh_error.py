@@ -15,34 +15,22 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
-from warpbrain.mesh import TetMesh
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.finer import FinerCase, restricted
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.observation import Observed, State, observe
-from warpbrain.simulation.result import Result
+from warpbrain.simulation.result import NodalState, Result, nodal_state_of
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: Out-of-balance force, relative: far below what meshes differ by.
 TOLERANCE = 1e-5
 #: Of an error that falls with the square of the size of elements, what halving them leaves to be added.
 _RICHARDSON = 4.0 / 3.0
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """A `State` and nothing else."""
-
-    mesh: TetMesh
-    u: Floats
-    reactions: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +67,6 @@ class MeshError:
 Solve = Callable[[str, bool, Floats], State]
 
 
-def unlocked(elements: str) -> str:
-    """The kind of elements that stands for one that locks; itself, if it does not."""
-    return "tet4-averaged" if elements == "tet4" else elements
-
-
 def estimate(state: State, elements: str, solve: Solve, prolongation: Any = None) -> MeshError:
     """Estimate the error of a state.
 
@@ -101,7 +84,7 @@ def estimate(state: State, elements: str, solve: Solve, prolongation: Any = None
     SolveError
         If a state is not found on other elements.
     """
-    other = unlocked(elements)
+    other = "tet4-averaged" if elements == "tet4" else elements
     free = state if other == elements else solve(other, False, state.u)
     locking, reactions = free.u - state.u, free.reactions - state.reactions
     if prolongation is None:
@@ -163,17 +146,17 @@ def mesh_error(
 
 def observe_without(case: Case, result: Result, error: MeshError, time: float | None = None) -> Observed:
     """Recordings beside a state with the estimated error taken off; see `observe`."""
-    return observe(case, Found(result.mesh, result.u + error.u, result.reactions + error.reactions), time)
+    return observe(case, NodalState(result.mesh, result.u + error.u, result.reactions + error.reactions), time)
 
 
-def _equilibrium(system: System, start: Floats, say: Callable[[float], None]) -> Found:
+def _equilibrium(system: System, start: Floats, say: Callable[[float], None]) -> NodalState:
     say(0.0)
     options = EquilibriumOptions(tolerance=TOLERANCE)
     found = EquilibriumSolver(system, options, lambda step: say(step.load)).solve(start=start)
-    return Found(system.mesh, found.u, system.model.reactions(found.internal, system.model.external_forces()))
+    return NodalState(system.mesh, found.u, system.model.reactions(found.internal, system.model.external_forces()))
 
 
-def _motion(system: System, steps: int, say: Callable[[float], None]) -> Found:
+def _motion(system: System, steps: int, say: Callable[[float], None]) -> NodalState:
     simulator = Simulator(system)
     for step in range(1, steps + 1):
         due = simulator.time + simulator.time_step
@@ -181,8 +164,4 @@ def _motion(system: System, steps: int, say: Callable[[float], None]) -> Found:
         simulator.step()
         simulator.check()
         say(step / steps)
-    system.evaluate_forces()
-    system.gather_forces()
-    internal = system.internal.numpy().astype(np.float64)
-    u = system.u.numpy().astype(np.float64)
-    return Found(system.mesh, u, system.model.reactions(internal, system.model.external_forces(simulator.time)))
+    return nodal_state_of(system, simulator.time)

@@ -26,25 +26,34 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.nodal_volume import nodal_volume_kernels
 from warpbrain.physics.term import Body, Term
 
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
+
+class _PatchTerm(Term):
+    """Of the material itself: it is there, however little of the load is."""
+
+    def set_scale(self, scale: float) -> None:
+        super().set_scale(1.0)
+
+    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
+        launch(kernel, count, inputs, self.body.device)
+
+    def _ints(self, values: NDArray[Any]) -> wp.array:
+        return self.array(np.ascontiguousarray(values, dtype=np.int32), int)
+
+    def _zeros(self, shape: Any, dtype: Any) -> wp.array:
+        return wp.zeros(shape, dtype=dtype, device=self.body.device)
 
 
-class NodalVolumeTerm(Term):
-    """Forces and blocks of the pressure in each element, and the energy of all patches.
+class NodalVolumeTerm(_PatchTerm):
+    """Forces and blocks of the pressure in each element, and the energy of all patches, on a body of quadratic
+    elements.
 
-    Parameters
-    ----------
-    body : Body
-        Of quadratic elements.
-    logarithmic : (m,) bool array
-        Whether `U = (ln J)^2 / 2` in an element (laws of the coupled formulation), or `(J - 1)^2 / 2`.
-    kinds : (m,) int array
-        See `warpbrain.simulation.model.Model.element_kinds`.
+    `logarithmic` (m,) says whether `U = (ln J)^2 / 2` in an element (laws of the coupled formulation), or `(J - 1)^2 /
+    2`; `kinds` (m,) are `warpbrain.simulation.model.Model.element_kinds`.
     """
 
     def __init__(self, body: Body, logarithmic: NDArray[np.bool_], kinds: Ints) -> None:
@@ -75,28 +84,14 @@ class NodalVolumeTerm(Term):
         self.curvature = self._zeros(self.count, p.scalar)
         self.of_elements = self._zeros((count, 40), p.vec3)
 
-    def _ints(self, values: NDArray[Any]) -> wp.array:
-        return self.array(np.ascontiguousarray(values, dtype=np.int32), int)
-
-    def _zeros(self, shape: Any, dtype: Any) -> wp.array:
-        return wp.zeros(shape, dtype=dtype, device=self.body.device)
-
     @property
     def patches(self) -> Ints:
         """The patch at each corner of each element (m, 4)."""
         return self._patches
 
     def set_elements(self, modulus: Floats, weight: Floats, growth: Floats) -> None:
-        """Take what the elements have.
-
-        Parameters
-        ----------
-        modulus : (m,) array
-            Volumetric modulus [Pa] of the law.
-        weight : (m,) array
-            Factor on the energy of each element.
-        growth : (m,) array
-            How many times its volume an element has grown.
+        """Take what the elements (m,) have: volumetric modulus [Pa] of the law, factor on the energy, and how many
+        times its volume each has grown.
         """
 
         def total(values: Floats) -> Floats:
@@ -109,13 +104,6 @@ class NodalVolumeTerm(Term):
         # a captured graph reads these arrays
         self._volumes_on_device.assign(self._volumes)
         self._moduli_on_device.assign(self._moduli)
-
-    def set_scale(self, scale: float) -> None:
-        # a material is there, however little of the load is
-        super().set_scale(1.0)
-
-    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
-        launch(kernel, count, inputs, self.body.device)
 
     def _evaluate(self, u: wp.array) -> tuple[Any, ...]:
         """Find the pressures at a displacement; returns what element kernels take."""
@@ -148,13 +136,10 @@ class NodalVolumeTerm(Term):
         return np.asarray(self._p.numpy().astype(np.float64)[self._patches].mean(axis=1))
 
 
-class PatchStiffnessTerm(Term):
+class PatchStiffnessTerm(_PatchTerm):
     """`sum_a c_a g_ab (x) g_ac`: how pressures follow the displacement. Its diagonal is in blocks, the rest is not.
 
-    Parameters
-    ----------
-    volumes : NodalVolumeTerm
-        Of which the tangents are evaluated before those of this one.
+    Its tangents are evaluated after those of `volumes`.
     """
 
     def __init__(self, volumes: NodalVolumeTerm) -> None:
@@ -162,7 +147,7 @@ class PatchStiffnessTerm(Term):
         assert body.quadratic is not None
         size = len(body.quadratic.points)
         super().__init__(body, np.arange(size)[:, None])
-        p, device = body.precision, body.device
+        p = body.precision
         self._volumes, self._kernels = volumes, nodal_volume_kernels(p)
         nodes = np.repeat(volumes.stencils.astype(np.int64)[:, None, :], 4, axis=1)
         keys = (volumes.patches[:, :, None] * size + nodes).ravel()
@@ -171,24 +156,14 @@ class PatchStiffnessTerm(Term):
         patches, nodes = np.divmod(keys[parts][starts], size)
         entries = np.argsort(nodes, kind="stable")
 
-        def ints(values: NDArray[Any]) -> wp.array:
-            return wp.array(values.astype(np.int32), dtype=int, device=device)
-
-        self._part_first, self._parts = ints(np.r_[starts, len(parts)]), ints(parts)
-        self._patch_first = ints(np.searchsorted(patches, np.arange(volumes.count + 1)))
-        self._node_first = ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
-        self._nodes, self._entries, self._patches = ints(nodes), ints(entries), ints(patches[entries])
+        self._part_first, self._parts = self._ints(np.r_[starts, len(parts)]), self._ints(parts)
+        self._patch_first = self._ints(np.searchsorted(patches, np.arange(volumes.count + 1)))
+        self._node_first = self._ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
+        self._nodes, self._entries, self._patches = self._ints(nodes), self._ints(entries), self._ints(patches[entries])
         # in the order of patches, and in that of nodes
-        self._g, self._by_node = (wp.zeros(len(starts), dtype=p.vec3, device=device) for _ in range(2))
-        self._change = wp.zeros(volumes.count, dtype=p.scalar, device=device)
-        self._one = wp.ones(1, dtype=p.scalar, device=device)
-
-    def set_scale(self, scale: float) -> None:
-        # a material is there, however little of the load is
-        super().set_scale(1.0)
-
-    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
-        launch(kernel, count, inputs, self.body.device)
+        self._g, self._by_node = (self._zeros(len(starts), p.vec3) for _ in range(2))
+        self._change = self._zeros(volumes.count, p.scalar)
+        self._one = self.array(np.ones(1), p.scalar)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self.forces.zero_()

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
+from warpbrain.mesh.surface import connected
 from warpbrain.physics.composition import require_composable
 from warpbrain.physics.laws import Law
 from warpbrain.physics.load import BodyForce, Load
-from warpbrain.physics.mechanism import Emptying, Following, Mechanism
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
+from warpbrain.physics.mechanism import Emptying, Following, Growing, Mechanism, Removing, Substituting, Weakening
 
 #: Kinds of elements; the default first.
 ELEMENTS = ("tet4", "tet4-averaged", "tet10", "tet10-mixed")
@@ -216,6 +214,16 @@ class Model:
         """The mechanisms that take tissue out little by little."""
         return [mechanism for mechanism in self.mechanisms if isinstance(mechanism, Emptying)]
 
+    @cached_property
+    def growing(self) -> list[Growing]:
+        """The mechanisms by which tissue grows."""
+        return [mechanism for mechanism in self.mechanisms if isinstance(mechanism, Growing)]
+
+    @cached_property
+    def weakening(self) -> list[Weakening]:
+        """The mechanisms that make tissue softer."""
+        return [mechanism for mechanism in self.mechanisms if isinstance(mechanism, Weakening)]
+
     def remaining_part(self, scales: Sequence[float]) -> Floats:
         """Part (m,) of each tetrahedron that is left, with a scale from 0 to 1 for each of `emptying`."""
         part = np.ones(len(self.mesh.tetrahedra))
@@ -300,3 +308,79 @@ def _with_midsides(mesh: QuadraticMesh, constrained: Bools, prescribed: Floats) 
     if prescribed.shape == corners and constrained.shape == mesh.points.shape:
         prescribed = np.where(constrained, mesh.between(prescribed), 0.0)
     return constrained, prescribed
+
+
+def with_mechanisms(model: Model, mechanisms: Sequence[Mechanism]) -> Model:
+    """The model with mechanisms that act too.
+
+    Those that are loads go to the loads, those that say another law or compressibility change the materials, in their
+    order, and all others act in the system. With other numbers of the same mechanisms (`with_numbers`) the model is one
+    that `System.set_model` takes.
+
+    Parameters
+    ----------
+    model : Model
+        If tissue is removed, of what is left.
+    mechanisms : sequence of Mechanism
+    """
+    loads = [m for m in mechanisms if isinstance(m, Load)]
+    materials = all_substituted(model.materials, mechanisms)
+    acting = [m for m in mechanisms if not isinstance(m, Removing | Load)]
+    return replace(model, materials=materials, loads=(*loads, *model.loads), mechanisms=(*acting, *model.mechanisms))
+
+
+def all_substituted(materials: Mapping[int, Material], mechanisms: Iterable[Mechanism]) -> dict[int, Material]:
+    """The materials of tissues as those mechanisms that say something of their law have them, in their order."""
+    found = dict(materials)
+    for mechanism in mechanisms:
+        if isinstance(mechanism, Substituting):
+            found = substituted(found, mechanism)
+    return found
+
+
+def substituted(materials: Mapping[int, Material], mechanism: Substituting) -> dict[int, Material]:
+    """The materials of tissues as a mechanism that says something of their law has them."""
+    return {
+        label: Material(*mechanism.substitute(label, m.law, m.poisson, m.formulation)) for label, m in materials.items()
+    }
+
+
+def require_held(model: Model) -> None:
+    """Raise `InputError` if a connected part of the body can move as a rigid one.
+
+    Each part needs constrained components, or mechanisms that hold it, that exclude its six rigid motions.
+    """
+    mesh = model.node_mesh
+    count = len(mesh.points)
+    parts, part = _connected_parts(mesh)
+    holding = [mechanism.held(mesh) for mechanism in model.mechanisms]
+    for number in range(parts):
+        members = np.flatnonzero(part == number)
+        x = mesh.points[members] - mesh.points[members].mean(axis=0)
+        size = float(np.abs(x).max())
+        # three translations and three rotations of each node, as rows (node, component)
+        motions = np.zeros((len(members), 3, 6))
+        motions[:, :, :3] = np.eye(3)
+        for axis in range(3):
+            motions[:, :, 3 + axis] = np.cross(np.eye(3)[axis], x) / size
+        held = motions[model.constrained[members]]
+        for nodes, directions in holding:
+            own = np.isin(nodes, members)
+            rows = motions[np.searchsorted(members, nodes[own])]
+            held = np.concatenate([held, np.einsum("ki,kij->kj", directions[own], rows)])
+        rank = int(np.linalg.matrix_rank(held, tol=1e-6)) if len(held) else 0
+        if rank < 6:
+            where = 1000.0 * mesh.points[members].mean(axis=0)
+            which = "the body" if parts == 1 else f"a part of {len(members)} of {count} nodes"
+            raise InputError(
+                f"{which} around ({where[0]:.0f}, {where[1]:.0f}, {where[2]:.0f}) mm is not held: its constrained "
+                f"nodes leave {6 - rank} of 6 rigid motions free, so it has no equilibrium"
+            )
+
+
+@lru_cache(maxsize=4)
+def _connected_parts(mesh: TetMesh) -> tuple[int, NDArray[np.int32]]:
+    """How many there are, and which of them each node (n,) belongs to; a mesh is asked for every state of it."""
+    links = np.column_stack([np.repeat(mesh.tetrahedra[:, 0], 3), mesh.tetrahedra[:, 1:].ravel()])
+    part = connected(links, len(mesh.points))
+    return int(part.max()) + 1, part

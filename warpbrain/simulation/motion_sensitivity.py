@@ -22,16 +22,15 @@ from collections.abc import Sequence
 
 import numpy as np
 import warp as wp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.simulation.beside import Beside, ModelOf
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.refinement import lengths, refine
 from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, SeveralSolver, several_solver
-
-Floats = NDArray[np.float64]
 
 
 class MotionSensitivity:

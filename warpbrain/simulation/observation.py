@@ -9,8 +9,8 @@ from functools import partial
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments, goes_on
@@ -19,9 +19,6 @@ from warpbrain.mesh import TetMesh
 from warpbrain.recordings.comparison import Comparison, compare_force, compare_points, compare_surface, joined
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.times import compared_rows, rows_at, times_of
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 
 class State(Protocol):
@@ -98,8 +95,8 @@ def _compare(
 
 def _rows_by_time(
     case: Case, recording: Recording, time: float | None, others: Mapping[float, State]
-) -> list[tuple[float, Rows]]:
-    """Rows of a recording that are compared, by the time of the state that they are compared with."""
+) -> list[tuple[float, Ints]]:
+    """Ints of a recording that are compared, by the time of the state that they are compared with."""
     assert isinstance(recording, PointsRecording | SurfaceRecording | ForceRecording)
     times = times_of(recording)
     rows = compared_rows(recording)
@@ -142,7 +139,7 @@ def _state_at(
 
 
 def _compared(
-    case: Case, recording: Recording, state: State, time: float, before: State | None, rows: Rows
+    case: Case, recording: Recording, state: State, time: float, before: State | None, rows: Ints
 ) -> Comparison:
     u = state.u if before is None else state.u - before.u
     if isinstance(recording, PointsRecording):

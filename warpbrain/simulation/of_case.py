@@ -12,8 +12,7 @@ from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.contact import Contact as SkullContact
 from warpbrain.physics.mechanisms.pressure import Pressure
-from warpbrain.simulation.assumed import with_mechanisms
-from warpbrain.simulation.model import Material, Model, Motion
+from warpbrain.simulation.model import Material, Model, Motion, with_mechanisms
 
 
 def model_of(case: Case) -> Model:
@@ -22,7 +21,7 @@ def model_of(case: Case) -> Model:
 
 
 def plain_model_of(case: Case) -> Model:
-    """The model of a case without the mechanisms that it assumes; see `warpbrain.simulation.assumed`.
+    """The model of a case without the mechanisms that it assumes; see `warpbrain.simulation.model`.
 
     Returns
     -------

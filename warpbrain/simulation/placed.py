@@ -9,17 +9,110 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh
-from warpbrain.simulation.pattern import build_pattern
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """Pattern of a symmetric block matrix over nodes, and the lists that fill it: of NumPy, or on a device.
+
+    What acts is a number of families of stencils: the four nodes of every tetrahedron, the three of every triangle that
+    a pressure acts on. A stencil of s nodes has s forces and s (s + 1) / 2 blocks, those of its node pairs (a, b),
+    a <= b, row by row. Forces and blocks of all families lie one after the other in one array each.
+
+    Attributes
+    ----------
+    offsets : (n + 1,) int
+        Start of each block row in `columns`.
+    columns : (nnz,) int
+        Block column of each stored block, ascending within a row.
+    diagonal : (n,) int
+        Position of each diagonal block.
+    block_pairs : (nnz,) int
+        Pair whose block is stored there, or -1 - pair where its transpose is.
+    pairs : (p, 2) int
+        Node pairs i <= j that share a stencil.
+    positions : (p, 2) int
+        Positions of the blocks (i, j) and (j, i) of each pair.
+    first : (p + 1,) int
+        Start of each pair's list in `contributions`.
+    contributions : (b,) int
+        Stencil blocks that add up to the pair's block, ascending.
+    corner_first : (n + 1,) int
+        Start of each node's list in `corners`.
+    corners : (c,) int
+        Stencil forces on the node, ascending.
+    """
+
+    offsets: Any
+    columns: Any
+    diagonal: Any
+    block_pairs: Any
+    pairs: Any
+    positions: Any
+    first: Any
+    contributions: Any
+    corner_first: Any
+    corners: Any
+
+
+def build_pattern(stencils: Sequence[NDArray[np.integer]], count: int) -> Pattern:
+    """Make the pattern of families of stencils.
+
+    Parameters
+    ----------
+    stencils : sequence of (k, s) int arrays
+        Node ids, ascending in each row, so that every block of a pair (a, b), a <= b, belongs to nodes i <= j.
+    count : int
+        Number of nodes; each must be in a stencil.
+    """
+    keys = []
+    for nodes in stencils:
+        a, b = np.triu_indices(nodes.shape[1])
+        keys.append((nodes[:, a].astype(np.int64) * count + nodes[:, b]).ravel())
+    key = np.concatenate(keys)
+    contributions = np.argsort(key, kind="stable")
+    key = key[contributions]
+    first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
+    i, j = np.divmod(key[first], count)
+
+    mirrored = np.flatnonzero(i != j)
+    rows, columns = np.r_[i, j[mirrored]], np.r_[j, i[mirrored]]
+    order = np.argsort(rows * count + columns, kind="stable")
+    block_pairs = np.r_[np.arange(len(i)), -1 - mirrored][order]
+    where = np.empty(len(order), dtype=np.int64)
+    where[order] = np.arange(len(order))
+    positions = np.repeat(where[: len(i), None], 2, axis=1)
+    positions[mirrored, 1] = where[len(i) :]
+    offsets = np.searchsorted(rows[order], np.arange(count + 1))
+
+    all_nodes = np.concatenate([nodes.ravel() for nodes in stencils])
+    corners = np.argsort(all_nodes, kind="stable")
+    corner_first = np.searchsorted(all_nodes[corners], np.arange(count + 1))
+
+    def ints(values: NDArray[np.integer]) -> NDArray[np.int32]:
+        return np.ascontiguousarray(values, dtype=np.int32)
+
+    return Pattern(
+        offsets=ints(offsets),
+        columns=ints(columns[order]),
+        diagonal=ints(positions[i == j, 0]),
+        block_pairs=ints(block_pairs),
+        pairs=ints(np.stack([i, j], axis=1)),
+        positions=ints(positions),
+        first=ints(np.r_[first, len(key)]),
+        contributions=ints(contributions),
+        corner_first=ints(corner_first),
+        corners=ints(corners),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,26 +130,10 @@ class PlacedMesh:
     inverse_edges : wp.array of mat33, shape (m,)
     """
 
-    tetrahedra: Ints
+    tetrahedra: NDArray[np.int32]
     shape_gradients: Floats
     nodes: wp.array
     inverse_edges: wp.array
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedPattern:
-    """The attributes of `Pattern` of these names, on a device."""
-
-    offsets: wp.array
-    columns: wp.array
-    diagonal: wp.array
-    block_pairs: wp.array
-    pairs: wp.array
-    positions: wp.array
-    first: wp.array
-    contributions: wp.array
-    corner_first: wp.array
-    corners: wp.array
 
 
 #: Patterns of one mesh at most: those of a finer mesh take a tenth of a gigabyte.
@@ -75,9 +152,7 @@ def placed_mesh(mesh: TetMesh, device: wp.Device, precision: Precision) -> Place
     return known[key]
 
 
-def placed_pattern(
-    mesh: TetMesh, stencils: Sequence[NDArray[np.integer]], count: int, device: wp.Device
-) -> PlacedPattern:
+def placed_pattern(mesh: TetMesh, stencils: Sequence[NDArray[np.integer]], count: int, device: wp.Device) -> Pattern:
     """The pattern of families of stencils over `count` nodes on a device; see `build_pattern`."""
     said = sha256()
     for nodes in stencils:
@@ -89,7 +164,7 @@ def placed_pattern(
             known.pop(oldest, None)
         pattern = build_pattern(stencils, count)
         kinds = {"pairs": wp.vec2i, "positions": wp.vec2i}
-        known[key] = PlacedPattern(
+        known[key] = Pattern(
             **{
                 name: wp.array(values, dtype=kinds.get(name, int), device=device)
                 for name, values in vars(pattern).items()

@@ -11,16 +11,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver, NewtonStep
-from warpbrain.simulation.held import require_held
-from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.model import require_held
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 #: How often a step is halved before the run gives up.
 _HALVINGS = 6
@@ -103,12 +101,7 @@ def follow_slowly(
         If no equilibrium is found: when, where and why.
     """
     series = np.asarray(times, dtype=np.float64)
-    if (
-        series.ndim != 1
-        or not len(series)
-        or not np.all(np.isfinite(series))
-        or np.any(np.diff(series, prepend=0) <= 0)
-    ):
+    if series.ndim != 1 or not len(series) or not (np.isfinite(series) & (np.diff(series, prepend=0) > 0)).all():
         raise InputError(f"times = {list(times)} s: expected positive numbers that increase")
     require_held(system.model)
     solver = EquilibriumSolver(system, options, on_step, clock, factors=factors)

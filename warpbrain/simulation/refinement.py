@@ -12,12 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 #: Directions before it gives up.
 _MOST = 40
@@ -36,24 +33,11 @@ def refine(
     goals: Floats,
     free: Bools,
 ) -> tuple[Floats, Floats]:
-    """Solve for p right-hand sides at once.
+    """Solve for p right-hand sides at once, from a solution and what is left there, both (p, n, 3).
 
-    Parameters
-    ----------
-    left_of : callable
-        What is left (n, 3) of a right-hand side, by its number, at a trial solution of that shape; affine.
-    correct : callable
-        Solves with the known part of the matrix, for right-hand sides (p, n, 3).
-    solution, left : (p, n, 3) array
-        To start from, and what is left there.
-    goals : (p,) array
-        Norms of what may be left on the free components.
-    free : (n, 3) bool array
-
-    Returns
-    -------
-    solution, left : (p, n, 3) array
-        What is left on every component.
+    `left_of` says what is left (n, 3) of a right-hand side, by its number, at a trial solution of that shape: an affine
+    function. `correct` solves with the known part of the matrix, for right-hand sides (p, n, 3). `goals` (p,) are norms
+    of what may be left on the `free` components (n, 3). Returns the solution, and what is left on every component.
 
     Raises
     ------

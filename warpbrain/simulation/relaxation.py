@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpbrain.errors import SolveError, require_kind
 from warpbrain.kernels.precision import Precision
 from warpbrain.simulation.dynamics import Simulator
-from warpbrain.simulation.held import require_held
+from warpbrain.simulation.model import require_held
 from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
@@ -150,9 +150,7 @@ def relax_to_rest(
             simulator.restore(u, v, start)
             continue
         moved = min(1.0, moved + share)
-        system.evaluate_forces()
-        system.gather_forces()
-        internal = system.internal.numpy().astype(np.float64)
+        internal = system.internal_forces()
         residual = float(np.linalg.norm(free * (external - internal)))
         scale = float(np.linalg.norm(internal) + np.linalg.norm(external))
         residual /= max(scale, np.finfo(float).tiny)

@@ -7,14 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import require_kind
 from warpbrain.mesh import TetMesh
 from warpbrain.shown import Shown
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ class Result(Shown):
     nodal_pressures : mapping of str to (n,) array
         What mechanisms know at the nodes [Pa]: ``fluid_pressure`` of drainage.
     u_middles : (m, 6, 3) array or None
-        Displacement [m] of the midside nodes of quadratic elements, in the order of `warpbrain.mesh.quality.EDGES`.
+        Displacement [m] of the midside nodes of quadratic elements, in the order of `warpbrain.mesh.surface.EDGES`.
 
     Of quadratic elements displacements are those of the mesh's own nodes, strain and stress those in the middle of
     elements, and half of what holds a midside node is at either end of its edge.
@@ -92,24 +90,22 @@ def displacement_statistics(mesh: TetMesh, u: Floats) -> Mapping[str, Statistics
     """Statistics of a displacement (n, 3) [m] by node set, and of all nodes under ``"all nodes"``."""
     sizes = np.linalg.norm(u, axis=1)
     groups = {"all nodes": np.ones(len(sizes), dtype=bool), **mesh.node_sets}
-    return {name: _statistics(sizes[members]) for name, members in groups.items() if members.any()}
-
-
-def _statistics(sizes: Floats) -> Statistics:
-    return Statistics(
-        nodes=len(sizes),
-        mean=float(sizes.mean()),
-        root_mean_square=float(np.sqrt(np.mean(sizes**2))),
-        percentile_95=float(np.percentile(sizes, 95.0)),
-        largest=float(sizes.max()),
-    )
+    return {
+        name: Statistics(
+            nodes=len(own),
+            mean=float(own.mean()),
+            root_mean_square=float(np.sqrt(np.mean(own**2))),
+            percentile_95=float(np.percentile(own, 95.0)),
+            largest=float(own.max()),
+        )
+        for name, members in groups.items()
+        if len(own := sizes[members])
+    }
 
 
 def nodal_state_of(system: System, time: float = math.inf) -> NodalState:
     """The state of all nodes of a system at its present displacement; see `result_of`."""
-    system.evaluate_forces()
-    system.gather_forces()
-    internal = system.internal.numpy().astype(np.float64)
+    internal = system.internal_forces()
     reactions = system.model.reactions(internal, system.model.external_forces(time))
     return NodalState(system.node_mesh, system.u.numpy().astype(np.float64), reactions)
 

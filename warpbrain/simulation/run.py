@@ -12,14 +12,15 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
+from warpbrain.recordings.recording import TestRecording
 from warpbrain.shown import Shown
-from warpbrain.simulation.at_rest import states_at_rest
-from warpbrain.simulation.courses import Course, Followed, Watching, follow
+from warpbrain.simulation.courses import Course, Followed, Watching, follow, states_at_rest
 from warpbrain.simulation.locking import choose_elements
-from warpbrain.simulation.model import ELEMENTS, Model
+from warpbrain.simulation.model import ELEMENTS, Model, require_held
 from warpbrain.simulation.observation import Observed, observe
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.result import Result, nodal_state_of, result_of
+from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.simulation.specimen_run import SpecimenRun, SpecimenRunning
 from warpbrain.simulation.system import System
 
@@ -193,3 +194,20 @@ def run(
     if course != Course(tolerance=tolerance):
         raise InputError(f"steps, to_rest, until: {case.path} has a [specimen], whose tests are quasi-static")
     return SpecimenRunning(case, tolerance, elements, device, precision).run()
+
+
+def why_not(case: Case) -> str:
+    """Why a sound case cannot be run as it stands; empty if it can."""
+    try:
+        if case.specimen is None:
+            require_held(model_of(case))
+            return ""
+        specimen_of(case)
+        for tissue in case.tissues.values():
+            _ = tissue.known_law
+    except InputError as error:
+        return str(error).removeprefix(f"{case.path}: ")
+    for recording in case.recordings:
+        if isinstance(recording, TestRecording) and (why := not_transmitted(case.specimen.grips, recording.mode)):
+            return f"recording '{recording.name}' mode '{recording.mode}': {why}"
+    return ""

@@ -16,27 +16,66 @@ the same way, and all is balanced again, until nothing changes.
 Every parameter is one more right-hand side of one matrix, and conjugate gradients solve for all of them at once
 (`warpbrain.kernels.block_linear`). SciPy's sparse LU takes 1.1 s for its factors on the phantom's 4187 nodes (2-core
 CPU, 2026-11), longer than two parameters take so to 1e-10; it has no device, and its fill grows faster than the mesh.
+
+Contact that is stuck, slides or lifts off, a falx or a resection that is there or not: nothing lies between two such
+states, and so there is no derivative. The whole difference stands where a derivative would (`secant`).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.beside import Beside, ModelOf
-from warpbrain.simulation.coupled import InTurn
-from warpbrain.simulation.equilibrium import Equilibrium
+from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.refinement import lengths, refine
 from warpbrain.simulation.system import System
 
-Floats = NDArray[np.float64]
+
+class InTurn:
+    """Solves the system's linear systems for several right-hand sides, one after the other.
+
+    Parameters
+    ----------
+    system : System
+    tolerance : float
+        Relative, of each.
+    max_iterations : int
+    """
+
+    def __init__(self, system: System, tolerance: float, max_iterations: int) -> None:
+        self._system, self._tolerance = system, tolerance
+        self._solver = system.linear_solver(tolerance=tolerance, max_iterations=max_iterations, watch_curvature=True)
+        self._results: list[LinearResult] = []
+
+    def prepare(self) -> None:
+        """Take notice of new values of the matrix, and of what terms keep of their own."""
+        self._solver.prepare()
+
+    def solve(self, right_hand_sides: Sequence[Floats], tolerance: float | None = None) -> Floats:
+        """Solve from zero for right-hand sides (n, 3), which are zero on constrained components: (count, n, 3)."""
+        found, self._results = [], []
+        for b in right_hand_sides:
+            self._system.load.assign(b)
+            self._system.solution.zero_()
+            self._solver.solve(tolerance)
+            self._results.append(self._solver.result())
+            found.append(self._system.solution.numpy().astype(np.float64))
+        return np.array(found)
+
+    def results(self) -> list[LinearResult]:
+        """How the last solve ended, for each right-hand side."""
+        return self._results
+
 
 #: What solves for several right-hand sides: at once, or in turn where terms have unknowns of their own.
 SeveralSolver = BlockConjugateGradient | InTurn
@@ -181,9 +220,7 @@ class SensitivitySolver:
 
         def internal(offset: float, _: Model) -> Floats:
             system.u.assign(state + offset * moved)
-            system.evaluate_forces()
-            system.gather_forces()
-            return system.internal.numpy().astype(np.float64)
+            return system.internal_forces()
 
         return beside.derivative(k, internal)
 
@@ -232,18 +269,6 @@ def several_solver(system: System, count: int, tolerance: float, max_cg: int) ->
     )
 
 
-def sensitivities(
-    system: System,
-    equilibrium: Equilibrium,
-    models: ModelOf,
-    theta: ArrayLike,
-    scales: ArrayLike | None = None,
-    tolerance: float = 1e-10,
-) -> Sensitivities:
-    """Derivatives of an equilibrium by parameters; see `SensitivitySolver`."""
-    return SensitivitySolver(system, tolerance).solve(equilibrium.u, models, theta, scales)
-
-
 def _require_solved(linear: LinearResult, parameter: int) -> None:
     if linear.indefinite:
         raise SolveError(
@@ -255,3 +280,54 @@ def _require_solved(linear: LinearResult, parameter: int) -> None:
             f"sensitivity to parameter {parameter}: conjugate gradients did not converge in {linear.iterations} "
             f"iterations (residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Secant:
+    """A difference of two equilibria.
+
+    Attributes
+    ----------
+    nodes : (n,) int array
+        Ids, in the model without, of the nodes that both models have.
+    u : (n, 3) array
+        Displacement with less that without [m].
+    reactions : (n, 3) array
+        Of what holds them [N].
+    """
+
+    nodes: NDArray[np.int64]
+    u: Floats
+    reactions: Floats
+
+
+def secant(
+    without: Model,
+    present: Model,
+    nodes: NDArray[np.integer] | None = None,
+    options: EquilibriumOptions | None = None,
+    device: str | None = None,
+) -> Secant:
+    """The difference that a switch makes.
+
+    Parameters
+    ----------
+    without, present : Model
+        Alike but for the switch.
+    nodes : (n,) int array, optional
+        For each node of `present` its id in `without`; the same ones by default. A resection leaves some.
+    options : EquilibriumOptions, optional
+    device : str, optional
+
+    Raises
+    ------
+    SolveError
+        If one of the two has no equilibrium.
+    """
+    shared = np.arange(len(present.mesh.points)) if nodes is None else np.asarray(nodes, dtype=np.int64)
+    found = []
+    for model in (present, without):
+        state = solve_equilibrium(System(model, device), options)
+        found.append((state.u, model.reactions(state.internal, model.external_forces())))
+    (u, reactions), (u_without, reactions_without) = found
+    return Secant(shared, u - u_without[shared], reactions - reactions_without[shared])

@@ -16,8 +16,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, SolveError
@@ -25,16 +25,11 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import TestRecording
-from warpbrain.simulation.assumed import with_mechanisms
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.history import History, history_of
 from warpbrain.simulation.locking import choose_elements
-from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.model import Material, Model, with_mechanisms
 from warpbrain.simulation.system import System
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 #: Imposed values from rest to the farther extreme of a test.
 STEPS = 8
@@ -82,7 +77,7 @@ class TestResult:
     response: Floats
     predicted: Floats
     residuals: Floats
-    newton: Integers
+    newton: Ints
     min_J: Floats
     unstable_iterations: int
     time: Floats | None = None
@@ -320,28 +315,26 @@ class Rig:
 
     def _step(self, recording: TestRecording, value: float, start: Floats, h: float, time: float) -> Equilibrium:
         """The state a time step `h` after another, at a time."""
-        self._impose(recording, value)
-        try:
-            return self.solver.step(start, h, time)
-        except SolveError as error:
-            factor, unit = SHOWN[recording.quantities[0]]
-            raise SolveError(
-                f"test '{recording.name}' ({recording.mode}) at {time:.4g} s: {recording.quantities[0]} "
-                f"{factor * value:.4g} {unit}: {error}"
-            ) from None
+        return self._solved(recording, value, lambda: self.solver.step(start, h, time), at=f" at {time:.4g} s")
 
     def _equilibrium(
         self, recording: TestRecording, value: float, previous: float, start: Floats | None
     ) -> Equilibrium:
         """Equilibrium at an imposed value, from the state `start` at the value before it."""
+        came = f", coming from {SHOWN[recording.quantities[0]][0] * previous:.4g}"
+        return self._solved(recording, value, lambda: self.solver.solve(start=start), came=came)
+
+    def _solved(
+        self, recording: TestRecording, value: float, solve: Callable[[], Equilibrium], at: str = "", came: str = ""
+    ) -> Equilibrium:
         self._impose(recording, value)
         try:
-            return self.solver.solve(start=start)
+            return solve()
         except SolveError as error:
             factor, unit = SHOWN[recording.quantities[0]]
             raise SolveError(
-                f"test '{recording.name}' ({recording.mode}): {recording.quantities[0]} {factor * value:.4g} {unit}, "
-                f"coming from {factor * previous:.4g}: {error}"
+                f"test '{recording.name}' ({recording.mode}){at}: {recording.quantities[0]} {factor * value:.4g} "
+                f"{unit}{came}: {error}"
             ) from None
 
     def _platen(self, recording: TestRecording, value: float) -> Floats:
@@ -375,18 +368,6 @@ class Rig:
             return float(np.sum(x * force[:, 1] - y * force[:, 0]))
         total = float(force[:, 0 if recording.mode == "shear" else 2].sum())
         return total / self._area if recording.quantities[1] == "stress" else total
-
-
-def simulate_test(
-    case: Case,
-    recording: TestRecording,
-    device: str | None = None,
-    precision: str = "double",
-    options: EquilibriumOptions | None = None,
-    steps: int = STEPS,
-) -> TestResult:
-    """Simulate one test on the specimen of a case; see `Rig`, which runs several without starting anew for each."""
-    return Rig(case, device, precision, options).run(recording, steps)
 
 
 def compare_test(recording: TestRecording, result: TestResult) -> Comparison:

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -13,28 +14,29 @@ import warp as wp
 from numpy.typing import NDArray
 from warp.sparse import BsrMatrix, bsr_zeros
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
-from warpbrain.kernels.linear import ConjugateGradient, Nodes, solver_kernels
+from warpbrain.kernels.linear import ConjugateGradient, solver_kernels
 from warpbrain.kernels.module import begin_loading
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
-from warpbrain.kernels.quadratic import quadratic_kernels
+from warpbrain.kernels.ten_nodes import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import EDGES
 from warpbrain.physics.continuous import differ_in_numbers_only
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.device import grown
-from warpbrain.physics.mechanism import Following, Growing, Weakening
+from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import Term
 from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
+from warpbrain.simulation.factored import FactoredSolver, KeptFactors
+from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.placed import placed_mesh, placed_pattern
-
-Floats = NDArray[np.float64]
 
 
 def find_device(name: str | None) -> wp.Device:
@@ -67,14 +69,6 @@ def begin_loading_kernels(device: wp.Device, precision: Precision) -> None:
 def _code(material: Material) -> tuple[type[Law], str, int]:
     """What must stay as it is when a material changes in a system: law, formulation and number of parameters."""
     return type(material.law), material.formulation, len(material.law.parameters())
-
-
-def _volumetric_modulus(material: Material) -> float:
-    return material.volumetric_modulus
-
-
-def _no_modulus(_material: Material) -> float:
-    return 0.0
 
 
 @dataclass(frozen=True)
@@ -146,10 +140,8 @@ class System:
         self.terms = [*self._following]
         self._time_step = math.inf
         self._acting: tuple[float, float] = (1.0, math.inf)
-        self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
-        self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
         # of what alters elements, as they are now; None: not known yet
-        alters = self._growing or self._weakening or model.emptying or self._averages or self._mixes
+        alters = model.growing or model.weakening or model.emptying or self._averages or self._mixes
         self._scales: tuple[float, ...] | None = None if alters else ()
         self.groups = self._group_elements()
         self.terms += [term for group in self.groups for term in group.averaged]
@@ -199,7 +191,7 @@ class System:
         for (law_type, formulation), materials in self._grouped(self.model).items():
             members = np.flatnonzero(np.isin(self.model.mesh.tissue, list(materials)))
             device_law = law_type.device_law(formulation)
-            device_law = grown(device_law) if self._growing else device_law
+            device_law = grown(device_law) if self.model.growing else device_law
             linear = self.quadratic is None
             kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
             averaged = (
@@ -243,16 +235,16 @@ class System:
     ) -> Floats:
         """Parameters by element; 1 where it is of no tissue of the group."""
         if modulus is None:
-            modulus = own_modulus if self._averages else _volumetric_modulus
+            modulus = own_modulus if self._averages else attrgetter("volumetric_modulus")
             # all of it acts on the volumes at corners
-            modulus = _no_modulus if self._mixes else modulus
+            modulus = (lambda _material: 0.0) if self._mixes else modulus
         rows = law_type.parameter_rows([material.law for material in materials.values()])
         # the last column, where something grows, is the growth stretch
-        parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self._growing)))
+        parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self.model.growing)))
         for (label, material), row in zip(materials.items(), rows, strict=True):
             members = np.flatnonzero(self.model.mesh.tissue == label)
             parameters[members, : 1 + len(row)] = (modulus(material), *row)
-        if self._growing:
+        if self.model.growing:
             parameters[:, -1] = self.growth_stretches
         return parameters
 
@@ -300,7 +292,9 @@ class System:
         self.model = model
         others: dict[int, Term] = {}
         try:
-            changed = self._changed(before, model)
+            pairs = zip(before.mechanisms, model.mechanisms, strict=True)
+            following = [(was, now) for was, now in pairs if isinstance(now, Following)]
+            changed = {n: now for n, (was, now) in enumerate(following) if was is not now and was != now}
             made = {} if made is None else made
             for place, mechanism in changed.items():
                 if id(mechanism) not in made:
@@ -319,9 +313,7 @@ class System:
                 others[place].set_time_step(self._time_step)
                 term.adopt(others[place])
         if list(before.mechanisms) != list(model.mechanisms):
-            self._growing = [m for m in model.mechanisms if isinstance(m, Growing)]
-            self._weakening = [m for m in model.mechanisms if isinstance(m, Weakening)]
-            self._scales = None if self._growing or self._weakening or model.emptying else self._scales
+            self._scales = None if model.growing or model.weakening or model.emptying else self._scales
             self._act()
         self._write_materials()
 
@@ -350,13 +342,6 @@ class System:
         for was, now in zip(before.mechanisms, model.mechanisms, strict=True):
             if was != now and not differ_in_numbers_only(was, now):
                 raise InputError(f"mechanisms: {now}: expected other numbers of {was}")
-
-    @staticmethod
-    def _changed(before: Model, after: Model) -> dict[int, Following]:
-        """Mechanisms that are terms and have other parameters, by the number of the term."""
-        pairs = zip(before.mechanisms, after.mechanisms, strict=True)
-        following = [(was, now) for was, now in pairs if isinstance(now, Following)]
-        return {place: now for place, (was, now) in enumerate(following) if was is not now and was != now}
 
     def _write_materials(self) -> None:
         """Let laws and terms have the moduli, factors and growth that elements have now."""
@@ -420,14 +405,8 @@ class System:
     def evaluate_tangents(self) -> None:
         """Element forces and tangent blocks at `u`."""
         for g in self.groups:
-            self._launch(
-                g.kernels.forces_and_tangents,
-                len(g.elements),
-                *self._geometry(g),
-                self.u,
-                self.element_forces,
-                self.element_blocks,
-            )
+            outputs = (self.element_forces, self.element_blocks)
+            self._launch(g.kernels.forces_and_tangents, len(g.elements), *self._geometry(g), self.u, *outputs)
         for term in self.terms:
             term.evaluate_tangents(self.u)
 
@@ -439,6 +418,12 @@ class System:
     def gather_forces(self) -> None:
         """Internal forces from the element forces."""
         self._launch(self._kernels.gather_forces, self.size, *self.forces_on_nodes, self.internal)
+
+    def internal_forces(self) -> Floats:
+        """Internal forces (n, 3) [N] at `u`, evaluated anew."""
+        self.evaluate_forces()
+        self.gather_forces()
+        return self.internal.numpy().astype(np.float64)
 
     def size_of_forces(self) -> float:
         """Norm [N] of what rounding is relative to.
@@ -461,19 +446,9 @@ class System:
         if self._coupled:
             self.coupling_root.fill_(math.sqrt(k if coupling is None else coupling))
         self._launch(
-            self._kernels.gather_matrix,
-            len(self.pairs),
-            self.pairs,
-            self.pair_first,
-            self.contributions,
-            self.pair_positions,
-            self._flat_blocks,
-            self.mass,
-            self.free,
-            scalar(k),
-            scalar(m),
-            self.matrix.values,
-        )
+            self._kernels.gather_matrix, len(self.pairs), self.pairs, self.pair_first, self.contributions,
+            self.pair_positions, self._flat_blocks, self.mass, self.free, scalar(k), scalar(m), self.matrix.values,
+        )  # fmt: skip
 
     def stiffness(self) -> Any:
         """`K` [N/m] at `u` on every component, constrained ones included, as a SciPy BSR matrix (3 n, 3 n)."""
@@ -529,20 +504,7 @@ class System:
         What unknowns of a term's own do to it counts `coupling` times, `k` times if absent.
         """
         self._add_all_beyond_blocks(increment, -1.0, k, coupling, self._all_components, self.free)
-        self._launch(
-            self._kernels.constrained_load,
-            self.size,
-            self.matrix.offsets,
-            self.matrix.columns,
-            self.block_pairs,
-            self.pair_first,
-            self.contributions,
-            self._flat_blocks,
-            increment,
-            self.free,
-            self.precision.scalar(k),
-            self.load,
-        )
+        self._subtract_blocks_times(increment, k, self.free)
 
     def stiffness_times(self, increment: Floats, k: float = 1.0, coupling: float | None = None) -> Floats:
         """`k K increment` [N] on every component, constrained ones included, shape (n, 3).
@@ -551,22 +513,17 @@ class System:
         """
         self.increment.assign(increment)
         self.load.zero_()
-        self._launch(
-            self._kernels.constrained_load,
-            self.size,
-            self.matrix.offsets,
-            self.matrix.columns,
-            self.block_pairs,
-            self.pair_first,
-            self.contributions,
-            self._flat_blocks,
-            self.increment,
-            self._all_components,
-            self.precision.scalar(-k),
-            self.load,
-        )
+        self._subtract_blocks_times(self.increment, -k, self._all_components)
         self._add_all_beyond_blocks(self.increment, 1.0, k, coupling, self._all_components, self._all_components)
         return self.load.numpy().astype(np.float64)
+
+    def _subtract_blocks_times(self, increment: wp.array, k: float, rows: wp.array) -> None:
+        """`load -= k K increment`, of what of `K` is in blocks, on components that are 1 in `rows`."""
+        self._launch(
+            self._kernels.constrained_load, self.size, self.matrix.offsets, self.matrix.columns, self.block_pairs,
+            self.pair_first, self.contributions, self._flat_blocks, increment, rows, self.precision.scalar(k),
+            self.load,
+        )  # fmt: skip
 
     def linear_solver(
         self,
@@ -576,13 +533,30 @@ class System:
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
         at_rest: bool = False,
+        factors: KeptFactors | None = None,
     ) -> LinearSolver:
-        """A solver for ``matrix solution = load``: conjugate gradients (`warpbrain.kernels.linear`).
+        """A solver for ``matrix solution = load``; all are chosen here.
 
-        `at_rest` is for matrices without inertia, for which a coarse space is worth its making. Where a term has
-        unknowns of its own: `warpbrain.simulation.coupled`.
+        - Conjugate gradients in a captured loop (`warpbrain.kernels.linear`) for one system after the other.
+        - MINRES (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is indefinite.
+        - With what is kept from state to state (`kept_for`), which needs all of the matrix, the gradients of
+          `warpbrain.simulation.factored`, or on a GPU in double precision of `warpbrain.simulation.kept_inverse`: a
+          factorisation of one state nearly solves those that are near.
+
+        Parameters
+        ----------
+        tolerance : float
+            Relative.
+        max_iterations : int
+        preconditioner : str
+            See `warpbrain.kernels.linear.PRECONDITIONERS`.
+        watch_curvature : bool
+            Tell an indefinite matrix.
+        at_rest : bool
+            The matrix is without inertia, so that a coarse space is worth its making.
+        factors : KeptFactors, optional
         """
-        conjugate_gradient = ConjugateGradient(
+        plain = ConjugateGradient(
             self.matrix,
             self.diagonal,
             self.load,
@@ -593,13 +567,20 @@ class System:
             preconditioner=preconditioner,
             watch_curvature=watch_curvature,
             beyond=None if self.assembled else self._add_beyond_blocks,
-            nodes=Nodes(self.model.node_mesh.points, self.free) if at_rest else None,
+            nodes=(self.model.node_mesh.points, self.free) if at_rest else None,
         )
-        if not self._coupled:
-            return conjugate_gradient
-        # MINRES takes some times the iterations of CG
-        most = 4 * max_iterations
-        return CoupledSolver(self, self._coupled, conjugate_gradient, tolerance=tolerance, max_iterations=most)
+        captured: LinearSolver = plain
+        if self._coupled:
+            # MINRES takes some times the iterations of CG
+            most = 4 * max_iterations
+            captured = CoupledSolver(self, self._coupled, plain, tolerance=tolerance, max_iterations=most)
+        if factors is None or not self.assembled:
+            return captured
+        if not isinstance(factors, KeptInverse):
+            return FactoredSolver(self, captured, factors, tolerance)
+        if self._coupled or self.precision.name != "double":
+            return captured
+        return InvertedSolver(self, captured, factors, tolerance)
 
     def load_kernels(self) -> float:
         """Compile what a run needs, or find it in Warp's cache, at the present state; returns the seconds it took."""
@@ -650,25 +631,23 @@ class System:
         share, time = self._acting
         for term in self.terms:
             term.set_scale(share * term.factor(time))
-        growing, weakening, emptying = self._growing, self._weakening, self.model.emptying
-        scales = tuple(share * mechanism.factor(time) for mechanism in (*growing, *weakening))
-        scales += tuple(share * mechanism.factor(time) for mechanism in emptying)
+        model = self.model
+        acting: list[Sequence[Any]] = [model.growing, model.weakening, model.emptying]
+        growth, softening, emptying = ([share * mechanism.factor(time) for mechanism in those] for those in acting)
+        scales = (*growth, *softening, *emptying)
         if scales == self._scales:
             return False
         self._scales = scales
-        mesh = self.model.mesh
-        self.stiffness_factors = np.ones(self.elements)
-        for softer, scale in zip(weakening, scales[len(growing) :], strict=False):
-            self.stiffness_factors *= softer.stiffness_factor(mesh, scale)
+        self.stiffness_factors, change = np.ones(self.elements), np.ones(self.elements)
+        for softer, scale in zip(model.weakening, softening, strict=True):
+            self.stiffness_factors *= softer.stiffness_factor(model.mesh, scale)
         if emptying:
-            left = scales[len(growing) + len(weakening) :]
-            self.remaining_parts = self.model.remaining_part(left)
-            self.mass.assign(self.model.node_masses * self.model.remaining_share(left))
+            self.remaining_parts = model.remaining_part(emptying)
+            self.mass.assign(model.node_masses * model.remaining_share(emptying))
         # a kernel multiplies all that an element does by its volume
         self.volume.assign((PART if self._averages else 1.0) * self.stiffness_factors * self._volumes)
-        change = np.ones(self.elements)
-        for larger, scale in zip(growing, scales, strict=False):
-            change *= 1.0 + larger.growth(mesh, scale)
+        for larger, scale in zip(model.growing, growth, strict=True):
+            change *= 1.0 + larger.growth(model.mesh, scale)
         self.growth_stretches = np.cbrt(change)
         return True
 

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from testing_machine import EXACT, case_of, recorded
+from testing_machine import EXACT, case_of, recorded, simulate_test
 
 from warpbrain.cases.specimen import Specimen
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
-from warpbrain.simulation.specimen import simulate_test
 from warpbrain.worlds.specimen.material import HomogeneousMaterial, relaxing
 
 PLATE = Specimen("block", (5e-3, 4e-3, 3e-3), "lubricated")

@@ -16,7 +16,7 @@ from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
 from warpbrain.cases.building.mmg import Cells, remesh
 from warpbrain.cases.building.tissue_names import Assignment
 from warpbrain.images.reading import Image
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import EDGES
 
 # nodes of a mesh whose size is not given: about what the shipped cases have
 NODES = 5000

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.mesh.quality import EDGES
+from warpbrain.mesh.surface import EDGES
 
 
 def bcc_lattice(lower: Floats, upper: Floats, spacing: float) -> tuple[Floats, Ints]:

@@ -13,7 +13,7 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.frame import METRES
 from warpbrain.mesh import MeshError, MeshInFile, pinched_nodes, read_mesh_file
 from warpbrain.mesh.files import ends_inside_a_number
-from warpbrain.mesh.soundness import coincident_nodes
+from warpbrain.mesh.quality import coincident_nodes
 from warpbrain.mesh.surface import boundary_faces
 
 #: Volumes [m3] that no brain, phantom or specimen has: 100 litres, and a tenth of a cubic millimetre.

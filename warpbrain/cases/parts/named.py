@@ -13,7 +13,7 @@ from warpbrain.cases.case import Tissue
 from warpbrain.cases.format.reading import Reading
 from warpbrain.frame import Frame
 from warpbrain.mesh import MeshError, MeshInFile, TetMesh, read_mesh, wall_nodes
-from warpbrain.mesh.soundness import open_edges
+from warpbrain.mesh.quality import open_edges
 from warpbrain.physics.mechanism import ClosedSurface
 from warpbrain.problems import Problems
 from warpbrain.recordings.surfaces import read_surface_mesh

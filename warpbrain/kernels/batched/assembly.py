@@ -3,49 +3,23 @@
 The matrices are symmetric: the blocks `A_ij` with i <= j are kept, one for each pair of nodes that share an element.
 """
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import warp as wp
 
 from warpbrain.kernels.batched.layout import ROWS, block_of, store_block, store_vector, vector_of
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
 
-@dataclass(frozen=True)
-class BatchedAssemblyKernels:
-    """Assembly kernels of one precision; each has a lane as its last index.
-
-    Attributes
-    ----------
-    gather_matrix : wp.Kernel
-        One thread for a pair of nodes: `A_ij = k K_ij + m M_ij`, with `k` and `m` of the sample and the rows and
-        columns of constrained components replaced by those of the identity.
-    gather_forces : wp.Kernel
-        One thread for `ROWS` nodes: internal forces, and the shares of the squared norms of what is out of balance on
-        the free components and of the internal forces.
-    smallest : wp.Kernel
-        One thread for a share of the elements: their smallest `J`, NaN if one is.
-    constrained_load : wp.Kernel
-        One thread for a node: subtract `k K d`, of prescribed velocities `d`, from the right-hand side.
-    """
-
-    gather_matrix: Any
-    gather_forces: Any
-    smallest: Any
-    constrained_load: Any
-
-
 @cache
-def batched_assembly_kernels(precision: Precision) -> BatchedAssemblyKernels:
-    """Make (once) the batched assembly kernels of a precision."""
+def batched_assembly_kernels(precision: Precision) -> KernelSet:
+    """Make (once) the batched assembly kernels of a precision; the last index of each is a lane."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"assembly_{precision.name}_batched")
+    kernels = KernelSet(f"assembly_{precision.name}_batched")
     rows = wp.constant(ROWS)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def gather_matrix(
         slots: wp.array[int],
         count: wp.array[int],
@@ -59,6 +33,8 @@ def batched_assembly_kernels(precision: Precision) -> BatchedAssemblyKernels:
         m: wp.array[scalar],
         values: wp.array3d[scalar],
     ):
+        """One thread for a pair of nodes: `A_ij = k K_ij + m M_ij`, with `k` and `m` of the sample and the rows and
+        columns of constrained components replaced by those of the identity."""
         p, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -76,7 +52,7 @@ def batched_assembly_kernels(precision: Precision) -> BatchedAssemblyKernels:
                 A[c, c] += free[i][c] * inertia + (one - free[i][c])
         store_block(values, p, slot, A)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def gather_forces(
         slots: wp.array[int],
         count: wp.array[int],
@@ -88,6 +64,8 @@ def batched_assembly_kernels(precision: Precision) -> BatchedAssemblyKernels:
         internal: wp.array3d[scalar],
         shares: wp.array3d[scalar],
     ):
+        """One thread for `ROWS` nodes: internal forces, and the shares of the squared norms of what is out of balance
+        on the free components and of the internal forces."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -105,10 +83,11 @@ def batched_assembly_kernels(precision: Precision) -> BatchedAssemblyKernels:
         shares[0, chunk, slot] = unbalanced
         shares[1, chunk, slot] = size
 
-    @wp.kernel(module=module)
+    @kernels.add
     def smallest(
         slots: wp.array[int], count: wp.array[int], size: int, values: wp.array2d[scalar], least: wp.array2d[scalar]
     ):
+        """One thread for a share of the elements: their smallest `J`, NaN if one is."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -121,7 +100,7 @@ def batched_assembly_kernels(precision: Precision) -> BatchedAssemblyKernels:
                 low = value
         least[chunk, slot] = low
 
-    @wp.kernel(module=module)
+    @kernels.add
     def constrained_load(
         slots: wp.array[int],
         count: wp.array[int],
@@ -134,6 +113,7 @@ def batched_assembly_kernels(precision: Precision) -> BatchedAssemblyKernels:
         k: wp.array[scalar],
         load: wp.array3d[scalar],
     ):
+        """One thread for a node: subtract `k K d`, of prescribed velocities `d`, from the right-hand side."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -152,4 +132,4 @@ def batched_assembly_kernels(precision: Precision) -> BatchedAssemblyKernels:
                 f += K * vector_of(velocity, nodes[e][b], slot)
         store_vector(load, i, slot, vector_of(load, i, slot) - wp.cw_mul(free[i], k[slot] * f))
 
-    return BatchedAssemblyKernels(gather_matrix, gather_forces, smallest, constrained_load)
+    return kernels

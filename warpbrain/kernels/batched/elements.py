@@ -1,36 +1,20 @@
 """Element kernels of many samples, made of a law's device functions: forces, tangent blocks and `J`."""
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import warp as wp
 
 from warpbrain.kernels.batched.layout import store_block, store_vector, vector_of
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import DeviceLaw
 
 
-@dataclass(frozen=True)
-class BatchedElementKernels:
-    """The kernel of one law in one precision.
-
-    Attributes
-    ----------
-    forces_and_tangents : wp.Kernel
-        One thread for an element of a group and a lane. Parameters have a row for each tissue and slot, slots fastest.
-        Element results are those of `warpbrain.kernels.tetrahedron`: corner ``4 e + a`` and block ``10 e + k``.
-    """
-
-    forces_and_tangents: Any
-
-
 @cache
-def batched_element_kernels(law: DeviceLaw, precision: Precision) -> BatchedElementKernels:
+def batched_element_kernels(law: DeviceLaw, precision: Precision) -> KernelSet:
     """Make (once) the batched element kernels of a law in a precision."""
     scalar, mat33 = precision.scalar, precision.mat33
-    module = compiled_module(f"{law.key}_{precision.name}_batched")
+    kernels = KernelSet(f"{law.key}_{precision.name}_batched")
     tangents_of = law.kernels(precision).tangents
 
     @wp.func
@@ -42,7 +26,7 @@ def batched_element_kernels(law: DeviceLaw, precision: Precision) -> BatchedElem
         u3 = vector_of(u, nodes[3], slot) - u0
         return wp.matrix_from_cols(u1, u2, u3) * G
 
-    @wp.kernel(module=module)
+    @kernels.add
     def forces_and_tangents(
         slots: wp.array[int],
         count: wp.array[int],
@@ -57,6 +41,9 @@ def batched_element_kernels(law: DeviceLaw, precision: Precision) -> BatchedElem
         element_blocks: wp.array3d[scalar],
         element_J: wp.array2d[scalar],
     ):
+        """One thread for an element of a group and a lane. Parameters have a row for each tissue and slot, slots
+        fastest. Element results are those of `warpbrain.kernels.tetrahedron`: corner ``4 e + a`` and block ``10 e +
+        k``."""
         t, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -88,4 +75,4 @@ def batched_element_kernels(law: DeviceLaw, precision: Precision) -> BatchedElem
         store_block(element_blocks, 10 * e + 8, slot, K23)
         store_block(element_blocks, 10 * e + 9, slot, K33)
 
-    return BatchedElementKernels(forces_and_tangents)
+    return kernels

@@ -70,3 +70,25 @@ def store_symmetric(blocks: wp.array3d[Any], i: int, slot: int, value: Any):
     blocks[i, 3, slot] = value[1, 1]
     blocks[i, 4, slot] = value[1, 2]
     blocks[i, 5, slot] = value[2, 2]
+
+
+@wp.func
+def row_product(
+    offsets: wp.array[int],
+    columns: wp.array[int],
+    blocks: wp.array[int],
+    values: wp.array3d[Any],
+    x: wp.array3d[Any],
+    i: int,
+    slot: int,
+):
+    """`sum_j A_ij x_j` of a sample; `blocks` says where `A_ij`, or for j < i its transpose, is kept."""
+    zero = x.dtype(0.0)
+    y = wp.vector(zero, zero, zero)
+    for k in range(offsets[i], offsets[i + 1]):
+        j = columns[k]
+        A = block_of(values, blocks[k], slot)
+        if j < i:
+            A = wp.transpose(A)
+        y += A * vector_of(x, j, slot)
+    return y

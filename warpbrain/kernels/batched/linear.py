@@ -30,21 +30,10 @@ from warpbrain.kernels.precision import Precision
 class BatchedConjugateGradient:
     """Block-Jacobi CG for as many systems as there are slots; nothing is allocated in a solve.
 
-    Parameters
-    ----------
-    offsets, columns, blocks : wp.array of int
-        Pattern: start of each row in `columns`, block columns, and where each block (or its transpose, left of the
-        diagonal) is kept in `values`.
-    diagonal : wp.array of int, shape (n,)
-        Where each diagonal block is kept in `values`.
-    values : wp.array, shape (pairs, 9, slots)
-        Blocks on and above the diagonal.
-    solution : wp.array, shape (n, 3, slots)
-        `x`: the first guess and the result.
-    precision : Precision
-    tolerance : float
-        A system ends when ``|b - A x| <= tolerance |b|``.
-    max_iterations : int
+    Rows of the pattern begin at `offsets` in `columns`; `blocks` says where each block, or left of the diagonal its
+    transpose, is in `values` (pairs, 9, slots), of which those on and above the diagonal are kept, and `diagonal` (n,)
+    where diagonal blocks are. `solution` (n, 3, slots) is first guess and result. A system ends when ``|b - A x| <=
+    tolerance |b|``.
 
     Attributes
     ----------

@@ -3,56 +3,22 @@
 See `warpbrain.simulation.dynamics` for the equations.
 """
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.batched.layout import store_vector, vector_of
-from warpbrain.kernels.batched.product import row_product
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.batched.layout import row_product, store_vector, vector_of
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
 
-@dataclass(frozen=True)
-class BatchedMotionKernels:
-    """Kernels of a time step in one precision, one thread for a node and a lane.
-
-    Attributes
-    ----------
-    restore : wp.Kernel
-        Back to the start of the step, with no guess for its solution.
-    reset : wp.Kernel
-        At rest in the reference shape.
-    prescribe : wp.Kernel
-        Velocity of the constrained components that takes them to where they must be at the end of the step.
-    begin : wp.Kernel
-        Keeps the state and writes the right-hand side `b = M v + h (f_ext - f_int) - A v` on the free components.
-    update : wp.Kernel
-        Velocity and displacement at the end of the step, of the samples whose linear solve has ended.
-    find_ready : wp.Kernel
-        One thread for a slot: 1 where a state is to be evaluated, one that has just been reached or one that is marked.
-    collect : wp.Kernel
-        One thread for a slot of a list and a node: a sample's vectors side by side, as they leave the device.
-    """
-
-    restore: Any
-    reset: Any
-    prescribe: Any
-    begin: Any
-    update: Any
-    find_ready: Any
-    collect: Any
-
-
 @cache
-def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
-    """Make (once) the batched kernels of a time step in a precision."""
+def batched_motion_kernels(precision: Precision) -> KernelSet:
+    """Make (once) the batched kernels of a time step in a precision, one thread for a node and a lane."""
     scalar, vec3 = precision.scalar, precision.vec3
-    module = compiled_module(f"motion_{precision.name}_batched")
+    kernels = KernelSet(f"motion_{precision.name}_batched")
 
-    @wp.kernel(module=module)
+    @kernels.add
     def restore(
         slots: wp.array[int],
         u_start: wp.array3d[scalar],
@@ -61,21 +27,23 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         v: wp.array3d[scalar],
         dv: wp.array3d[scalar],
     ):
+        """Back to the start of the step, with no guess for its solution."""
         i, lane = wp.tid()
         slot = slots[lane]
         store_vector(u, i, slot, vector_of(u_start, i, slot))
         store_vector(v, i, slot, vector_of(v_start, i, slot))
         store_vector(dv, i, slot, vec3())
 
-    @wp.kernel(module=module)
+    @kernels.add
     def reset(slots: wp.array[int], u: wp.array3d[scalar], v: wp.array3d[scalar], dv: wp.array3d[scalar]):
+        """At rest in the reference shape."""
         i, lane = wp.tid()
         slot = slots[lane]
         store_vector(u, i, slot, vec3())
         store_vector(v, i, slot, vec3())
         store_vector(dv, i, slot, vec3())
 
-    @wp.kernel(module=module)
+    @kernels.add
     def prescribe(
         slots: wp.array[int],
         count: wp.array[int],
@@ -86,6 +54,7 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         u: wp.array3d[scalar],
         velocity: wp.array3d[scalar],
     ):
+        """Velocity of the constrained components that takes them to where they must be at the end of the step."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -96,7 +65,7 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         held = vec3(scalar(1.0), scalar(1.0), scalar(1.0)) - free[i]
         store_vector(velocity, i, slot, wp.cw_mul(held, (goal - vector_of(u, i, slot)) / h[slot]))
 
-    @wp.kernel(module=module)
+    @kernels.add
     def begin(
         slots: wp.array[int],
         count: wp.array[int],
@@ -116,6 +85,7 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         v_start: wp.array3d[scalar],
         b: wp.array3d[scalar],
     ):
+        """Keeps the state and writes the right-hand side `b = M v + h (f_ext - f_int) - A v` on the free components."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -130,7 +100,7 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         step = h[slot] * (external - vector_of(internal, i, slot))
         store_vector(b, i, slot, wp.cw_mul(free[i], mass[i] * vi + step - Av))
 
-    @wp.kernel(module=module)
+    @kernels.add
     def update(
         slots: wp.array[int],
         count: wp.array[int],
@@ -144,6 +114,7 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         v: wp.array3d[scalar],
         u: wp.array3d[scalar],
     ):
+        """Velocity and displacement at the end of the step, of the samples whose linear solve has ended."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -156,16 +127,19 @@ def batched_motion_kernels(precision: Precision) -> BatchedMotionKernels:
         store_vector(v, i, slot, w)
         store_vector(u, i, slot, vector_of(u_start, i, slot) + h[slot] * w)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def find_ready(marked: wp.array[int], stepping: wp.array[int], solving: wp.array[int], ready: wp.array[int]):
+        """One thread for a slot: 1 where a state is to be evaluated, one that has just been reached or one that is
+        marked."""
         slot = wp.tid()
         ready[slot] = marked[slot]
         if stepping[slot] != 0 and solving[slot] == 0:
             ready[slot] = 1
 
-    @wp.kernel(module=module)
+    @kernels.add
     def collect(slots: wp.array[int], x: wp.array3d[scalar], collected: wp.array2d[vec3]):
+        """One thread for a slot of a list and a node: a sample's vectors side by side, as they leave the device."""
         place, i = wp.tid()
         collected[place, i] = vec3(x[i, 0, slots[place]], x[i, 1, slots[place]], x[i, 2, slots[place]])
 
-    return BatchedMotionKernels(restore, reset, prescribe, begin, update, find_ready, collect)
+    return kernels

@@ -1,8 +1,6 @@
 """Kernels of conjugate gradients for many systems of one pattern, each with scalars, sums and an end of its own."""
 
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import warp as wp
 
@@ -10,68 +8,25 @@ from warpbrain.kernels.batched.layout import (
     ROWS,
     SHARES,
     block_of,
+    row_product,
     store_symmetric,
     store_vector,
     symmetric_of,
     vector_of,
 )
-from warpbrain.kernels.batched.product import row_product
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
 
-@dataclass(frozen=True)
-class BatchedSolveKernels:
-    """Kernels of one precision; each has a lane as its last index.
-
-    Attributes
-    ----------
-    invert_diagonal : wp.Kernel
-        One thread for a node: the inverse of its diagonal block.
-    start : wp.Kernel
-        One thread for `ROWS` nodes: residual `r = b - A x` (in the place of `b`), `z = D^-1 r`, `p = z`; shares of
-        `b . b`, `r . r` and `r . z`.
-    product : wp.Kernel
-        Likewise: `q = A p`; shares of `p . q`.
-    advance : wp.Kernel
-        Likewise: `x += alpha p`, `r -= alpha q`, `z = D^-1 r`; shares of `r . r` and `r . z`.
-    turn : wp.Kernel
-        Likewise: `p = z + beta p`.
-    add_shares : wp.Kernel
-        Second stage of the sums, one thread for `SHARES` shares.
-    finish_start, finish_product, finish_advance : wp.Kernel
-        Third stage, one thread for a sample: its scalars, and whether it goes on.
-    add_sums : wp.Kernel
-        Third stage of sums that are only looked at, one thread for a quantity.
-    gather_active : wp.Kernel
-        One thread for a lane: the list of the slots that go on, in the order of the list they come from.
-    go_on : wp.Kernel
-        One thread: whether more go on than may linger.
-    """
-
-    invert_diagonal: Any
-    start: Any
-    product: Any
-    advance: Any
-    turn: Any
-    add_shares: Any
-    finish_start: Any
-    finish_product: Any
-    finish_advance: Any
-    add_sums: Any
-    gather_active: Any
-    go_on: Any
-
-
 @cache
-def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
-    """Make (once) the kernels of batched conjugate gradients in a precision."""
+def batched_solve_kernels(precision: Precision) -> KernelSet:
+    """Make (once) the kernels of batched conjugate gradients in a precision; the last index of each is a lane."""
     scalar = precision.scalar
-    module = compiled_module(f"linear_{precision.name}_batched")
+    kernels = KernelSet(f"linear_{precision.name}_batched")
     rows = wp.constant(ROWS)
     shares_each = wp.constant(SHARES)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def invert_diagonal(
         slots: wp.array[int],
         count: wp.array[int],
@@ -79,13 +34,14 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         values: wp.array3d[scalar],
         inverse: wp.array3d[scalar],
     ):
+        """One thread for a node: the inverse of its diagonal block."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
         store_symmetric(inverse, i, slot, wp.inverse(block_of(values, diagonal[i], slot)))
 
-    @wp.kernel(module=module)
+    @kernels.add
     def start(
         slots: wp.array[int],
         count: wp.array[int],
@@ -100,6 +56,8 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         p: wp.array3d[scalar],
         shares: wp.array3d[scalar],
     ):
+        """One thread for `ROWS` nodes: residual `r = b - A x` (in the place of `b`), `z = D^-1 r`, `p = z`; shares of
+        `b . b`, `r . r` and `r . z`."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -121,7 +79,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         shares[1, chunk, slot] = rr
         shares[2, chunk, slot] = rz
 
-    @wp.kernel(module=module)
+    @kernels.add
     def product(
         slots: wp.array[int],
         count: wp.array[int],
@@ -133,6 +91,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         q: wp.array3d[scalar],
         shares: wp.array3d[scalar],
     ):
+        """Likewise: `q = A p`; shares of `p . q`."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -144,7 +103,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
             pq += wp.dot(vector_of(p, i, slot), qi)
         shares[0, chunk, slot] = pq
 
-    @wp.kernel(module=module)
+    @kernels.add
     def advance(
         slots: wp.array[int],
         count: wp.array[int],
@@ -157,6 +116,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         z: wp.array3d[scalar],
         shares: wp.array3d[scalar],
     ):
+        """Likewise: `x += alpha p`, `r -= alpha q`, `z = D^-1 r`; shares of `r . r` and `r . z`."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -175,7 +135,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         shares[0, chunk, slot] = rr
         shares[1, chunk, slot] = rz
 
-    @wp.kernel(module=module)
+    @kernels.add
     def turn(
         slots: wp.array[int],
         count: wp.array[int],
@@ -183,6 +143,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         z: wp.array3d[scalar],
         p: wp.array3d[scalar],
     ):
+        """Likewise: `p = z + beta p`."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -191,8 +152,9 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         for i in range(chunk * rows, wp.min((chunk + 1) * rows, p.shape[0])):
             store_vector(p, i, slot, vector_of(z, i, slot) + b * vector_of(p, i, slot))
 
-    @wp.kernel(module=module)
+    @kernels.add
     def add_shares(slots: wp.array[int], count: wp.array[int], shares: wp.array3d[scalar], sums: wp.array3d[scalar]):
+        """Second stage of the sums, one thread for `SHARES` shares."""
         quantity, group, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -209,7 +171,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
             total += sums[quantity, group, slot]
         return total
 
-    @wp.kernel(module=module)
+    @kernels.add
     def finish_start(
         slots: wp.array[int],
         count: wp.array[int],
@@ -221,6 +183,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         iterations: wp.array[int],
         solving: wp.array[int],
     ):
+        """Third stage, one thread for a sample: its scalars, and whether it goes on."""
         lane = wp.tid()
         if lane >= count[0]:
             return
@@ -234,7 +197,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         if rr[slot] > goal[slot]:
             solving[slot] = 1
 
-    @wp.kernel(module=module)
+    @kernels.add
     def finish_product(
         slots: wp.array[int],
         count: wp.array[int],
@@ -248,7 +211,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         slot = slots[lane]
         alpha[slot] = rz[slot] / total_of(sums, 0, slot)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def finish_advance(
         slots: wp.array[int],
         count: wp.array[int],
@@ -273,7 +236,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         if not (rr[slot] > goal[slot]) or iterations[slot] >= max_iterations:
             solving[slot] = 0
 
-    @wp.kernel(module=module)
+    @kernels.add
     def gather_active(
         slots: wp.array[int],
         count: wp.array[int],
@@ -281,6 +244,7 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         active: wp.array[int],
         active_count: wp.array[int],
     ):
+        """One thread for a lane: the list of the slots that go on, in the order of the list they come from."""
         lane = wp.tid()
         if lane == 0 and count[0] == 0:
             active_count[0] = 0
@@ -296,20 +260,19 @@ def batched_solve_kernels(precision: Precision) -> BatchedSolveKernels:
         if lane == count[0] - 1:
             active_count[0] = place + solving[slot]
 
-    @wp.kernel(module=module)
+    @kernels.add
     def add_sums(slots: wp.array[int], count: wp.array[int], sums: wp.array3d[scalar], totals: wp.array2d[scalar]):
+        """Third stage of sums that are only looked at, one thread for a quantity."""
         quantity, lane = wp.tid()
         if lane >= count[0]:
             return
         totals[quantity, slots[lane]] = total_of(sums, quantity, slots[lane])
 
-    @wp.kernel(module=module)
+    @kernels.add
     def go_on(active_count: wp.array[int], linger: wp.array[int], condition: wp.array[int]):
+        """One thread: whether more go on than may linger."""
         condition[0] = 0
         if active_count[0] > linger[0]:
             condition[0] = 1
 
-    return BatchedSolveKernels(
-        invert_diagonal, start, product, advance, turn, add_shares, finish_start, finish_product, finish_advance,
-        add_sums, gather_active, go_on,
-    )  # fmt: skip
+    return kernels

@@ -35,7 +35,7 @@ from warpbrain.kernels.distance_field import smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
-from warpbrain.mesh.extent import extent
+from warpbrain.mesh.quality import extent
 from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import ClosedSurface, Mechanism, ParameterError, parameter

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.simulation.cupy_on import has_cupy, require_memory
+from warpbrain.simulation.kept_inverse import has_cupy, require_memory
 
 #: Matrices of the size of the dense one for which there has to be memory, and columns that are solved together.
 _MATRICES, _TOGETHER = 3, 2048

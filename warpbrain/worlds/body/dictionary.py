@@ -12,7 +12,7 @@ from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh, face_vectors, nodes_of
-from warpbrain.mesh.extent import extent
+from warpbrain.mesh.quality import extent
 from warpbrain.physics.composition import CompositionError, require_composable
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanisms import mechanisms

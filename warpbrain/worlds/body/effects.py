@@ -15,7 +15,7 @@ from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
 from warpbrain.physics.proposal import Proposal, Varying
-from warpbrain.simulation.assumed import substituted
+from warpbrain.simulation.model import substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation

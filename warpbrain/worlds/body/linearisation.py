@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import TetMesh, vertex_normals
-from warpbrain.mesh.extent import extent
+from warpbrain.mesh.quality import extent
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.simulation.chord import toward_equilibrium
+from warpbrain.simulation.multisecant import toward_equilibrium
 from warpbrain.simulation.system import System
 from warpbrain.threads import fill_columns, in_threads
 from warpbrain.worlds.body.factors import Factors
@@ -287,7 +287,7 @@ class Linearisation:
     def toward_equilibrium(self, system: System, external: Floats, start: Floats, tolerance: float) -> Floats:
         """A displacement (N, 3) [m] nearer to an equilibrium of a system that is held at the same nodes.
 
-        See `warpbrain.simulation.chord`; the start itself where other nodes are held.
+        See `warpbrain.simulation.multisecant`; the start itself where other nodes are held.
         """
         if not np.array_equal(system.model.constrained.ravel(), ~self._free):
             return start

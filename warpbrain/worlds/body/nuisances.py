@@ -23,8 +23,7 @@ from warpbrain.physics.laws.ogden import NEO_HOOKEAN, Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import Proposal
-from warpbrain.simulation.assumed import all_substituted
-from warpbrain.simulation.model import Material
+from warpbrain.simulation.model import Material, all_substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation

@@ -16,7 +16,7 @@ from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.gross_errors import FurtherColumns, PointRows
 from warpbrain.inference.noise import outliers
-from warpbrain.mesh.extent import principal_axes
+from warpbrain.mesh.quality import principal_axes
 from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base

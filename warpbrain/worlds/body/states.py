@@ -22,12 +22,11 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.proposal import Patch
-from warpbrain.simulation.assumed import all_substituted
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.keeping import kept_for
-from warpbrain.simulation.kept_factors import KeptFactors
+from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.kept_inverse import kept_for
 from warpbrain.simulation.locking import elements_of_fits
-from warpbrain.simulation.model import Material
+from warpbrain.simulation.model import Material, all_substituted
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
