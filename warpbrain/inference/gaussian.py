@@ -79,7 +79,7 @@ class _Spectrum:
 def products_of_rows(columns: Floats, rows: Ints) -> Floats:
     """Products of each two rows of points with the rows (g, d), of each of some columns (n, q): (g d^2, q)."""
     of_points = columns[rows]
-    return np.asarray((of_points[:, :, None] * of_points[:, None]).reshape(-1, columns.shape[1]))
+    return np.asarray((of_points[:, :, None] * of_points[:, None]).reshape(rows.size * rows.shape[1], columns.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)
