@@ -46,13 +46,12 @@ class SparseFactors:
         _is_used = True
         pattern = (tril(matrix) if symmetric else matrix).tocsc().astype(np.float64)
         pattern.sum_duplicates()
-        factors: rslab.Ldlt | rslab.Lu
         if symmetric:
             factors = _analysed(pattern).factor(pattern.data)
             self.is_definite = factors.inertia[0] == matrix.shape[0]
+            self._solve = factors.solve_many
         else:
-            factors = rslab.lu(pattern, threads=thread_count())
-        self._solve = factors.solve_many
+            self._solve = rslab.lu(pattern, threads=thread_count()).solve_many
 
     def _by_superlu(self, matrix: Any, symmetric: bool) -> Callable[[Floats], Floats]:
         from scipy.sparse.linalg import splu

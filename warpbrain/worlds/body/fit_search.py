@@ -181,8 +181,8 @@ class FitSearch:
                     self.columns = self._difference_columns()
             self.columns = self._rigid.renewed(self.columns, self.state.sensors, self.z)
             step, current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
-            self.converged = bool(np.abs(step).max() < _SHORT)
-            if self.converged:
+            if np.abs(step).max() < _SHORT:
+                self.converged = True
                 return
             if not self._line_search(step):
                 if not current and np.abs(step).max() >= 2.0 * _SHORT:
