@@ -20,11 +20,20 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import read_costs, table
-from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
-from warpbrain.report.mechanisms.index import index
-from warpbrain.report.mechanisms.page import page
-from warpbrain.report.mechanisms.pairs import pairs_page, pairs_table
+from warpbrain.report.mechanisms.pages import (
+    BASE,
+    Effect,
+    digest_of,
+    index,
+    made_from,
+    page,
+    pairs_page,
+    pairs_table,
+    read_costs,
+    read_effects,
+    table,
+    write_effects,
+)
 from warpbrain.report.mechanisms.picture import INKS, write_picture
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumSolver

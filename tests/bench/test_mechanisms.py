@@ -8,7 +8,7 @@ import pytest
 from command import Ran
 
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import PLAIN, ratio, read_costs, table
+from warpbrain.report.mechanisms.pages import PLAIN, ratio, read_costs, table
 
 
 def bench(monkeypatch, capsys, *arguments: str) -> Ran:

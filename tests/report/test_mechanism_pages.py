@@ -11,11 +11,23 @@ import pytest
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.shipped import find_case
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import PLAIN, read_costs, reasons, row_of, table
-from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
-from warpbrain.report.mechanisms.index import index
-from warpbrain.report.mechanisms.page import page
-from warpbrain.report.mechanisms.pairs import pairs_page, pairs_table
+from warpbrain.report.mechanisms.pages import (
+    BASE,
+    PLAIN,
+    Effect,
+    digest_of,
+    index,
+    made_from,
+    page,
+    pairs_page,
+    pairs_table,
+    read_costs,
+    read_effects,
+    reasons,
+    row_of,
+    table,
+    write_effects,
+)
 from warpbrain.report.mechanisms.picture import write_picture
 
 DOCS = Path(__file__).parents[2] / "docs"

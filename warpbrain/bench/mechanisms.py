@@ -49,8 +49,7 @@ def _bench(options: argparse.Namespace) -> None:
     from warpbrain.bench.host import processor
     from warpbrain.bench.mechanism_cost import measure_cost
     from warpbrain.cases.shipped import find_case
-    from warpbrain.report.mechanisms.cost import PLAIN, ratio
-    from warpbrain.report.mechanisms.effect import BASE
+    from warpbrain.report.mechanisms.pages import BASE, PLAIN, ratio
     from warpbrain.report.summary import machine
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.progress import Progress

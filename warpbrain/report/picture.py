@@ -16,8 +16,7 @@ from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import PointsRecording, Recording
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.rendering.offscreen import RenderingError, render
-from warpbrain.report.rendering.scene import (
+from warpbrain.report.rendering import (
     AFTER,
     AXIAL,
     BEFORE,
@@ -28,7 +27,9 @@ from warpbrain.report.rendering.scene import (
     RECORDED,
     SAGITTAL,
     Camera,
+    RenderingError,
     Scene,
+    render,
 )
 
 #: Pixels of one picture.
@@ -39,13 +40,7 @@ _MOVED, _RECORDED = 0.11, 0.15
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """Points that were recorded and where the simulation has them, all (k, 3) [m].
-
-    Attributes
-    ----------
-    where, recorded, computed : (k, 3) array
-        Positions before, displacements.
-    """
+    """Points that were recorded, how far they moved, and how far the simulation has them move, all (k, 3) [m]."""
 
     where: Floats
     recorded: Floats
@@ -61,29 +56,17 @@ class Moved:
             if isinstance(recording, PointsRecording):
                 moved = one.residuals_before - one.residuals_after
                 found.append(np.column_stack([recording.points[one.rows], one.residuals_before, moved]))
-        where, recorded, computed = np.split(np.concatenate(found), 3, axis=1)
-        return cls(where, recorded, computed)
+        return cls(*np.split(np.concatenate(found), 3, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """Renderings of a scene, and what makes a figure of them.
-
-    Attributes
-    ----------
-    scene : Scene
-    images : dict of str to (height, width, 3) uint8 array
-    cameras : dict of str to Camera
-    whole : TetMesh
-    resected : (m,) bool array
-        Elements of it that were taken out.
-    names : dict of int to str
-        Of the tissues.
-    """
+    """Renderings (height, width, 3) uint8 of a scene, and what makes a figure of them."""
 
     scene: Scene
     images: dict[str, Any]
     cameras: dict[str, Camera]
+    #: The anatomy, elements (m,) of it that were taken out, and the names of its tissues.
     whole: TetMesh
     resected: Bools
     names: dict[int, str]
@@ -92,15 +75,8 @@ class Pictures:
 def pictures_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Pictures:
     """Render a deformed body.
 
-    Parameters
-    ----------
-    whole, mesh : TetMesh
-        The anatomy before anything was resected, and what is left of it.
-    u : (n, 3) array
-        Displacement of the nodes of `mesh` [m].
-    names : dict
-        Names of the tissues by label.
-    moved : Moved
+    `whole` is the anatomy before anything was resected, `mesh` what is left of it, of whose nodes u (n, 3) [m] is the
+    displacement; `names` are those of the tissues by label.
 
     Raises
     ------
@@ -172,9 +148,7 @@ def round_factor(wanted: float, length: float) -> float:
     """How many times as long as it is a length is drawn: 1, 2 or 5 and zeros, never less than 1, 1 of what is not."""
     if length < 1e-6 * wanted:
         return 1.0
-    factor = max(1.0, wanted / length)
-    decade = 10.0 ** math.floor(math.log10(factor))
-    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= factor * (1.0 + 1e-9))
+    return views.round_below(max(1.0, wanted / length) * (1.0 + 1e-9))
 
 
 def cameras_of(scene: Scene) -> dict[str, Camera]:
@@ -218,62 +192,35 @@ def draw(
     title: str,
     subtitles: Sequence[str],
 ) -> Pictures | str:
-    """Render a deformed body and write the picture of it; see `pictures_of` and `write_picture`.
+    """Render a deformed body, see `pictures_of`, and write the picture of it below a title and more lines.
 
-    Returns
-    -------
-    Pictures or str
-        Or why nothing can be rendered here: no picture is then left at `path`, which would be one of something else.
+    Returns why, if nothing can be rendered here: no picture is then left at `path`, which would be one of something
+    else.
     """
     try:
         pictures = pictures_of(whole, mesh, u, names, moved)
     except RenderingError as error:
         path.unlink(missing_ok=True)
         return str(error)
-    write_picture(path, pictures, title, subtitles)
-    return pictures
-
-
-def write_picture(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -> None:
-    """Write the pictures of a deformed body as one PNG file.
-
-    Parameters
-    ----------
-    path : Path
-    pictures : Pictures
-    title : str
-    subtitles : sequence of str
-        Lines below it.
-    """
     from matplotlib.cm import ScalarMappable
-    from matplotlib.figure import Figure
 
     scene, lines = pictures.scene, len(subtitles) + 1
     high = 9.8 + 0.24 * lines
-    figure = Figure(figsize=(13.8, high), facecolor="white")
+    figure, axes = views.panels(2, 3, (13.8, high))
     # room for the title, which has any number of lines
     figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.24 * lines / high))
-    axes = figure.subplots(2, 3).ravel()
     for panel, (name, image) in zip(axes, pictures.images.items(), strict=True):
         show(panel, image, annotations_of(pictures, name))
         panel.set_title(heading(pictures, name), fontsize=10)
     shades = ScalarMappable(cmap="viridis")
     shades.set_clim(0.0, scene.top)
-    bar = figure.colorbar(shades, ax=list(axes), location="bottom", shrink=0.7, aspect=45, pad=0.01)
+    bar = figure.colorbar(shades, ax=axes, location="bottom", shrink=0.7, aspect=45, pad=0.01)
     bar.set_label("displacement [mm]; red: where it was before")
-    views.legend(figure, _entries(pictures), loc="outside lower center", fontsize=9, ncols=6)
-    # the title is the user's free text, in which a dollar sign begins no formula
-    figure.suptitle("\n".join([title, *subtitles]), fontsize=12, parse_math=False, y=1.0 - 0.08 / high, va="top")
-    views.save(figure, path)
-
-
-def _entries(pictures: Pictures) -> list[tuple[Any, str]]:
-    from matplotlib.lines import Line2D
-
-    entries = views.tissue_entries(pictures.names, pictures.whole, pictures.resected)
-    return entries + [
-        (Line2D([], [], color=colour, linewidth=2.5), name) for name, colour in arrow_colours(pictures.scene).items()
-    ]
+    entries = views.tissue_entries(names, whole, pictures.resected)
+    entries += [(views.line(color=colour, linewidth=2.5), name) for name, colour in arrow_colours(scene).items()]
+    views.legend(figure, entries, loc="outside lower center", fontsize=9, ncols=6)
+    views.save(figure, path, "\n".join([title, *subtitles]), y=1.0 - 0.08 / high, va="top")
+    return pictures
 
 
 def arrow_colours(scene: Scene) -> dict[str, str]:
@@ -304,24 +251,16 @@ def _times(factor: float) -> str:
 
 @dataclass(frozen=True)
 class Annotations:
-    """Letters and lines on a picture, in mm from its middle to the right and up.
+    """Letters and lines on a picture, in mm from its middle to the right and up."""
 
-    Attributes
-    ----------
-    across, high : float
-        Half the width and half the height of the picture.
-    letters : tuple of tuple of float, float and str
-        Where, and which direction of the patient that is.
-    lines : tuple of tuple of four floats
-        From and to: of the directions, where they are not those of the picture.
-    bar : tuple of three floats and str
-        Left end and height of the scale bar, its length, and the words.
-    """
-
+    #: Half the width and half the height of the picture.
     across: float
     high: float
+    #: Where, and which direction of the patient that is.
     letters: tuple[tuple[float, float, str], ...]
+    #: From and to: of the directions, where they are not those of the picture.
     lines: tuple[tuple[float, float, float, float], ...]
+    #: Left end and height of the scale bar, its length, and the words.
     bar: tuple[float, float, float, str]
 
 

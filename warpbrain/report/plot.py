@@ -6,8 +6,6 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.ensemble.results import EnsembleResult
@@ -15,8 +13,8 @@ from warpbrain.errors import InputError
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.mesh import TetMesh
 from warpbrain.report.diagnosis.files import file_of_map
-from warpbrain.report.ensemble_files import file_of_fields
-from warpbrain.report.files import MILLIMETRES, file_of_result
+from warpbrain.report.ensemble import file_of_fields
+from warpbrain.report.files import body_file, file_of_result, sets_of
 from warpbrain.report.state_files import file_of_estimate
 from warpbrain.report.views import TISSUE_COLOURS
 from warpbrain.simulation.result import Result
@@ -153,38 +151,14 @@ def _file(what: Any) -> tuple[Any, str]:
 
 @_file.register
 def _(what: TetMesh) -> tuple[Any, str]:
-    import meshio
-
-    sets = {name: members.astype(np.uint8) for name, members in what.node_sets.items()}
-    cells = {name: [members.astype(np.uint8)] for name, members in what.element_sets.items()}
-    tetrahedra = [("tetra", what.tetrahedra)]
-    of_cells = {**cells, "tissue": [what.tissue]}
-    return meshio.Mesh(MILLIMETRES * what.points, tetrahedra, point_data=sets, cell_data=of_cells), "tissue"
+    return body_file(what, sets_of(what.node_sets), sets_of(what.element_sets)), "tissue"
 
 
-@_file.register
-def _(what: Case) -> tuple[Any, str]:
-    return _file(what.mesh)
-
-
-@_file.register
-def _(what: Result) -> tuple[Any, str]:
-    return file_of_result(what), "displacement"
-
-
-@_file.register
-def _(what: Run) -> tuple[Any, str]:
-    return _file(what.result)
-
-
-@_file.register
-def _(what: Posterior) -> tuple[Any, str]:
-    return file_of_estimate(what), "displacement"
-
-
-@_file.register
-def _(what: Diagnosis) -> tuple[Any, str]:
-    return file_of_map(what), "score"
+_file.register(Case, lambda what: _file(what.mesh))
+_file.register(Result, lambda what: (file_of_result(what), "displacement"))
+_file.register(Run, lambda what: _file(what.result))
+_file.register(Posterior, lambda what: (file_of_estimate(what), "displacement"))
+_file.register(Diagnosis, lambda what: (file_of_map(what), "score"))
 
 
 @_file.register
@@ -197,7 +171,7 @@ def _(what: EnsembleResult) -> tuple[Any, str]:
 def _figure(what: Any, field: str | None) -> Any:
     """The figure of what is drawn as curves; None of bodies."""
     if isinstance(what, SpecimenRun):
-        from warpbrain.report.specimen_picture import COLUMNS, tests_figure
+        from warpbrain.report.specimen import COLUMNS, tests_figure
 
         return tests_figure(what.tests, COLUMNS)
     if isinstance(what, Posterior) and field == "moduli":

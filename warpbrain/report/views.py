@@ -1,4 +1,4 @@
-"""What the pictures share: where an anatomy is cut, how a cut is held and framed, colours, legend and file.
+"""What the pictures share: colours, figures and their files, where an anatomy is cut, how a cut is held and framed.
 
 Drawn with matplotlib alone: a cut needs no renderer, so a picture comes out the same on a laptop, a server without a
 display and a machine without graphics libraries. Cuts are shown as a radiologist holds them: the patient's left is on
@@ -13,19 +13,20 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.atomic import whole_file
-from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.slices import Cut, cut, outline
+from warpbrain.report.slices import Cut, cut, level_line, outline
 
-Ints = NDArray[np.int32]
-
+#: Colours of Okabe and Ito, whom everybody can tell apart; and greys.
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
+BLACK, QUIET = "#000000", "#555555"
 #: Of tissue in pictures: that of its name. A name that the presets of labels do not give has one of the remaining ones,
 #: the same wherever it stands; labels without a name have them in the order of their numbers.
 COLOUR_OF = {
@@ -41,6 +42,32 @@ COLOUR_OF = {
 TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8", "#bfd5d3", "#dcc3cb")
 RESECTED = "#d9483b"
 TISSUE_EDGE = "#4d4640"
+
+
+def panels(
+    rows: int, columns: int, size: tuple[float, float], layout: str = "constrained", **options: Any
+) -> tuple[Any, list[Any]]:
+    """A figure of that size [inch] and its panels, row by row."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout=layout, facecolor="white")
+    return figure, list(figure.subplots(rows, columns, squeeze=False, **options).ravel())
+
+
+def save(figure: Any, path: Path, title: str = "", fontsize: float = 12.0, dpi: float = 110.0, **options: Any) -> None:
+    """Write a figure as PNG, whole, below a title that may be a user's free text."""
+    if title:
+        # a dollar sign in it begins no formula
+        figure.suptitle(title, parse_math=False, fontsize=fontsize, **options)
+    with whole_file(path) as temporary, temporary.open("wb") as stream:
+        write_png(figure, stream, dpi)
+
+
+def write_png(figure: Any, stream: BinaryIO, dpi: float) -> None:
+    """Write a figure; a name in a script that the font lacks is no reason to print anything."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        figure.savefig(stream, format="png", dpi=dpi)
 
 
 @dataclass(frozen=True)
@@ -86,19 +113,16 @@ def in_view(coordinates: Floats) -> Floats:
     return np.array(coordinates) * (-MILLIMETRES, MILLIMETRES)
 
 
-def path_of(polygons: Sequence[Floats]) -> Any:
-    """Polygons of a cut as one path of a picture."""
-    from matplotlib.path import Path
-
-    return Path.make_compound_path(*(Path(in_view(p), closed=False) for p in polygons))
+def round_below(value: float) -> float:
+    """1, 2 or 5 and zeros, no more than a value."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    # a logarithm rounded up is why a half is among them
+    return max(step * decade for step in (0.5, 1.0, 2.0, 5.0) if step * decade <= value)
 
 
 def scale_length(mesh: TetMesh) -> float:
     """Length of the scale bar [mm]: 1, 2 or 5 and zeros, 20 for a brain."""
-    sixth = MILLIMETRES * float(np.ptp(mesh.points, axis=0).max()) / 6.0
-    decade = 10.0 ** math.floor(math.log10(sixth))
-    # a logarithm rounded up is why a half is among them
-    return max(step * decade for step in (0.5, 1.0, 2.0, 5.0) if step * decade <= sixth)
+    return round_below(MILLIMETRES * float(np.ptp(mesh.points, axis=0).max()) / 6.0)
 
 
 def heading(mesh: TetMesh, view: View, place: float) -> str:
@@ -140,18 +164,40 @@ def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float =
     axes.add_collection(PolyCollection(polygons, facecolors=shown, edgecolors=shown, linewidths=rim))
 
 
-def draw_values(axes: Any, mesh: TetMesh, values: Floats, view: View, place: float, top: float) -> Any:
-    """Draw a framed cut coloured by nodal values (n,), from 0 to `top`; returns what a colour bar is made of."""
+def draw_scalars(axes: Any, section: Cut, top: float, cmap: Any = "viridis", **options: Any) -> Any:
+    """Colour a cut by what it carries, from 0 to `top`; returns what a colour bar is made of."""
     from matplotlib.collections import PolyCollection
 
-    section = cut(mesh.points, mesh.tetrahedra, values, view.axis, place)
-    polygons = [in_view(p) for p in section.polygons]
-    drawn = PolyCollection(polygons, array=section.values, cmap="viridis", edgecolors="face", linewidths=0.4)
+    style = {"edgecolors": "face", "linewidths": 0.4, **options}
+    drawn = PolyCollection([in_view(p) for p in section.polygons], array=section.values, cmap=cmap, **style)
     drawn.set_clim(0.0, top)
-    axes.add_collection(drawn)
-    draw_outline(axes, boundary_faces(mesh.tetrahedra), mesh.points, view, place)
+    return axes.add_collection(drawn)
+
+
+def draw_values(axes: Any, mesh: TetMesh, values: Floats, view: View, place: float, top: float) -> Any:
+    """Draw a framed cut coloured by nodal values (n,), from 0 to `top`; returns what a colour bar is made of."""
+    drawn = draw_scalars(axes, cut(mesh.points, mesh.tetrahedra, values, view.axis, place), top)
+    draw_outline(axes, mesh.boundary, mesh.points, view, place)
     frame(axes, mesh, view)
     return drawn
+
+
+def draw_level(axes: Any, section: Cut, level: float, colour: str, zorder: float = 2.0) -> None:
+    """A line where the values that a cut carries are at a level."""
+    from matplotlib.collections import LineCollection
+
+    segments = in_view(level_line(section, level))
+    axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=2.2, zorder=zorder))
+
+
+def draw_part(axes: Any, section: Cut, part: Bools, **style: Any) -> None:
+    """Fill some polygons (k,) of a cut as one shape, so that a hatching goes on from one to the next."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Shape
+
+    if part.any():
+        chosen = [Shape(in_view(p), closed=False) for p, here in zip(section.polygons, part, strict=True) if here]
+        axes.add_artist(PathPatch(Shape.make_compound_path(*chosen), **style))
 
 
 def draw_outline(
@@ -196,19 +242,35 @@ def bare(axes: Any) -> None:
 
 def tissue_entries(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> list[tuple[Any, str]]:
     """Legend entries of the tissues that something is left of, and of what was resected."""
+    return [
+        (patch(facecolor=colour) if colour == RESECTED else patch(facecolor=colour, edgecolor=TISSUE_EDGE), name)
+        for name, colour in tissue_legend(names, mesh, resected)
+    ]
+
+
+def tissue_legend(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> list[tuple[str, str]]:
+    """Names and colours of the tissues that something is left of, and of what was resected."""
+    left = set(np.unique(mesh.tissue[~resected]).tolist())
+    colours = sorted(tissue_colours(names, mesh).items())
+    entries = [(names.get(label, str(label)), colour) for label, colour in colours if label in left]
+    return entries + ([("resected", RESECTED)] if resected.any() else [])
+
+
+def line(**style: Any) -> Any:
+    """A line or a mark of a legend; nothing to be seen without a style."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **style)
+
+
+def patch(**style: Any) -> Any:
+    """A patch of a legend."""
     from matplotlib.patches import Patch
 
-    entries, left = [], set(np.unique(mesh.tissue[~resected]).tolist())
-    for label, colour in sorted(tissue_colours(names, mesh).items()):
-        if label not in left:
-            continue
-        entries.append((Patch(facecolor=colour, edgecolor=TISSUE_EDGE), names.get(label, str(label))))
-    if resected.any():
-        entries.append((Patch(facecolor=RESECTED), "resected"))
-    return entries
+    return Patch(**style)
 
 
-def legend(figure: Any, entries: list[tuple[Any, str]], **options: Any) -> list[Any]:
+def legend(figure: Any, entries: Sequence[tuple[Any, str]], **options: Any) -> list[Any]:
     """A legend of the whole figure; the texts, in the order of the entries."""
     # labels are set afterwards: names are the user's free text, in which a dollar sign begins no formula and a leading
     # underscore hides nothing
@@ -217,11 +279,3 @@ def legend(figure: Any, entries: list[tuple[Any, str]], **options: Any) -> list[
         text.set_parse_math(False)
         text.set_text(label)
     return list(made.get_texts())
-
-
-def save(figure: Any, path: Path) -> None:
-    """Write a figure as PNG, whole."""
-    with whole_file(path) as temporary, warnings.catch_warnings():
-        # a title in a script that the font lacks is no reason to print anything
-        warnings.filterwarnings("ignore", message="Glyph .* missing")
-        figure.savefig(temporary, dpi=110, format="png")

@@ -15,8 +15,7 @@ from warpbrain.inference.decide import Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
 from warpbrain.physics.words import Smallest, Value
-from warpbrain.report.files import plain
-from warpbrain.report.fingerprints import fingerprints
+from warpbrain.report.files import fingerprints, plain
 from warpbrain.report.summary import machine
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen import result as of_specimen

@@ -1,4 +1,4 @@
-"""Pictures of a body in a diagnosis: where the mismatch is, what the data see, what is left at recorded points."""
+"""Figures of a diagnosis and its view: the body with what the map says, agreement, what imitates what, curves."""
 
 from __future__ import annotations
 
@@ -8,20 +8,37 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Floats
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.physics.words import length, number
+from warpbrain.report import views
 from warpbrain.report.diagnosis.description import STATES
-from warpbrain.report.diagnosis.figures import COLOURS
 from warpbrain.report.diagnosis.files import Recorded, file_of_map
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.generative.page import BLACK, GREEN
-from warpbrain.report.page.figures import TEXT, inlined, panels, shades
+from warpbrain.report.page.figures import NARROW, TEXT, WIDTH, inlined, panels, shades
 from warpbrain.report.page.scene import Arrows, Field, View
-from warpbrain.report.slices import Cut, cut, level_line
-from warpbrain.report.views import VIEWS, bare, draw_outline, in_view, scale_length
-from warpbrain.report.views import View as Slice
+from warpbrain.report.slices import Cut, cut
+from warpbrain.report.views import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    VERMILLION,
+    VIEWS,
+    bare,
+    in_view,
+    round_below,
+    scale_length,
+)
+from warpbrain.worlds.specimen.protocol import Test
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
+#: Colours, markers and lines of the states of a case; in grey print the first is the darkest.
+COLOURS = {"declared": VERMILLION, "refitted": ORANGE, "explained": BLUE}
+_MARKERS = {"declared": "x", "refitted": "+", "explained": "o"}
+_STYLES = {"declared": ":", "refitted": "--", "explained": "-"}
+#: A part below the first is not written; above the second letters are white.
+_SHOWN, _DARK = 0.01, 0.55
 #: Ground of the tissue, of what is significant, and lines of the hatching; length of the arrow of a large residual, as
 #: a part of the size of the body; how arrows look.
 _TISSUE, _TINT, _HATCHING, _LONG = "#f1eeea", "#cfe6dc", "#9a938b", 0.16
@@ -30,14 +47,7 @@ _ARROW = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.009, "he
 
 
 class Anatomy:
-    """The body of a diagnosis with what its map says.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    summary : dict
-        Its `diagnosis.json`.
-    """
+    """The body of a diagnosis with what its map says; `summary` is its `diagnosis.json`."""
 
     def __init__(self, diagnosis: Diagnosis, summary: dict[str, Any]) -> None:
         self.mesh, self.summary = diagnosis.base.at.system.model.mesh, summary
@@ -60,30 +70,25 @@ class Anatomy:
         off = np.array([0.12, 0.003, 0.003]) * np.ptp(points, axis=0)
         return 0.5 * (points.min(axis=0) + points.max(axis=0)) + off
 
-    def plane(self, view: Slice) -> str:
+    def plane(self, view: views.View) -> str:
         """A cut in words."""
         return f"{view.name}, {'xyz'[view.axis]} = {MILLIMETRES * self.centre[view.axis]:z.0f} mm"
 
-    def draw(self, axes: Any, view: Slice) -> Cut:
+    def draw(self, axes: Any, view: views.View) -> Cut:
         """Draw a cut: tissue, hatched where the data are blind, a line around what is significant."""
-        from matplotlib.collections import LineCollection
-
         mesh, place = self.mesh, float(self.centre[view.axis])
         section = cut(mesh.points, mesh.tetrahedra, self.fields["score"], view.axis, place)
         everywhere = np.ones(len(section.polygons), dtype=bool)
         blind = self.fields["blind"][mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
-        for part, style in (
-            (everywhere, {"facecolor": _TISSUE, "edgecolor": _TISSUE, "linewidth": 0.3}),
-            (section.values > self.threshold, {"facecolor": _TINT, "edgecolor": _TINT, "linewidth": 0.3}),
-            (blind, {"facecolor": "none", "edgecolor": _HATCHING, "hatch": "//////", "linewidth": 0.0, "zorder": 2.0}),
-        ):
-            _fill(axes, section, part, style)
-        segments = in_view(level_line(section, self.threshold))
-        axes.add_collection(LineCollection(list(segments), colors=GREEN, linewidths=2.2))
-        draw_outline(axes, mesh.boundary, mesh.points, view, place)
+        for part, colour in ((everywhere, _TISSUE), (section.values > self.threshold, _TINT)):
+            views.draw_part(axes, section, part, facecolor=colour, edgecolor=colour, linewidth=0.3)
+        hatched = {"facecolor": "none", "edgecolor": _HATCHING, "hatch": "//////", "linewidth": 0.0, "zorder": 2.0}
+        views.draw_part(axes, section, blind, **hatched)
+        views.draw_level(axes, section, self.threshold, GREEN)
+        views.draw_outline(axes, mesh.boundary, mesh.points, view, place)
         return section
 
-    def frame(self, axes: Any, view: Slice) -> None:
+    def frame(self, axes: Any, view: views.View) -> None:
         """Limits around the body, letters of the directions at the edges and a scale bar below."""
         points, bar = self.mesh.points, scale_length(self.mesh)
         corners = in_view(np.array([points.min(axis=0)[view.plane], points.max(axis=0)[view.plane]]))
@@ -100,18 +105,8 @@ class Anatomy:
         axes.text(low[0] + 1.1 * bar, low[1] + 0.15 * bar, f"{bar:g} mm", fontsize=8, va="center", color="#333333")
 
 
-def _fill(axes: Any, section: Cut, part: Bools, style: dict[str, Any]) -> None:
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-
-    if part.any():
-        chosen = [Path(in_view(p), closed=False) for p, here in zip(section.polygons, part, strict=True) if here]
-        axes.add_artist(PathPatch(Path.make_compound_path(*chosen), **style))
-
-
 def map_figure(anatomy: Anatomy) -> str:
     """Scores as colours, with the threshold of significance as a line and the located ball as a dashed circle."""
-    from matplotlib.collections import PolyCollection
     from matplotlib.patches import Circle
 
     threshold, where = anatomy.threshold, anatomy.summary["map"]
@@ -123,12 +118,8 @@ def map_figure(anatomy: Anatomy) -> str:
         tint: Any = None
         for panel, view in zip(axes, VIEWS, strict=True):
             section = anatomy.draw(panel, view)
-            tint = PolyCollection(
-                [in_view(p) for p in section.polygons], array=section.values, cmap=shades(), linewidths=0.2,
-                edgecolors="face", zorder=1.0,
-            )  # fmt: skip
-            tint.set_clim(0.0, max(float(anatomy.fields["score"].max()), threshold))
-            panel.add_collection(tint)
+            top = max(float(anatomy.fields["score"].max()), threshold)
+            tint = views.draw_scalars(panel, section, top, shades(), linewidths=0.2, zorder=1.0)
             if anatomy.ball is not None:
                 at, radius = in_view(anatomy.centre[view.plane]), MILLIMETRES * anatomy.ball[1]
                 style = {"facecolor": "none", "edgecolor": BLACK, "linestyle": "--", "linewidth": 1.3}
@@ -161,7 +152,7 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
     large = float(np.quantile(np.linalg.norm(first, axis=1), 0.95)) or 1e-3
     enlarged = _LONG * float(np.ptp(points, axis=0).max()) / large
     across, high = np.ptp(points[:, view.plane], axis=0)
-    errors = {state: length(anatomy.summary["fit"]["rmse_m"][state]) for state in shown}
+    errors = _errors(anatomy.summary, shown)
 
     def draw(narrow: bool) -> Any:
         figure, axes = panels(narrow, 0.9 + 2.8 * float(high / across), len(shown), width=3.0 * len(shown))
@@ -174,7 +165,12 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
             panel.plot(*start[vectors.aside].T, "x", color=BLACK, markersize=6.0, zorder=6)
             panel.set_title(f"{STATES[state]}\nRMSE {errors[state]}", fontsize=TEXT + 1)
             anatomy.frame(panel, view)
-        _key(axes[-1], _round(MILLIMETRES * large), enlarged, scale_length(anatomy.mesh))
+        # an arrow of a round length at the lower right
+        panel, key, bar = axes[-1], round_below(MILLIMETRES * large), scale_length(anatomy.mesh)
+        right, low = panel.get_xlim()[1] - 0.1 * bar, panel.get_ylim()[0] + 0.15 * bar
+        left = right - key * enlarged
+        panel.quiver([left], [low], [right - left], [0.0], color=BLACK, **_ARROW)
+        panel.text(left - 0.1 * bar, low, f"{key:g} mm left", fontsize=8, ha="right", va="center", color="#333333")
         return figure
 
     times = np.unique(recorded["time_s"][recorded.lengths])
@@ -186,22 +182,15 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
         f"cut ({anatomy.plane(view)}){when}.{hidden} Green: where a force is significant. Hatched: the data cannot see "
         "a force there."
     )
-    listed = ", ".join(f"{STATES[state]} {error}" for state, error in errors.items())
-    return inlined(draw, f"Arrows of what is left at recorded points; RMSE {listed}.", caption)
+    return inlined(draw, f"Arrows of what is left at recorded points; RMSE {_listed(errors)}.", caption)
 
 
-def _key(axes: Any, key: float, enlarged: float, bar: float) -> None:
-    """An arrow of a round length [mm] at the lower right."""
-    right, low = axes.get_xlim()[1] - 0.1 * bar, axes.get_ylim()[0] + 0.15 * bar
-    left = right - key * enlarged
-    axes.quiver([left], [low], [right - left], [0.0], color=BLACK, **_ARROW)
-    axes.text(left - 0.1 * bar, low, f"{key:g} mm left", fontsize=8, ha="right", va="center", color="#333333")
+def _errors(summary: dict[str, Any], states: list[str]) -> dict[str, str]:
+    return {state: length(summary["fit"]["rmse_m"][state]) for state in states}
 
 
-def _round(value: float) -> float:
-    """1, 2 or 5 and zeros, no more than a value."""
-    decade = 10.0 ** math.floor(math.log10(value))
-    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= value)
+def _listed(errors: dict[str, str]) -> str:
+    return ", ".join(f"{STATES[state]} {error}" for state, error in errors.items())
 
 
 def view_of(anatomy: Anatomy, recorded: Recorded | None) -> View:
@@ -231,3 +220,103 @@ def view_of(anatomy: Anatomy, recorded: Recorded | None) -> View:
               "the case with its tissue refitted, nothing else added"),
     ]  # fmt: skip
     return View(anatomy.mesh, fields, points, arrows, anatomy.ball)
+
+
+def agreement_figure(summary: dict[str, Any], recorded: Recorded) -> str:
+    """Observed beside computed, one panel a state, on common scales: every component of a displacement."""
+    from matplotlib.ticker import MaxNLocator
+
+    shown, observed = recorded.states, recorded["observed"][recorded.counted]
+    computed = {state: recorded[state][recorded.counted] for state in shown}
+    ends = np.concatenate([observed, *computed.values()])
+    margin = 0.05 * float(np.ptp(ends)) or 1.0
+    limits = (float(ends.min()) - margin, float(ends.max()) + margin)
+    errors = _errors(summary, shown)
+
+    def draw(narrow: bool) -> Any:
+        figure, axes = panels(narrow, 3.6, len(shown), sharex=True, sharey=True, width=2.75 * len(shown))
+        for panel, state in zip(axes, shown, strict=True):
+            panel.plot(
+                computed[state], observed, _MARKERS[state], markersize=4.0, color=COLOURS[state], fillstyle="none",
+                markeredgewidth=0.8,
+            )  # fmt: skip
+            panel.plot(limits, limits, color=BLACK, linewidth=0.8)
+            panel.set(xlim=limits, ylim=limits, aspect="equal")
+            for axis in (panel.xaxis, panel.yaxis):
+                axis.set_major_locator(MaxNLocator(5))
+            panel.set_title(f"{STATES[state]}\nRMSE {errors[state]}", fontsize=TEXT)
+            panel.set_xlabel("computed [mm]", fontsize=TEXT)
+        for panel in axes if narrow else axes[:1]:
+            panel.set_ylabel("observed [mm]", fontsize=TEXT)
+        return figure
+
+    caption = (
+        "Every component of displacement that was recorded, beside what was computed of it; on the line they agree. "
+        "The refitted ones have registration and the error of the mesh taken off."
+    )
+    return inlined(draw, f"Observed beside computed displacements; RMSE {_listed(errors)}.", caption)
+
+
+def confusion_figure(rows: dict[str, dict[str, float]]) -> str:
+    """Rows: what acts; columns: what imitates it; in the cells percent of what is visible."""
+    columns = list(dict.fromkeys(name for row in rows.values() for name in row))
+    shares = np.array([[row.get(name, np.nan) for name in columns] for row in rows.values()], dtype=float)
+
+    def draw(narrow: bool) -> Any:
+        figure, (axes,) = panels(narrow, 1.6 + 0.27 * len(rows))
+        size = TEXT - 2.5 if narrow else TEXT
+        axes.imshow(np.ma.masked_invalid(shares), cmap=shades(), vmin=0.0, vmax=1.0, aspect="auto")
+        for row, column in np.argwhere(shares >= _SHOWN).tolist():
+            colour = "white" if shares[row, column] > _DARK else BLACK
+            text = f"{100.0 * shares[row, column]:.0f}"
+            axes.text(column, row, text, ha="center", va="center", fontsize=size - 1, color=colour)
+        axes.set_xticks(range(len(columns)), columns, rotation=55, ha="right", rotation_mode="anchor", fontsize=size)
+        axes.set_yticks(range(len(rows)), list(rows), fontsize=size)
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+        axes.set_xlabel("what imitates it", fontsize=TEXT)
+        axes.set_ylabel("what acts", fontsize=TEXT)
+        return figure
+
+    caption = (
+        "Percent of the visible effect of each mechanism, at its middling place, that the best place of another cause "
+        "imitates: near 100 these data cannot tell the two apart, however large the effect is."
+    )
+    pairs = [(part, kind, other) for kind, row in rows.items() for other, part in row.items()]
+    most = ", ".join(f"{kind} by {other} {100.0 * part:.0f} %" for part, kind, other in sorted(pairs, reverse=True)[:4])
+    return inlined(draw, f"How much of each mechanism others imitate; most: {most}.", caption)
+
+
+def curves_figure(diagnosis: SpecimenDiagnosis) -> str:
+    """Stress of tests, recorded and computed: one panel a test, over strain, or over time where the strain is held."""
+    tests = diagnosis.protocol.tests
+
+    def draw(narrow: bool) -> Any:
+        columns = 1 if narrow else min(3, len(tests))
+        lines = math.ceil(len(tests) / columns)
+        figure, grid = views.panels(lines, columns, (NARROW if narrow else WIDTH, 0.5 + 2.3 * lines))
+        for panel, test, rows in zip(grid, tests, diagnosis.protocol.rows, strict=False):
+            known = (state for state in STATES if state in diagnosis.stresses)
+            _curve(panel, test, {state: diagnosis.stresses[state][rows] for state in known})
+        for empty in grid[len(tests) :]:
+            empty.set_visible(False)
+        grid[0].legend(fontsize=TEXT - 2, frameon=False)
+        return figure
+
+    caption = (
+        "Nominal stress of each test: dots were recorded, lines were computed. Tests marked check were not fitted."
+    )
+    return inlined(draw, f"Recorded and computed stress of {len(tests)} tests.", caption)
+
+
+def _curve(panel: Any, test: Test, computed: dict[str, Any]) -> None:
+    turns = np.any(np.diff(test.strain) * (test.strain[-1] - test.strain[0]) <= 0.0)
+    x, label = (test.time, "time [s]") if turns and test.time is not None else (test.strain, "stretch or shear")
+    panel.plot(x, test.stress, ".", color=BLACK, markersize=3.0, label="recorded")
+    for state, values in computed.items():
+        panel.plot(x, values, _STYLES[state], color=COLOURS[state], linewidth=1.5, label=STATES[state])
+    panel.set_title(f"{test.name} ({test.mode}{'' if test.fitted else ', check'})", fontsize=TEXT)
+    panel.set_xlabel(label, fontsize=TEXT - 1)
+    panel.set_ylabel("stress [Pa]", fontsize=TEXT - 1)
+    panel.tick_params(labelsize=TEXT - 2)
+    panel.spines[["top", "right"]].set_visible(False)
