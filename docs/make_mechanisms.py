@@ -12,16 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.colors import to_rgb
-from numpy.typing import NDArray
-from PIL import Image
-
-from warpbrain.cases.assuming import assume
-from warpbrain.cases.case import Case
-from warpbrain.cases.shipped import find_case
-from warpbrain.mesh import TetMesh
-from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.pages import (
-    BASE,
+from mechanism_pages import (
     Effect,
     digest_of,
     index,
@@ -34,7 +25,16 @@ from warpbrain.report.mechanisms.pages import (
     table,
     write_effects,
 )
-from warpbrain.report.mechanisms.picture import INKS, write_picture
+from mechanism_picture import INKS, write_picture
+from numpy.typing import NDArray
+from PIL import Image
+
+from warpbrain.bench.mechanisms import BASE
+from warpbrain.cases.assuming import assume
+from warpbrain.cases.case import Case
+from warpbrain.cases.shipped import find_case
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of

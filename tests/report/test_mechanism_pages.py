@@ -7,13 +7,7 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
-
-from warpbrain.cases.assuming import assume
-from warpbrain.cases.shipped import find_case
-from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.pages import (
-    BASE,
-    PLAIN,
+from mechanism_pages import (
     Effect,
     digest_of,
     index,
@@ -28,7 +22,12 @@ from warpbrain.report.mechanisms.pages import (
     table,
     write_effects,
 )
-from warpbrain.report.mechanisms.picture import write_picture
+from mechanism_picture import write_picture
+
+from warpbrain.bench.mechanisms import BASE, PLAIN
+from warpbrain.cases.assuming import assume
+from warpbrain.cases.shipped import find_case
+from warpbrain.physics.mechanisms import mechanisms
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES, FIGURES = DOCS / "mechanisms", DOCS / "figures"

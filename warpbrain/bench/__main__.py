@@ -3,55 +3,45 @@
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
 import sys
-from pathlib import Path
+from importlib import import_module
 from typing import Any
 
-from warpbrain.bench import diagnosing, ensemble, mechanisms, threads
+from warpbrain.bench import command
 from warpbrain.errors import InputError
-from warpbrain.terminal.command import OneLineParser, exit_status
+
+#: Modules of the commands that have a name.
+_COMMANDS = {"ensemble": "batches", "diagnose": "diagnosing", "mechanisms": "mechanisms", "threads": "threads"}
+_DESCRIPTION = (
+    "Times each phase of a step on the phantom's meshes beside the paper's Table 3. "
+    "python -m warpbrain.bench ensemble times batches, mechanisms what each costs, diagnose a diagnosis, threads a "
+    "step and an equilibrium by how many cores of the CPU they have."
+)
+_OPTIONS: dict[str, command.Options] = {
+    "--device": {"metavar": "NAME", "help": "cpu, cuda:0, ... or all (default: the GPU if there is one)"},
+    "--rows": {"metavar": "ROW,...", "help": "st/coarse, st/fine, mt/coarse, mt/fine (default: all)"},
+    "--steps": {"type": int, "default": 100, "help": "samples (default: 100)"},
+    "--warmup": {"type": int, "default": 10, "help": "steps before them (default: 10)"},
+    "--tol": {"type": float, "default": 1e-6, "help": "relative tolerance of the linear solves (default: 1e-6)"},
+    "--precision": command.PRECISION,
+    "--json": command.JSON,
+}
 
 
 def main() -> int:
     """Parse, measure, print; returns the exit status."""
-    if sys.argv[1:2] == ["ensemble"]:
-        return ensemble.main(sys.argv[2:])
-    if sys.argv[1:2] == ["diagnose"]:
-        return diagnosing.main(sys.argv[2:])
-    if sys.argv[1:2] == ["mechanisms"]:
-        return mechanisms.main(sys.argv[2:])
-    if sys.argv[1:2] == ["threads"]:
-        return threads.main(sys.argv[2:])
-    parser = OneLineParser(
-        prog="python -m warpbrain.bench",
-        description="Times each phase of a step on the phantom's meshes beside the paper's Table 3. "
-        "python -m warpbrain.bench ensemble times batches, mechanisms what each costs, diagnose a diagnosis, threads a "
-        "step and an equilibrium by how many cores of the CPU they have.",
-    )
-    add = parser.add_argument
-    add("--device", default=None, metavar="NAME", help="cpu, cuda:0, ... or all (default: the GPU if there is one)")
-    add("--rows", default=None, metavar="ROW,...", help="st/coarse, st/fine, mt/coarse, mt/fine (default: all)")
-    add("--steps", type=int, default=100, help="samples (default: 100)")
-    add("--warmup", type=int, default=10, help="steps before them (default: 10)")
-    add("--tol", type=float, default=1e-6, help="relative tolerance of the linear solves (default: 1e-6)")
-    add("--precision", choices=("double", "single"), default="double", help="default: double")
-    add("--json", type=Path, metavar="FILE", help="write every sample")
-    options = parser.parse_args()
-
-    return exit_status(parser.prog, lambda: _bench(options))
+    if sys.argv[1:2] and sys.argv[1] in _COMMANDS:
+        # what only one of them needs is loaded for it alone
+        return int(import_module(f"warpbrain.bench.{_COMMANDS[sys.argv[1]]}").main(sys.argv[2:]))
+    return command.run("", _DESCRIPTION, _OPTIONS, _bench, sys.argv[1:])
 
 
 def _bench(options: argparse.Namespace) -> None:
-    for name in ("steps", "warmup"):
-        if getattr(options, name) < 1:
-            raise InputError(f"--{name} {getattr(options, name)}: expected a whole number of at least 1")
     if not 0.0 < options.tol < 1.0:
         raise InputError(f"--tol {options.tol:g}: expected a number between 0 and 1")
 
-    from warpbrain.atomic import check_writable, whole_file
-    from warpbrain.bench.host import host
+    from warpbrain.atomic import check_writable
     from warpbrain.bench.measure import BODIES, RESTART, measure_row
     from warpbrain.bench.table3 import TABLE3
     from warpbrain.report.summary import machine
@@ -62,13 +52,10 @@ def _bench(options: argparse.Namespace) -> None:
 
     if options.json is not None:
         check_writable(options.json)
-    names = list(TABLE3) if options.rows is None else options.rows.split(",")
-    for name in names:
-        if name not in TABLE3:
-            raise InputError(f"--rows {name}: expected some of {', '.join(TABLE3)}")
+    names = command.chosen("--rows", options.rows, list(TABLE3))
     wp = start_warp_quietly()
     devices = [d.alias for d in wp.get_devices()] if options.device == "all" else [find_device(options.device).alias]
-    versions, where = machine(), host()
+    versions, where = machine(), command.host()
     results = []
     for alias in devices:
         device = wp.get_device(alias)
@@ -89,10 +76,7 @@ def _bench(options: argparse.Namespace) -> None:
             print(*_lines(measured), sep="\n")
         print("", *_table(results[-len(names) :]), sep="\n")
     if options.json is not None:
-        with whole_file(options.json) as scratch:
-            written = {"versions": versions, "host": where, "rows": [_json(r) for r in results]}
-            scratch.write_text(json.dumps(written, indent=1) + "\n")
-        print(f"written to {options.json}")
+        command.write(options.json, {"versions": versions, "host": where, "rows": [_json(r) for r in results]})
 
 
 def _lines(measured: Any) -> list[str]:
@@ -159,17 +143,10 @@ def _table(results: list[Any]) -> list[str]:
 
 
 def _json(measured: Any) -> dict[str, Any]:
+    plain = ("device", "precision", "tolerance", "nodes", "tetrahedra", "blocks", "cg_iterations", "bytes_per_step")
     return {
         "row": measured.row.name,
-        "device": measured.device,
-        "precision": measured.precision,
-        "tolerance": measured.tolerance,
-        "nodes": measured.nodes,
-        "tetrahedra": measured.tetrahedra,
-        "blocks": measured.blocks,
-        "cg_iterations": measured.cg_iterations,
-        "bytes_per_step": measured.bytes_per_step,
-        "launches_per_step": measured.launches_per_step,
+        **{name: getattr(measured, name) for name in (*plain, "launches_per_step")},
         "milliseconds": {
             "pre-processing": measured.preprocessing,
             "capture": measured.capture,

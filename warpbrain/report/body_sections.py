@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from warpbrain.arrays import Floats, Ints
+from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
@@ -139,7 +139,14 @@ def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float
         for panel, view, place in zip(axes, views.VIEWS, places, strict=True):
             drawn = views.draw_values(panel, state.mesh, values, view, place, float(values.max()))
             if state.trust is not None:
-                _draw_trust(panel, state.mesh, state.trust, view, place)
+                # hatched: what recordings do not see; dots, and a line around them: where they and the case disagree
+                left = (state.trust == LEFT).astype(np.float64)
+                section = cut(state.mesh.points, state.mesh.tetrahedra, left, view.axis, place)
+                for value, hatch, colour in ((UNSEEN, "//////", "white"), (LEFT, "....", VERMILLION)):
+                    inside = (state.trust == value)[state.mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
+                    style = {"facecolor": "none", "edgecolor": colour, "hatch": hatch, "linewidth": 0.0, "zorder": 2.0}
+                    views.draw_part(panel, section, inside, **style)
+                views.draw_level(panel, section, 0.5, VERMILLION, zorder=2.5)
             panel.set_title(views.heading(whole, view, place), fontsize=TEXT)
         bar = figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.9 if narrow else 0.5, aspect=40, pad=0.02)
         bar.set_label("standard deviation of the displacement [mm]", fontsize=TEXT - 1)
@@ -147,16 +154,6 @@ def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float
         return figure
 
     return inlined(draw, "Three cuts with the deviation.", words)
-
-
-def _draw_trust(axes: Any, mesh: TetMesh, trust: Ints, view: views.View, place: float) -> None:
-    """Hatch what recordings do not see; dots, and a line around them, where they and the case disagree."""
-    section = cut(mesh.points, mesh.tetrahedra, (trust == LEFT).astype(np.float64), view.axis, place)
-    of_elements = mesh.tetrahedra[section.elements]
-    for value, hatch, colour in ((UNSEEN, "//////", "white"), (LEFT, "....", VERMILLION)):
-        style = {"facecolor": "none", "edgecolor": colour, "hatch": hatch, "linewidth": 0.0, "zorder": 2.0}
-        views.draw_part(axes, section, (trust == value)[of_elements].mean(axis=1) > 0.5, **style)
-    views.draw_level(axes, section, 0.5, VERMILLION, zorder=2.5)
 
 
 def window(state: SavedState, exaggeration: float | None, off_screen: bool = False) -> Any:
@@ -169,7 +166,7 @@ def window(state: SavedState, exaggeration: float | None, off_screen: bool = Fal
 
 def write_view_page(path: Path, state: SavedState, exaggeration: float | None) -> None:
     """Write a body as one HTML file; `exaggeration` is chosen if it is None."""
-    places = views.places(state.mesh, views.resected_elements(state.mesh))
+    places = views.places(state.mesh)
     body = body_view(state.mesh, state.u, fields_of(state), _NO_POINTS, places, exaggeration)
     largest = MILLIMETRES * float(np.linalg.norm(state.u, axis=1).max())
     facts = [("largest displacement", f"{largest:.3g} mm"), ("nodes", f"{len(state.mesh.points)}")]

@@ -48,6 +48,7 @@ _SPECIMEN_VIEWS = (
 )
 _SPECIMEN_ENDS = ("+x", "+y", "+z", "-x", "-y", "-z")
 _SIZE = (960, 840)  # pixels of the body from outside
+_RIM = {"markeredgecolor": "#333333", "markeredgewidth": 0.4}
 _SEAM = 0.8  # width of the rims of polygons of one colour, below which their seams show
 _CHARACTERS = 105  # of a line above the panels
 _LABEL = 30  # characters of a name in the legend
@@ -180,10 +181,11 @@ def _headline(case: Case) -> str:
 
 def _draw_cut(axes: Any, scene: _Scene, view: View, place: float, section: Cut) -> None:
     views.draw_tissue(axes, section, scene.colours, _SEAM)
-    views.draw_outline(axes, scene.mesh.boundary, scene.mesh.points, view, place)
+    views.draw_outline(axes, scene.mesh, view, place)
     near = np.abs(scene.mesh.points[:, view.axis] - place) <= scene.near
     for number, (_, members) in enumerate(scene.node_sets):
-        _dots(axes, views.in_view(scene.mesh.points[members & near][:, view.plane]), number)
+        at, (colour, shape) = views.in_view(scene.mesh.points[members & near][:, view.plane]), _SET_STYLES[number]
+        axes.plot(*at.T, shape, markersize=_dot_size(number), color=colour, **_RIM)
     for number, surface in enumerate(scene.surfaces):
         close = np.abs(surface.points[:, view.axis] - place) <= scene.near_recorded
         _crosses(axes, views.in_view(surface.points[close][:, view.plane]), number)
@@ -198,13 +200,8 @@ def _draw_cut(axes: Any, scene: _Scene, view: View, place: float, section: Cut) 
     axes.set_title(views.heading(scene.mesh, view, place) + counted, fontsize=11)
 
 
-def _dots(axes: Any, at: Floats, number: int) -> None:
-    """Members of a node set; smaller the later, so that a node of two sets shows both."""
-    colour, shape = _SET_STYLES[number]
-    axes.plot(*at.T, shape, markersize=_dot_size(number), color=colour, markeredgecolor="#333333", markeredgewidth=0.4)
-
-
 def _dot_size(number: int) -> float:
+    """Smaller the later, so that a node of two sets shows both."""
     return 6.2 - 0.4 * number
 
 
@@ -238,6 +235,8 @@ def _arrows(axes: Any, start: Floats, along: Floats, number: int) -> None:
 
 def _draw_open(axes: Any, scene: _Scene) -> str:
     """The body with a corner cut out and all that was recorded; why it is not rendered, or nothing."""
+    from scipy.spatial import KDTree
+
     arrows = f"; all {scene.arrows} arrows, seen through the tissue" if scene.arrows else ""
     axes.set_title(f"a corner cut out{arrows}", fontsize=11)
     try:
@@ -253,8 +252,11 @@ def _draw_open(axes: Any, scene: _Scene) -> str:
         """Where in the panel, in mm from its middle, positions (n, 3) [m] are."""
         return (MILLIMETRES * points - camera.centre) @ np.column_stack([camera.right, camera.up])
 
+    corners = scene.mesh.points[scene.mesh.boundary]
+    this_side = face_vectors(scene.mesh.points, scene.mesh.boundary) @ camera.towards > 0.0
     for number, surface in enumerate(scene.surfaces):
-        _crosses(axes, at(surface.points[_on_this_side(surface.points, scene, camera)]), number)
+        # what is on the far side of the body is hidden
+        _crosses(axes, at(surface.points[this_side[KDTree(corners.mean(axis=1)).query(surface.points)[1]]]), number)
     for number, tracked in enumerate(scene.tracked):
         start, end = at(tracked.points), at(tracked.points + scene.enlarged * tracked.displacement)
         _arrows(axes, start, end - start, number)
@@ -265,20 +267,12 @@ def _render(scene: _Scene) -> tuple[Any, Camera]:
     """The anatomy, and what is taken out of it in red, seen from where there is most to see; and from where that is."""
     whole = scene.mesh
     left = whole.without(scene.resected)[0] if scene.resected.any() else whole
-    where = np.concatenate([np.zeros((0, 3)), *(one.points for one in (*scene.tracked, *scene.surfaces))])
+    recorded: list[PointsRecording | SurfaceRecording] = [*scene.tracked, *scene.surfaces]
+    where = np.concatenate([np.zeros((0, 3)), *(one.points for one in recorded)])
     still = np.zeros_like(where)
     drawn = scene_of(whole, left, np.zeros_like(left.points), scene.names, Moved(where, still, still))
     camera = cameras_of(drawn)[BEFORE]
     return render(drawn, {BEFORE: camera}, _SIZE)[BEFORE], camera
-
-
-def _on_this_side(points: Floats, scene: _Scene, camera: Camera) -> Bools:
-    """Which points of a surface are not on the far side of the body."""
-    from scipy.spatial import KDTree
-
-    corners = scene.mesh.points[scene.mesh.boundary]
-    nearest = KDTree(corners.mean(axis=1)).query(points)[1]
-    return np.asarray((face_vectors(scene.mesh.points, scene.mesh.boundary) @ camera.towards)[nearest] > 0.0)
 
 
 # the legend --------------------------------------------------------------------------------------------------------

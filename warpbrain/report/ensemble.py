@@ -155,7 +155,7 @@ def write_spread_picture(path: Path, fields: Fields, title: str, subtitle: str) 
     mesh = fields.mesh
     figure, axes = views.panels(2, 3, (13.5, 9.4))
     deviation = np.linalg.norm(fields.components.sd, axis=1)
-    places = views.places(mesh, views.resected_elements(mesh))
+    places = views.places(mesh)
     for row, name, metres in ((0, "median", fields.size.percentiles[50]), (3, "standard deviation", deviation)):
         values, drawn = MILLIMETRES * metres, None
         top = max(float(np.percentile(values, 99.5)), 1e-6)

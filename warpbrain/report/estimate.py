@@ -16,7 +16,7 @@ from warpbrain.estimation.registration import registration_of
 from warpbrain.inference.probability import percent
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report.comparison import SHOWN
-from warpbrain.report.files import MILLIMETRES, fingerprints, write_csv
+from warpbrain.report.files import MILLIMETRES, fingerprints, picked, write_csv
 from warpbrain.report.summary import machine
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
@@ -24,6 +24,7 @@ from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 _UNEXPLAINED = 0.3
 #: Correlations that are smaller are not told, nor are causes that are less probable.
 _TIED, _LIKELY = 0.3, 0.05
+_METHODS = {"laplace": "Laplace's approximation", "chain": "a Markov chain"}
 
 
 def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissue | None = None) -> dict[str, Any]:
@@ -32,15 +33,10 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     said, check, chain, best = posterior.identifiability, posterior.importance, posterior.chain, posterior.best
     noise, laplace = best.point.noise, best.laplace
     return {
-        "case": {"name": case.name, "title": case.title, "origin": case.origin, "assumptions": list(case.assumptions)},
+        "case": picked(case, "name", "title", "origin", "assumptions"),
         "inputs_sha256": fingerprints(case),
         "identifiability": {
-            "nothing": said.nothing,
-            "sentences": list(said.sentences),
-            "informed": list(said.informed),
-            "weakly_informed": list(said.weakly_informed),
-            "hidden": list(said.hidden),
-            "scale_is_hidden": said.scale_is_hidden,
+            **picked(said, "nothing", "sentences", "informed", "weakly_informed", "hidden", "scale_is_hidden"),
             "directions": [
                 {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": told, "undone": undone}
                 for gain, told, undone in zip(
@@ -55,21 +51,16 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
         "method": posterior.method,
         "check_of_laplace": {
             "draws": len(check.theta),
-            "pareto_k": check.smoothed.k,
-            "effective_draws": check.smoothed.effective,
-            "unstable_laws": check.unstable,
-            "without_equilibrium": check.failed,
-            "mean": check.mean,
-            "standard_deviation": check.standard_deviations,
-            "doubts": list(posterior.doubts),
+            **picked(check.smoothed, pareto_k="k", effective_draws="effective"),
+            **picked(check, unstable_laws="unstable", without_equilibrium="failed", mean="mean"),
+            **picked(check, standard_deviation="standard_deviations"),
+            "doubts": posterior.doubts,
         },
         "chain": None
         if chain is None
         else {
             "draws": len(chain.theta),
-            "equilibria": chain.solves,
-            "accepted": chain.accepted,
-            "effective_draws": chain.effective,
+            **picked(chain, equilibria="solves", accepted="accepted", effective_draws="effective"),
         },
         "modes": [
             {"theta": mode.theta, "probability": probability, "share_of_prior": mode.problem.mode.share}
@@ -78,11 +69,11 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
         "predictions": [_describe_prediction(prediction) for prediction in posterior.predictions],
         "all_recordings": [
             {
-                "role": one.role,
-                "count": one.count,
-                "root_mean_square_before_mm": MILLIMETRES * one.before,
-                "root_mean_square_after_mm": MILLIMETRES * one.after,
-                "root_mean_square_of_run_mm": MILLIMETRES * one.of_run,
+                **picked(one, "role", "count"),
+                **{
+                    f"root_mean_square_{key}_mm": MILLIMETRES * getattr(one, key)
+                    for key in ("before", "after", "of_run")
+                },
             }
             for one in posterior.overall_errors
         ],
@@ -96,15 +87,10 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
         "discretisation": describe_discretisation(posterior),
         "registration": describe_registration(posterior),
         "prior": {
-            "model": prior.model.name,
-            "variant": prior.model.variant,
-            "groups": list(prior.groups),
-            "laws": list(prior.laws_of),
-            "poisson": prior.poisson,
+            **picked(prior.model, model="name", variant="variant"),
+            **picked(prior, groups="groups", laws="laws_of", poisson="poisson"),
             "draws": len(prior.theta),
-            "seed": prior.seed,
-            "rejection_rate": prior.rejection_rate,
-            "distance_from_gaussian": prior.distances,
+            **picked(prior, seed="seed", rejection_rate="rejection_rate", distance_from_gaussian="distances"),
         },
         "gauss_newton": {"converged": best.converged, "history": [vars(step) for step in best.history]},
         "remarks": remarks_of(posterior),
@@ -131,12 +117,8 @@ def _describe(marginal: Marginal, posterior: Posterior) -> dict[str, Any]:
         },
         "coordinate": {
             "name": parameter.coordinate.name,
-            "estimate": marginal.estimate,
-            "mean": marginal.mean,
-            "standard_deviation": marginal.deviation,
-            "interval_95": list(marginal.interval),
-            "prior_mean": marginal.prior_mean,
-            "prior_standard_deviation": marginal.prior_deviation,
+            **picked(marginal, "estimate", "mean", standard_deviation="deviation", interval_95="interval"),
+            **picked(marginal, "prior_mean", prior_standard_deviation="prior_deviation"),
         },
     }
 
@@ -188,9 +170,7 @@ def _describe_prediction(prediction: Prediction) -> dict[str, Any]:
     factor, unit = SHOWN[prediction.unit]
     sigma = None if prediction.sigma is None else factor * float(np.sqrt(np.mean(prediction.sigma**2)))
     return {
-        "name": prediction.name,
-        "kind": prediction.kind,
-        "role": prediction.role,
+        **picked(prediction, "name", "kind", "role"),
         "unit": unit,
         "count": prediction.fitted.count,
         "root_mean_square_before": factor * prediction.error_before,
@@ -256,11 +236,14 @@ def remarks_of(posterior: Posterior) -> list[str]:
     ]
 
 
-def correlated(posterior: Posterior) -> list[tuple[str, str, float]]:
-    """Names of parameters that are tied to each other, and their correlation."""
+def correlated(posterior: Posterior) -> list[str]:
+    """Parameters that are tied to each other, for the terminal and for its page."""
     names, matrix = posterior.parameters.names, posterior.correlation
     return [
-        (names[i], names[j], matrix[i, j]) for i in range(len(names)) for j in range(i) if abs(matrix[i, j]) >= _TIED
+        f"correlation of {names[i]} and {names[j]}: {matrix[i, j]:.2f}"
+        for i in range(len(names))
+        for j in range(i)
+        if abs(matrix[i, j]) >= _TIED
     ]
 
 
@@ -287,7 +270,7 @@ def estimate_lines(posterior: Posterior, averaged: AveragedTissue | None = None)
         lines.append(_row(parameter, marginal.estimate, marginal.deviation, marginal.interval, prior))
     if averaged is not None:
         lines += averaged_lines(averaged)
-    lines += _check_lines(posterior)
+    lines += [f"  {line}" for line in (*correlated(posterior), *checks(posterior))]
     lines += ["", "RMSE at recordings      count   before    after    noise   in 50 %   in 95 %   gross errors"]
     lines += [_prediction_line(one) for one in posterior.predictions]
     for one in posterior.overall_errors:
@@ -344,32 +327,30 @@ def _prediction_line(one: Prediction) -> str:
     )
 
 
-def _check_lines(posterior: Posterior) -> list[str]:
-    importance = posterior.importance
-    lines = [f"  correlation of {one} and {other}: {value:.2f}" for one, other, value in correlated(posterior)]
-    lines.append(
-        f"  {posterior.method}: Pareto k {importance.smoothed.k:.2f} of {len(importance.theta)} weighted draws "
-        f"({importance.smoothed.effective:.0f} effective; without equilibrium: {importance.failed}, "
-        f"unstable laws: {importance.unstable})"
-    )
-    lines += [f"  Laplace fails: {doubt}" for doubt in posterior.doubts]
-    if posterior.chain is not None:
-        chain = posterior.chain
+def checks(posterior: Posterior) -> list[str]:
+    """How far an estimate is to be believed, for the terminal and for its page."""
+    check, chain = posterior.importance, posterior.chain
+    lines = [
+        f"{_METHODS[posterior.method]}: Pareto k {check.smoothed.k:.2f} of {len(check.theta)} weighted draws, "
+        f"{check.smoothed.effective:.0f} of them effective, {check.failed} without equilibrium, {check.unstable} of "
+        "unstable laws",
+        *(f"Laplace's approximation fails: {doubt}" for doubt in posterior.doubts),
+    ]
+    if chain is not None:
         lines.append(
-            f"  chain of {chain.solves} equilibria, {100 * chain.accepted:.0f} % accepted, worth "
+            f"chain of {chain.solves} equilibria, {100 * chain.accepted:.0f} % accepted, worth "
             f"{chain.effective.min():.0f} independent draws"
         )
-    lines.append(f"  noise: {posterior.best.point.noise.scale:.2f} times as large as declared")
+    lines.append(f"noise: {posterior.best.point.noise.scale:.2f} times as large as declared")
     mesh, registration = describe_discretisation(posterior), describe_registration(posterior)
     if mesh is not None:
         lines.append(
-            f"  error of the mesh: {mesh['amount']:.2f} +- {mesh['standard_deviation']:.2f} times what elements of "
-            f"half the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square"
+            f"error of the mesh: {mesh['amount']:.2f} ± {mesh['standard_deviation']:.2f} times what elements of half "
+            f"the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square"
         )
     if registration is not None:
-        shift = ", ".join(f"{value:.2f}" for value in registration["shift_mm"])
-        turn = ", ".join(f"{value:.2f}" for value in registration["turn_degrees"])
-        lines.append(f"  registration: shifted by ({shift}) mm, turned by ({turn}) degrees")
+        shift, turn = (", ".join(f"{x:.2f}" for x in registration[key]) for key in ("shift_mm", "turn_degrees"))
+        lines.append(f"registration: shifted by ({shift}) mm, turned by ({turn}) degrees")
     return lines
 
 

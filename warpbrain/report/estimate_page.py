@@ -17,7 +17,7 @@ from warpbrain.inference.probability import percent
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view, fields_of, known_displacement
 from warpbrain.report.comparison import Explained, error_text, explained
-from warpbrain.report.estimate import correlated, recorded_points
+from warpbrain.report.estimate import checks, correlated, recorded_points
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
 from warpbrain.report.page import Top, document, sections_of, write_document
 from warpbrain.report.page.figures import inlined
@@ -64,7 +64,7 @@ def write_estimate_page(
     """
     case, judged, nothing = said["case"], judged_of(said), said["nothing_else"]
     whole = posterior.case.mesh
-    places = views.places(whole, views.resected_elements(whole))
+    places = views.places(whole)
     names = ", ".join(_name(one) for one in said["parameters"])
     agreement = Markup()
     if any(one.kind != "surface" for one in posterior.predictions):
@@ -76,7 +76,7 @@ def write_estimate_page(
     sections = sections_of(
         "estimate.html", said=said, agreement=agreement,
         tissue=[_parameter(one) for one in said["parameters"]],
-        tied=[f"{one} and {other} are correlated: {value:.2f}." for one, other, value in correlated(posterior)],
+        tied=correlated(posterior), checks=checks(posterior),
         densities=inlined(
             lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
             "Each parameter before (dashed, filled) and after (line); dotted: the ends of its 95 % interval.",

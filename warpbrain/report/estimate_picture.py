@@ -125,9 +125,9 @@ def write_residuals(path: Path, posterior: Posterior) -> None:
     order, top = np.argsort(lengths), max(float(np.percentile(lengths, 98)), 1e-3) if len(lengths) else 1.0
     figure, axes = views.panels(1, 3, (13.5, 5.0))
     shown: Any = None
-    places = views.places(whole, views.resected_elements(whole))
+    places = views.places(whole)
     for panel, view, place in zip(axes, views.VIEWS, places, strict=True):
-        views.draw_outline(panel, mesh.boundary, mesh.points, view, place, colour="0.45")
+        views.draw_outline(panel, mesh, view, place, colour="0.45")
         flat = views.in_view(points[order][:, view.plane])
         shown = panel.scatter(
             flat[:, 0], flat[:, 1], c=lengths[order], s=16, cmap="viridis_r", vmin=0.0, vmax=top, edgecolors="0.2",

@@ -65,7 +65,7 @@ def file_of_result(result: Result) -> Any:
         cells[MIDDLES] = MILLIMETRES * result.u_middles.reshape(len(result.u_middles), -1)
     # sets first: one of the same name must not replace a result
     at_nodes = {**sets_of(result.mesh.node_sets), "displacement": MILLIMETRES * result.u, "reaction": result.reactions}
-    return body_file(result.mesh, at_nodes | result.nodal_pressures, cells)
+    return body_file(result.mesh, {**at_nodes, **result.nodal_pressures}, cells)
 
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:
@@ -86,6 +86,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value
+
+
+def picked(what: Any, *names: str, **renamed: str) -> dict[str, Any]:
+    """Attributes of an object for JSON, some by other names than their own."""
+    return {key: getattr(what, name) for key, name in ({name: name for name in names} | renamed).items()}
 
 
 def write_csv(path: Path, rows: Iterable[Iterable[Any]], lineterminator: str = "\r\n") -> None:

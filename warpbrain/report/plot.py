@@ -84,15 +84,47 @@ def plot(
     InputError
         If it cannot be drawn, or has no such field: the message lists those it has.
     """
-    figure = _figure(what, field)
+    figure = None
+    if isinstance(what, SpecimenRun):
+        from warpbrain.report.specimen import COLUMNS, tests_figure
+
+        figure = tests_figure(what.tests, COLUMNS)
+    elif isinstance(what, Posterior) and field == "moduli":
+        from warpbrain.report.estimate_picture import densities_figure
+
+        figure = densities_figure(what, narrow=False)
     if figure is not None:
         if screenshot is not None:
             figure.savefig(screenshot)
         return figure
+    if cut not in _SIDES:
+        raise InputError(f"cut = {cut!r}: expected 'x', 'y', 'z' or None")
     import pyvista
 
+    file, usual = _file(what)
+    body = pyvista.from_meshio(file)
+    name = usual if field is None else field
+    known = [*body.point_data, *body.cell_data]
+    if name not in known:
+        raise InputError(f"field = {name!r}: there is none in a {type(what).__name__}; it has {', '.join(known)}")
+    moves = next((key for key in ("displacement", "displacement_mean") if key in body.point_data), None)
+    if moves is not None:
+        body.points = body.points + exaggeration * body.point_data[moves]
+    shown = body if cut is None else body.clip(normal=cut)
     plotter = pyvista.Plotter(off_screen=True if screenshot is not None else None)
-    _add(plotter, what, field, exaggeration, cut)
+    categories = name == "tissue"
+    plotter.add_mesh(
+        shown,
+        scalars=name,
+        cmap=list(TISSUE_COLOURS) if categories else "viridis",
+        smooth_shading=True,
+        split_sharp_edges=True,
+        categories=categories,
+        show_scalar_bar=not categories,
+        scalar_bar_args={"title": f"{_UNITS.get(name, name)}\n", "color": "#333333", "fmt": "%.3g", **_BAR},
+    )
+    plotter.set_background("white")
+    plotter.add_axes(xlabel="R", ylabel="A", zlabel="S", color="#333333")
     side = view or _SIDES[cut]
     plotter.view_vector(side, viewup=(0.0, 1.0, 0.0) if cut == "z" and view is None else (0.0, 0.0, 1.0))
     plotter.camera.zoom(1.1)
@@ -108,36 +140,6 @@ def grid(what: Any) -> Any:
     import pyvista
 
     return pyvista.from_meshio(_file(what)[0])
-
-
-def _add(plotter: Any, what: Any, field: str | None, exaggeration: float, cut: str | None) -> None:
-    if cut not in _SIDES:
-        raise InputError(f"cut = {cut!r}: expected 'x', 'y', 'z' or None")
-    import pyvista
-
-    file, usual = _file(what)
-    body = pyvista.from_meshio(file)
-    name = usual if field is None else field
-    known = [*body.point_data, *body.cell_data]
-    if name not in known:
-        raise InputError(f"field = {name!r}: there is none in a {type(what).__name__}; it has {', '.join(known)}")
-    moves = next((key for key in ("displacement", "displacement_mean") if key in body.point_data), None)
-    if moves is not None:
-        body.points = body.points + exaggeration * body.point_data[moves]
-    shown = body if cut is None else body.clip(normal=cut)
-    categories = name == "tissue"
-    plotter.add_mesh(
-        shown,
-        scalars=name,
-        cmap=list(TISSUE_COLOURS) if categories else "viridis",
-        smooth_shading=True,
-        split_sharp_edges=True,
-        categories=categories,
-        show_scalar_bar=not categories,
-        scalar_bar_args={"title": f"{_UNITS.get(name, name)}\n", "color": "#333333", "fmt": "%.3g", **_BAR},
-    )
-    plotter.set_background("white")
-    plotter.add_axes(xlabel="R", ylabel="A", zlabel="S", color="#333333")
 
 
 @singledispatch
@@ -166,16 +168,3 @@ def _(what: EnsembleResult) -> tuple[Any, str]:
     if what.fields is None:
         raise InputError("what: no sample of this ensemble has an answer; the reasons are in its rows")
     return file_of_fields(what.fields), "displacement_sd"
-
-
-def _figure(what: Any, field: str | None) -> Any:
-    """The figure of what is drawn as curves; None of bodies."""
-    if isinstance(what, SpecimenRun):
-        from warpbrain.report.specimen import COLUMNS, tests_figure
-
-        return tests_figure(what.tests, COLUMNS)
-    if isinstance(what, Posterior) and field == "moduli":
-        from warpbrain.report.estimate_picture import densities_figure
-
-        return densities_figure(what, narrow=False)
-    return None

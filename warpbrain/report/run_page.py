@@ -58,7 +58,7 @@ def write_run_page(
         )
         for name, values in result.nodal_pressures.items()
     ]
-    places = views.places(whole, views.resected_elements(whole))
+    places = views.places(whole)
     solved = [f"{solution['kind']}, {len(solution['history'])} recorded steps"]
     if "time_s" in solution:
         solved.append(f"until {solution['time_s']:.4g} s")

@@ -8,10 +8,10 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from warpbrain import __version__
-from warpbrain.cases.case import Case
+from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.checking import NOTHING_ACTS
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.files import MILLIMETRES, picked
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
@@ -57,9 +57,7 @@ def machine() -> dict[str, str]:
 def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[str, Any]:
     """Anatomy and assumptions of a case, with units; `chosen` says why the elements were, if nobody asked for them."""
     return {
-        "name": case.name,
-        "title": case.title,
-        "origin": case.origin,
+        **picked(case, "name", "title", "origin"),
         "file": str(case.path),
         "nodes": len(model.mesh.points),
         "tetrahedra": len(model.mesh.tetrahedra),
@@ -76,8 +74,7 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
                 "name": tissue.name,
                 "law": tissue.known_law.name,
                 "formulation": tissue.formulation,
-                "parameters": vars(tissue.known_law),
-                "shear_modulus_Pa": tissue.known_law.shear_modulus,
+                **_law(tissue),
             }
             for label, tissue in sorted(case.tissues.items())
             if (model.mesh.tissue == label).any()
@@ -88,24 +85,27 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
     }
 
 
+def _law(tissue: Tissue) -> dict[str, Any]:
+    return {"parameters": vars(tissue.known_law), "shear_modulus_Pa": tissue.known_law.shear_modulus}
+
+
 def describe_result(result: Result) -> dict[str, Any]:
     """Displacements by node set and extremes of strain and stress, with units."""
     return {
         "displacement_mm": {
             name: {"nodes": s.nodes, **sizes_mm(s)} for name, s in result.displacement_statistics().items()
         },
-        "volume_ratio_J": {"smallest": result.J.min(), "largest": result.J.max()},
-        "principal_stretch": {
-            "smallest": result.principal_stretches.min(),
-            "largest": result.principal_stretches.max(),
-        },
+        "volume_ratio_J": _ends(result.J),
+        "principal_stretch": _ends(result.principal_stretches),
         "von_mises_Pa": {"largest": result.von_mises.max()},
-        "pressure_Pa": {"smallest": result.pressure.min(), "largest": result.pressure.max()},
+        "pressure_Pa": _ends(result.pressure),
         "reaction_N": result.reactions.sum(axis=0),
-        "pressures_at_nodes_Pa": {
-            name: {"smallest": values.min(), "largest": values.max()} for name, values in result.nodal_pressures.items()
-        },
+        "pressures_at_nodes_Pa": {name: _ends(values) for name, values in result.nodal_pressures.items()},
     }
+
+
+def _ends(values: Any) -> dict[str, float]:
+    return {"smallest": values.min(), "largest": values.max()}
 
 
 def sizes_mm(statistics: Any) -> dict[str, float]:
@@ -183,18 +183,12 @@ def timing_lines(phases: Mapping[str, float], counts: Mapping[str, int]) -> list
 
 def describe_prior(found: FromPrior) -> dict[str, Any]:
     """Model, draw and laws, with units; the draw is None where the laws are those of middle curves."""
-    drawn = found.drawn
-    draw: dict[str, Any] | None = None
+    drawn, draw = found.drawn, None
     tissues: dict[str, dict[str, Any]] = {}
     for label in found.labels:
         tissue = found.case.tissues[label]
-        tissues[str(label)] = {
-            "name": tissue.name,
-            "group": tissue.prior,
-            "law": tissue.known_law.name,
-            "parameters": vars(tissue.known_law),
-            "shear_modulus_Pa": tissue.known_law.shear_modulus,
-        }
+        known = {"name": tissue.name, "group": tissue.prior, "law": tissue.known_law.name}
+        tissues[str(label)] = known | _law(tissue)
     if drawn is not None:
         draw = {"sample": drawn.number, "seed": drawn.seed, "redrawn": len(drawn.rejected), "reasons": drawn.rejected}
         for described, fitted in zip(tissues.values(), drawn.fits, strict=True):
@@ -210,23 +204,17 @@ def prior_lines(described: Mapping[str, Any] | None) -> list[str]:
     by = f"the generative model {described['model']} ({described['variant']})"
     lines, curve = [], f"the middle curve of {by}"
     if draw is not None:
-        curve = "drawn"
-        lines = [
-            f"  prior     draw {draw['sample']} of seed {draw['seed']} by {by}; unstable and redrawn: {draw['redrawn']}"
-        ]
+        redrawn, curve = f"unstable and redrawn: {draw['redrawn']}", "drawn"
+        lines = [f"  prior     draw {draw['sample']} of seed {draw['seed']} by {by}; {redrawn}"]
         lines += [f"  redrawn   {reason}" for reason in draw["reasons"]]
     for label, tissue in described["tissues"].items():
+        parameters = []
+        for name, value in tissue["parameters"].items():
+            numbers = ", ".join(f"{v:.6g}" for v in (value if isinstance(value, tuple) else (value,)))
+            # exponents have no unit
+            parameters.append(f"{name} = {numbers}" + ("" if name == "alpha" else " Pa"))
         lines.append(
-            f"  tissue {label}  {tissue['group']}, {curve}: {tissue['law']}, {_parameters(tissue['parameters'])}, "
+            f"  tissue {label}  {tissue['group']}, {curve}: {tissue['law']}, {', '.join(parameters)}, "
             f"shear modulus {tissue['shear_modulus_Pa']:.6g} Pa"
         )
     return lines
-
-
-def _parameters(values: Mapping[str, float | tuple[float, ...]]) -> str:
-    """As `C1 = 250 Pa, C2 = 3.1 Pa`: exponents have no unit."""
-    said = []
-    for name, value in values.items():
-        number = ", ".join(f"{v:.6g}" for v in (value if isinstance(value, tuple) else (value,)))
-        said.append(f"{name} = {number}" + ("" if name == "alpha" else " Pa"))
-    return ", ".join(said)

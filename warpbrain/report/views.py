@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.arrays import Bools, Floats
 from warpbrain.atomic import whole_file
 from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
@@ -45,7 +45,7 @@ TISSUE_EDGE = "#4d4640"
 
 
 def panels(
-    rows: int, columns: int, size: tuple[float, float], layout: str = "constrained", **options: Any
+    rows: int, columns: int, size: tuple[float, float], layout: Any = "constrained", **options: Any
 ) -> tuple[Any, list[Any]]:
     """A figure of that size [inch] and its panels, row by row."""
     from matplotlib.figure import Figure
@@ -96,8 +96,9 @@ def resected_elements(mesh: TetMesh, name: str = "resection") -> Bools:
     return mesh.element_sets.get(name, np.zeros(len(mesh.tetrahedra), dtype=bool))
 
 
-def places(mesh: TetMesh, resected: Bools) -> tuple[float, float, float]:
+def places(mesh: TetMesh, resected: Bools | None = None) -> tuple[float, float, float]:
     """Where to cut [m], in the order of `VIEWS`: through the resected tissue, else through a lateral ventricle."""
+    resected = resected_elements(mesh) if resected is None else resected
     ventricle = mesh.node_sets.get("ventricle", np.zeros(len(mesh.points), dtype=bool))
     centre = mesh.points[ventricle].mean(axis=0) if ventricle.any() else mesh.points.mean(axis=0)
     if resected.any():
@@ -134,15 +135,14 @@ def heading(mesh: TetMesh, view: View, place: float) -> str:
 
 def tissue_colours(names: Mapping[int, str], mesh: TetMesh) -> dict[int, str]:
     """Colour of each label of a mesh, whatever the order of the labels."""
-    known = {label: COLOUR_OF[names[label]] for label in mesh.labels if names.get(label) in COLOUR_OF}
-    own = [colour for colour in TISSUE_COLOURS if colour not in COLOUR_OF.values()]
-    chosen = dict(known)
+    chosen = {label: COLOUR_OF[names[label]] for label in mesh.labels if names.get(label) in COLOUR_OF}
+    others = [colour for colour in TISSUE_COLOURS if colour not in COLOUR_OF.values()]
     # one that nobody named is called so (`cases new`)
-    named = {label: name for label, name in names.items() if name != f"tissue {label}"}
-    for name, label in sorted((named[label], label) for label in mesh.labels if label in named.keys() - known.keys()):
+    named = {label: name for label, name in names.items() if name != f"tissue {label}" and label not in chosen}
+    for name, label in sorted((named[label], label) for label in mesh.labels if label in named):
         # that of the name in every case, unless another tissue of this one has it already
-        wish = zlib.crc32(name.encode())
-        wishes = [own[(wish + k) % len(own)] for k in range(len(own))]
+        first = zlib.crc32(name.encode()) % len(others)
+        wishes = [*others[first:], *others[:first]]
         chosen[label] = next((colour for colour in wishes if colour not in chosen.values()), wishes[0])
     left = [colour for colour in TISSUE_COLOURS if colour not in chosen.values()]
     nameless = [label for label in mesh.labels if label not in chosen]
@@ -177,7 +177,7 @@ def draw_scalars(axes: Any, section: Cut, top: float, cmap: Any = "viridis", **o
 def draw_values(axes: Any, mesh: TetMesh, values: Floats, view: View, place: float, top: float) -> Any:
     """Draw a framed cut coloured by nodal values (n,), from 0 to `top`; returns what a colour bar is made of."""
     drawn = draw_scalars(axes, cut(mesh.points, mesh.tetrahedra, values, view.axis, place), top)
-    draw_outline(axes, mesh.boundary, mesh.points, view, place)
+    draw_outline(axes, mesh, view, place)
     frame(axes, mesh, view)
     return drawn
 
@@ -200,14 +200,12 @@ def draw_part(axes: Any, section: Cut, part: Bools, **style: Any) -> None:
         axes.add_artist(PathPatch(Shape.make_compound_path(*chosen), **style))
 
 
-def draw_outline(
-    axes: Any, faces: Ints, points: Floats, view: View, place: float, style: Any = "-", colour: str = TISSUE_EDGE
-) -> None:
-    """Draw where faces cross the plane of a cut."""
+def draw_outline(axes: Any, mesh: TetMesh, view: View, place: float, colour: str = TISSUE_EDGE) -> None:
+    """Draw where the surface of a body crosses the plane of a cut."""
     from matplotlib.collections import LineCollection
 
-    segments = in_view(outline(points, faces, view.axis, place))
-    axes.add_collection(LineCollection(list(segments), colors=colour, linestyles=[style], linewidths=0.9))
+    segments = in_view(outline(mesh.points, mesh.boundary, view.axis, place))
+    axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=0.9))
 
 
 def frame(axes: Any, mesh: TetMesh, view: View, margin: float | None = None) -> None:
@@ -216,15 +214,13 @@ def frame(axes: Any, mesh: TetMesh, view: View, margin: float | None = None) -> 
     margin = 0.4 * length if margin is None else margin
     corners = in_view(np.array([mesh.points.min(axis=0)[view.plane], mesh.points.max(axis=0)[view.plane]]))
     low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     bare(axes)
-    left, right, bottom, top = view.letters
-    style = {"fontsize": 11, "color": "#7a7a7a", "transform": axes.transAxes}
-    axes.text(0.01, 0.5, left, va="center", ha="left", **style)
-    axes.text(0.99, 0.5, right, va="center", ha="right", **style)
-    axes.text(0.5, 0.0, bottom, va="bottom", ha="center", **style)
-    axes.text(0.5, 1.0, top, va="top", ha="center", **style)
+    sides = ((0.01, 0.5, "left", "center"), (0.99, 0.5, "right", "center"))
+    for letter, (x, y, ha, va) in zip(
+        view.letters, (*sides, (0.5, 0.0, "center", "bottom"), (0.5, 1.0, "center", "top")), strict=True
+    ):
+        axes.text(x, y, letter, ha=ha, va=va, fontsize=11, color="#7a7a7a", transform=axes.transAxes)
     start, height = low + 0.2 * length
     axes.plot([start, start + length], [height, height], color="#333333", linewidth=2.0)
     middle, above = start + 0.5 * length, height + 0.1 * length
@@ -233,11 +229,8 @@ def frame(axes: Any, mesh: TetMesh, view: View, margin: float | None = None) -> 
 
 def bare(axes: Any) -> None:
     """Equal scales, no ticks, no box."""
-    axes.set_aspect("equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
-    for side in axes.spines.values():
-        side.set_visible(False)
+    axes.set(aspect="equal", xticks=[], yticks=[])
+    axes.spines[:].set_visible(False)
 
 
 def tissue_entries(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> list[tuple[Any, str]]:

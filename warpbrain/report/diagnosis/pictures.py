@@ -25,7 +25,6 @@ from warpbrain.report.views import (
     ORANGE,
     VERMILLION,
     VIEWS,
-    bare,
     in_view,
     round_below,
     scale_length,
@@ -70,9 +69,14 @@ class Anatomy:
         off = np.array([0.12, 0.003, 0.003]) * np.ptp(points, axis=0)
         return 0.5 * (points.min(axis=0) + points.max(axis=0)) + off
 
+    @property
+    def margin(self) -> float:
+        """Room around the body [mm] for letters, a scale bar and the key of arrows."""
+        return 0.7 * scale_length(self.mesh)
+
     def plane(self, view: views.View) -> str:
         """A cut in words."""
-        return f"{view.name}, {'xyz'[view.axis]} = {MILLIMETRES * self.centre[view.axis]:z.0f} mm"
+        return views.heading(self.mesh, view, float(self.centre[view.axis]))
 
     def draw(self, axes: Any, view: views.View) -> Cut:
         """Draw a cut: tissue, hatched where the data are blind, a line around what is significant."""
@@ -85,24 +89,8 @@ class Anatomy:
         hatched = {"facecolor": "none", "edgecolor": _HATCHING, "hatch": "//////", "linewidth": 0.0, "zorder": 2.0}
         views.draw_part(axes, section, blind, **hatched)
         views.draw_level(axes, section, self.threshold, GREEN)
-        views.draw_outline(axes, mesh.boundary, mesh.points, view, place)
+        views.draw_outline(axes, mesh, view, place)
         return section
-
-    def frame(self, axes: Any, view: views.View) -> None:
-        """Limits around the body, letters of the directions at the edges and a scale bar below."""
-        points, bar = self.mesh.points, scale_length(self.mesh)
-        corners = in_view(np.array([points.min(axis=0)[view.plane], points.max(axis=0)[view.plane]]))
-        low, high = corners.min(axis=0) - 0.6 * bar, corners.max(axis=0) + 0.6 * bar
-        low[1] -= 0.5 * bar
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
-        bare(axes)
-        middle = 0.5 * (corners[0] + corners[1])
-        places = [(low[0] + 0.25 * bar, middle[1]), (high[0] - 0.25 * bar, middle[1]), (middle[0], low[1] + 0.75 * bar)]
-        for letter, at in zip(view.letters, [*places, (middle[0], high[1] - 0.25 * bar)], strict=True):
-            axes.text(*at, letter, fontsize=10, color="#555555", va="center", ha="center")
-        axes.plot([low[0], low[0] + bar], [low[1] + 0.15 * bar] * 2, color="#333333", linewidth=2.0)
-        axes.text(low[0] + 1.1 * bar, low[1] + 0.15 * bar, f"{bar:g} mm", fontsize=8, va="center", color="#333333")
 
 
 def map_figure(anatomy: Anatomy) -> str:
@@ -125,7 +113,7 @@ def map_figure(anatomy: Anatomy) -> str:
                 style = {"facecolor": "none", "edgecolor": BLACK, "linestyle": "--", "linewidth": 1.3}
                 panel.add_patch(Circle((float(at[0]), float(at[1])), radius, **style))
             panel.set_title(anatomy.plane(view), fontsize=TEXT)
-            anatomy.frame(panel, view)
+            views.frame(panel, anatomy.mesh, view, anatomy.margin)
         shape = {"shrink": 0.9, "pad": 0.01} if narrow else {"shrink": 0.5, "pad": 0.02}
         bar = figure.colorbar(tint, ax=axes, orientation="horizontal", aspect=40, **shape)
         bar.set_label("score of a force there\n(chi-squared of 3 degrees of freedom)", fontsize=TEXT - 1)
@@ -164,7 +152,7 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
             panel.plot(*start[counted].T, ".", color=BLACK, markersize=2.0, zorder=6)
             panel.plot(*start[vectors.aside].T, "x", color=BLACK, markersize=6.0, zorder=6)
             panel.set_title(f"{STATES[state]}\nRMSE {errors[state]}", fontsize=TEXT + 1)
-            anatomy.frame(panel, view)
+            views.frame(panel, anatomy.mesh, view, anatomy.margin)
         # an arrow of a round length at the lower right
         panel, key, bar = axes[-1], round_below(MILLIMETRES * large), scale_length(anatomy.mesh)
         right, low = panel.get_xlim()[1] - 0.1 * bar, panel.get_ylim()[0] + 0.15 * bar

@@ -6,7 +6,7 @@ in another process: where there is no graphics library, VTK does not raise but c
 
 from __future__ import annotations
 
-import json
+import pickle
 import subprocess
 import sys
 import tempfile
@@ -122,17 +122,10 @@ def render(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -
 
 def write_scene(folder: Path, scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -> None:
     """Write what `read_scene` reads; `size` of each picture is in pixels."""
-    np.savez(folder / "scene.npz", **vars(scene))
-    seen = {
-        name: [one.right.tolist(), one.up.tolist(), list(one.centre), one.half_height] for name, one in cameras.items()
-    }
-    (folder / "cameras.json").write_text(json.dumps({"size": size, "cameras": seen}), encoding="utf-8")
+    (folder / "scene.pickle").write_bytes(pickle.dumps((scene, dict(cameras), size)))
 
 
 def read_scene(folder: Path) -> tuple[Scene, dict[str, Camera], tuple[int, int]]:
     """What `write_scene` wrote."""
-    with np.load(folder / "scene.npz") as arrays:
-        scene = Scene(**{name: arrays[name][()] for name in arrays.files})
-    read = json.loads((folder / "cameras.json").read_text(encoding="utf-8"))
-    cameras = {name: Camera(*map(np.array, one[:3]), one[3]) for name, one in read["cameras"].items()}
-    return scene, cameras, tuple(read["size"])
+    read: tuple[Scene, dict[str, Camera], tuple[int, int]] = pickle.loads((folder / "scene.pickle").read_bytes())
+    return read

@@ -15,20 +15,20 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import mechanism_picture
+from mechanism_picture import MAGNIFIED, PLACE
+
 from warpbrain.atomic import whole_file
+from warpbrain.bench.mechanisms import BASE, PLAIN, ratio
 from warpbrain.physics import potential
 from warpbrain.physics.composition import pairs
 from warpbrain.physics.continuous import smooth_parameters
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms import picture
-from warpbrain.report.mechanisms.picture import MAGNIFIED, PLACE
 
 # what mechanisms cost, from the files that `python -m warpbrain.bench mechanisms` wrote ----------------------
 
-#: The row of the plain model beside itself.
-PLAIN = "plain"
 #: How many times as long as a plain step is called long, and a plain iteration of the linear solver.
 _LONG, _HARD = 3.0, 1.5
 Costs = Mapping[str, Any]
@@ -37,11 +37,6 @@ Costs = Mapping[str, Any]
 def read_costs(paths: Iterable[Path]) -> list[Costs]:
     """Measurements, one a file."""
     return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
-
-
-def ratio(samples: Mapping[str, Sequence[float]]) -> float:
-    """How much longer it took with a mechanism than without: the median over neighbours in time."""
-    return statistics.median(b / a for a, b in zip(samples["plain"], samples["with"], strict=True))
 
 
 def _where(costs: Costs) -> str:
@@ -88,8 +83,7 @@ def table(measured: Sequence[Costs], kinds: Sequence[str]) -> list[str]:
 
 # what their examples do to the phantom ---------------------------------------------------------------------
 
-#: The case that examples are said of, and the files that it is.
-BASE = "phantom-loaded"
+#: The files of the case that examples are said of.
 _FILES = ("case-loaded.toml", "multi-loaded.vtu")
 
 
@@ -115,7 +109,7 @@ def made_from(kind: str) -> str:
     """Digest of everything that a picture of a mechanism should be made again for."""
     mechanism = mechanisms()[kind]
     digest = hashlib.sha256(mechanism.example.encode())
-    for module in (sys.modules[mechanism.__module__], picture):
+    for module in (sys.modules[mechanism.__module__], mechanism_picture):
         digest.update(inspect.getsource(module).encode())
     for name in _FILES:
         digest.update((files("warpbrain.cases") / "data" / "phantom" / name).read_bytes())
