@@ -23,7 +23,7 @@ from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.picture import Moved, cameras_of, notes_on, scene_of, show
 from warpbrain.report.rendering import BEFORE, Camera, RenderingError, render
-from warpbrain.report.slices import Cut, cut
+from warpbrain.report.slices import cut
 from warpbrain.report.summary import SET_TITLES
 from warpbrain.report.views import View
 
@@ -75,17 +75,6 @@ class _Scene:
         return views.resected_elements(self.mesh, *([] if resection is None else [resection.elements]))
 
     @cached_property
-    def places(self) -> tuple[float, float, float]:
-        return views.places(self.mesh, self.resected)
-
-    @cached_property
-    def sections(self) -> tuple[Cut, ...]:
-        """The cuts, in the order of `views`."""
-        mesh, nothing = self.mesh, np.zeros(len(self.mesh.points))
-        cuts = zip(self.views, self.places, strict=True)
-        return tuple(cut(mesh.points, mesh.tetrahedra, nothing, view.axis, place) for view, place in cuts)
-
-    @cached_property
     def names(self) -> dict[int, str]:
         """Of the tissues, by label."""
         return {label: tissue.name for label, tissue in self.case.tissues.items()}
@@ -98,11 +87,6 @@ class _Scene:
     def extent(self) -> float:
         """Largest side of the box around the body [m]."""
         return float(np.ptp(self.mesh.points, axis=0).max())
-
-    @property
-    def margin(self) -> float:
-        """Room around the body [mm]: for letters and a scale bar beside a body with corners."""
-        return 0.085 * MILLIMETRES * self.extent
 
     @cached_property
     def near(self) -> float:
@@ -154,8 +138,8 @@ def write_case_picture(path: Path, case: Case) -> str:
     """Draw a case as PNG; returns why the body from outside is not in it, empty if it is."""
     scene = _Scene(case)
     figure, panels = views.panels(2, 2, (15.0, 11.6))
-    for axes, view, place, section in zip(panels[:3], scene.views, scene.places, scene.sections, strict=True):
-        _draw_cut(axes, scene, view, place, section)
+    for axes, view, place in zip(panels[:3], scene.views, views.places(case.mesh, scene.resected), strict=True):
+        _draw_cut(axes, scene, view, place)
     missing = _draw_open(panels[3], scene)
     _draw_legend(figure, scene)
     # on the left, for the legend is in the other corner
@@ -179,12 +163,14 @@ def _headline(case: Case) -> str:
 # the cuts ----------------------------------------------------------------------------------------------------------
 
 
-def _draw_cut(axes: Any, scene: _Scene, view: View, place: float, section: Cut) -> None:
+def _draw_cut(axes: Any, scene: _Scene, view: View, place: float) -> None:
+    mesh = scene.mesh
+    section = cut(mesh.points, mesh.tetrahedra, np.zeros(len(mesh.points)), view.axis, place)
     views.draw_tissue(axes, section, scene.colours, _SEAM)
-    views.draw_outline(axes, scene.mesh, view, place)
-    near = np.abs(scene.mesh.points[:, view.axis] - place) <= scene.near
+    views.draw_outline(axes, mesh, view, place)
+    near = np.abs(mesh.points[:, view.axis] - place) <= scene.near
     for number, (_, members) in enumerate(scene.node_sets):
-        at, (colour, shape) = views.in_view(scene.mesh.points[members & near][:, view.plane]), _SET_STYLES[number]
+        at, (colour, shape) = views.in_view(mesh.points[members & near][:, view.plane]), _SET_STYLES[number]
         axes.plot(*at.T, shape, markersize=_dot_size(number), color=colour, **_RIM)
     for number, surface in enumerate(scene.surfaces):
         close = np.abs(surface.points[:, view.axis] - place) <= scene.near_recorded
@@ -195,9 +181,10 @@ def _draw_cut(axes: Any, scene: _Scene, view: View, place: float, section: Cut) 
         start, along = (x[close][:, view.plane] for x in (tracked.points, scene.enlarged * tracked.displacement))
         _arrows(axes, views.in_view(start), views.in_view(along), number)
         shown += int(close.sum())
-    views.frame(axes, scene.mesh, view, scene.margin)
+    # room for letters and a scale bar beside a body with corners
+    views.frame(axes, mesh, view, 0.085 * MILLIMETRES * scene.extent)
     counted = f"   ({shown} of {scene.arrows} arrows)" if scene.arrows else ""
-    axes.set_title(views.heading(scene.mesh, view, place) + counted, fontsize=11)
+    axes.set_title(views.heading(mesh, view, place) + counted, fontsize=11)
 
 
 def _dot_size(number: int) -> float:
@@ -279,11 +266,15 @@ def _render(scene: _Scene) -> tuple[Any, Camera]:
 
 
 def _draw_legend(figure: Any, scene: _Scene) -> None:
+    near, near_recorded = (
+        np.format_float_positional(MILLIMETRES * length, precision=2, fractional=False, trim="-") + " mm"
+        for length in (scene.near, scene.near_recorded)
+    )
     names = {label: _short(name) for label, name in scene.names.items()}
     groups = {
         "tissue": _first(views.tissue_entries(names, scene.mesh, scene.resected)),
-        f"nodes within {_millimetres(scene.near)} of a cut": _sets(scene),
-        f"recorded (in a cut: within {_millimetres(scene.near_recorded)})": _recordings(scene),
+        f"nodes within {near} of a cut": _sets(scene),
+        f"recorded (in a cut: within {near_recorded})": _recordings(scene),
     }
     entries: list[tuple[Any, str]] = []
     headings = []
@@ -294,10 +285,6 @@ def _draw_legend(figure: Any, scene: _Scene) -> None:
     texts = views.legend(figure, entries[:-1], loc="outside right upper", fontsize=10)
     for number in headings:
         texts[number].set_fontweight("bold")
-
-
-def _millimetres(length: float) -> str:
-    return np.format_float_positional(MILLIMETRES * length, precision=2, fractional=False, trim="-") + " mm"
 
 
 def _sets(scene: _Scene) -> list[tuple[Any, str]]:

@@ -106,15 +106,11 @@ def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], mo
     sizes = MILLIMETRES * np.linalg.norm(u, axis=1)
     size = MILLIMETRES * float(np.ptp(whole.points, axis=0).max())
     resected = taken_out(whole, mesh)
-    removed = whole.without(resected)[0] if resected.any() else None
     # nodes of what is left first, as in `mesh`; those that only what was removed has come after them
-    points, tetrahedra = mesh.points, mesh.tetrahedra
-    tissue, gone = mesh.tissue, np.zeros(len(tetrahedra), dtype=bool)
-    if removed is not None:
-        points = np.concatenate([points, whole.points])
-        tetrahedra = np.concatenate([tetrahedra, whole.tetrahedra[resected] + len(mesh.points)])
-        tissue = np.concatenate([tissue, whole.tissue[resected]])
-        gone = np.concatenate([gone, np.ones(int(resected.sum()), dtype=bool)])
+    more = whole.points if resected.any() else whole.points[:0]
+    points, tissue = np.concatenate([mesh.points, more]), np.concatenate([mesh.tissue, whole.tissue[resected]])
+    tetrahedra = np.concatenate([mesh.tetrahedra, whole.tetrahedra[resected] + len(mesh.points)])
+    gone = np.arange(len(tetrahedra)) >= len(mesh.tetrahedra)
     by_label = {label: np.array(to_rgb(c)) for label, c in views.tissue_colours(names, whole).items()}
     colours = np.array([by_label[label] for label in tissue.tolist()])
     colours[gone] = to_rgb(views.RESECTED)
@@ -155,20 +151,22 @@ def cameras_of(scene: Scene) -> dict[str, Camera]:
     """Where each picture is seen from: the body, before and after, fills it."""
     moved = scene.points + scene.exaggeration * scene.u
     everything = np.concatenate([scene.points, moved[np.unique(scene.tetrahedra[~scene.removed])]])
-    oblique = _seen_from(scene.side * [0.80, 0.85, 0.62], everything)
     tips = np.concatenate([everything, scene.where + scene.arrows * scene.recorded])
-    cameras = {BEFORE: oblique, AFTER: oblique, MOTION: _seen_from(scene.side * [1.0, 0.25, 0.12], tips)}
+    cameras = {}
+    for name, towards, points in (
+        (BEFORE, [0.80, 0.85, 0.62], everything),
+        (AFTER, [0.80, 0.85, 0.62], everything),
+        (MOTION, [1.0, 0.25, 0.12], tips),
+    ):
+        # what is above is above
+        to_viewer = scene.side * towards
+        right = np.cross([0.0, 0.0, 1.0], to_viewer)
+        right /= np.linalg.norm(right)
+        cameras[name] = _fitted(points, right, np.cross(to_viewer / np.linalg.norm(to_viewer), right))
     x, y, z = np.eye(3)
     for name, (right, up) in {AXIAL: (-x, y), CORONAL: (-x, z), SAGITTAL: (-y, z)}.items():
         cameras[name] = _fitted(everything, right, up)
     return cameras
-
-
-def _seen_from(towards: Floats, points: Floats) -> Camera:
-    """A camera that points (n, 3) fill, with what is above in it above; `towards` is from them to the viewer."""
-    right = np.cross([0.0, 0.0, 1.0], towards)
-    right /= np.linalg.norm(right)
-    return _fitted(points, right, np.cross(towards / np.linalg.norm(towards), right))
 
 
 def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
@@ -231,22 +229,19 @@ def arrow_colours(scene: Scene) -> dict[str, str]:
 
 def heading(pictures: Pictures, name: str) -> str:
     """What stands above a picture, in two lines."""
-    scene = pictures.scene
+    scene, factor = pictures.scene, pictures.scene.exaggeration
     if name == BEFORE:
         return "before\n"
     if name == AFTER:
-        return f"after\n{_times(scene.exaggeration)}"
-    if name == MOTION:
-        if len(scene.where):
-            return f"recorded and computed\n{_times(scene.arrows)}"
-        return f"how the surface moves\n{_times(scene.exaggeration)}"
-    view = next(view for view in views.VIEWS if view.axis == CUTS[name])
-    said = views.heading(pictures.whole, view, float(scene.places[view.axis]) / MILLIMETRES)
-    return f"{said}\n{_times(scene.exaggeration)}"
-
-
-def _times(factor: float) -> str:
-    return "motion as large as it is" if factor == 1.0 else f"motion {factor:g} times as large"
+        above = "after"
+    elif name == MOTION and len(scene.where):
+        above, factor = "recorded and computed", scene.arrows
+    elif name == MOTION:
+        above = "how the surface moves"
+    else:
+        view = next(view for view in views.VIEWS if view.axis == CUTS[name])
+        above = views.heading(pictures.whole, view, float(scene.places[view.axis]) / MILLIMETRES)
+    return f"{above}\n" + ("motion as large as it is" if factor == 1.0 else f"motion {factor:g} times as large")
 
 
 @dataclass(frozen=True)

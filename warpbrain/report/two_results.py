@@ -92,10 +92,6 @@ class SavedResult:
             by_name[f"{one['tissue']}, {one['name']}{more}"] = Quantity(one[key], one["unit"], (low, high))
         return by_name
 
-    def verdict(self) -> tuple[str, str]:
-        """What a diagnosis says, in a word and in a sentence; empty for other results."""
-        return str(self.said.get("verdict", "")), str(self.said.get("sentence", ""))
-
 
 def read_result(folder: Path) -> SavedResult:
     """Open a folder of results.
@@ -177,25 +173,24 @@ def difference(first: SavedState, second: SavedState) -> Difference:
         there = location.interpolate(second.u)
     if not inside.any():
         raise InputError(f"{first.path} and {second.path}: the bodies are nowhere in one place")
+    weights = mesh.node_volumes * inside
+
+    def root_mean_square(u: Floats) -> float:
+        return MILLIMETRES * float(np.sqrt((weights * np.linalg.norm(u, axis=1) ** 2).sum() / weights.sum()))
+
     apart = np.linalg.norm(there - first.u, axis=1)
     worst = int(np.flatnonzero(inside)[apart[inside].argmax()])
-    weights = mesh.node_volumes * inside
     x, y, z = (MILLIMETRES * mesh.points[worst]).tolist()
     return Difference(
-        _mean_square(apart, weights),
-        MILLIMETRES * float(apart[worst]),
-        (x, y, z),
-        _mean_square(np.linalg.norm(first.u, axis=1), weights),
-        _mean_square(np.linalg.norm(there, axis=1), weights),
-        int(np.count_nonzero(inside)),
-        int(np.count_nonzero(~inside)),
-        same,
+        root_mean_square_mm=root_mean_square(there - first.u),
+        largest_mm=MILLIMETRES * float(apart[worst]),
+        at_mm=(x, y, z),
+        first_mm=root_mean_square(first.u),
+        second_mm=root_mean_square(there),
+        nodes=int(np.count_nonzero(inside)),
+        outside=int(np.count_nonzero(~inside)),
+        same_mesh=same,
     )
-
-
-def _mean_square(lengths: Floats, weights: Floats) -> float:
-    """Root mean square [mm] of lengths [m]."""
-    return MILLIMETRES * float(np.sqrt((weights * lengths**2).sum() / weights.sum()))
 
 
 def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
@@ -209,8 +204,8 @@ def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
         "rmse": _pairs(first.errors(), second.errors()),
         "displacement": asdict(difference(first.state, second.state)) if bodies else None,  # type: ignore[arg-type]
         "tissue": _pairs(first.tissue(), second.tissue()),
-        "verdict": [first.verdict()[0] or None, second.verdict()[0] or None],
-        "sentence": [first.verdict()[1] or None, second.verdict()[1] or None],
+        # of a diagnosis, in a word and in a sentence
+        **{key: [result.said.get(key) or None for result in (first, second)] for key in ("verdict", "sentence")},
     }
 
 

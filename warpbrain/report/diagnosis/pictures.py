@@ -10,6 +10,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.inference.probability import percent
 from warpbrain.physics.words import length, number
 from warpbrain.report import views
 from warpbrain.report.diagnosis.description import STATES
@@ -271,7 +272,7 @@ def confusion_figure(rows: dict[str, dict[str, float]]) -> str:
         "imitates: near 100 these data cannot tell the two apart, however large the effect is."
     )
     pairs = [(part, kind, other) for kind, row in rows.items() for other, part in row.items()]
-    most = ", ".join(f"{kind} by {other} {100.0 * part:.0f} %" for part, kind, other in sorted(pairs, reverse=True)[:4])
+    most = ", ".join(f"{kind} by {other} {percent(part)}" for part, kind, other in sorted(pairs, reverse=True)[:4])
     return inlined(draw, f"How much of each mechanism others imitate; most: {most}.", caption)
 
 
