@@ -15,7 +15,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
-from warpbrain.report.files import MILLIMETRES, write_csv
+from warpbrain.report.files import MILLIMETRES, picked, write_csv
 from warpbrain.simulation.mesh_error import MeshError
 from warpbrain.simulation.observation import Observed
 
@@ -57,9 +57,7 @@ def _describe(comparison: Comparison) -> dict[str, Any]:
         return sizes if value.legacy is None else {**sizes, "legacy_sqrt_mm": value.legacy}
 
     described = {
-        "name": comparison.name,
-        "kind": comparison.kind,
-        "role": comparison.role,
+        **picked(comparison, "name", "kind", "role"),
         "unit": unit,
         "count": comparison.count,
         "before": error(comparison.before),

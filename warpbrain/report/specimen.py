@@ -16,7 +16,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.report import views
-from warpbrain.report.files import MILLIMETRES, write_csv
+from warpbrain.report.files import MILLIMETRES, picked, write_csv
 from warpbrain.report.summary import describe_case, elements_lines, sentence_lines, tissue_lines
 from warpbrain.report.views import BLACK, BLUE, VERMILLION
 from warpbrain.simulation.locking import largest_poisson, locking_sentences
@@ -113,9 +113,7 @@ def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
         (factor, unit), (scale, answer_unit) = SHOWN[what], SHOWN[answer]
         described.append(
             {
-                "name": recording.name,
-                "mode": recording.mode,
-                "role": recording.role,
+                **picked(recording, "name", "mode", "role"),
                 "rows": len(recording.imposed),
                 **({} if result.time is None else {"time_s": result.time}),
                 "imposed": {"quantity": what, "unit": unit, "values": factor * result.imposed},
