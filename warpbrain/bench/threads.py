@@ -55,14 +55,14 @@ def main(arguments: Sequence[str]) -> int:
 def _bench(options: argparse.Namespace) -> None:
     if options.row not in TABLE3:
         raise InputError(f"--row {options.row}: expected one of {', '.join(TABLE3)}")
-    said = options.counts
+    listed = options.counts
     counts = (
         [n for n in COUNTS if n <= processors()]
-        if said is None
-        else [int(n) if n.strip().isdecimal() else 0 for n in said.split(",")]
+        if listed is None
+        else [int(n) if n.strip().isdecimal() else 0 for n in listed.split(",")]
     )
     if not counts or not all(0 < n <= MOST for n in counts):
-        raise InputError(f"--counts {said}: expected whole numbers from 1 to {MOST}, with commas between them")
+        raise InputError(f"--counts {listed}: expected whole numbers from 1 to {MOST}, with commas between them")
 
     if options.json is not None:
         check_writable(options.json)

@@ -70,13 +70,13 @@ def _describe(comparison: Comparison) -> dict[str, Any]:
     return described
 
 
-def comparison_lines(said: Mapping[str, Any], legacy: bool) -> list[str]:
+def comparison_lines(summary: Mapping[str, Any], legacy: bool) -> list[str]:
     """The table of errors, as printed."""
     lines = []
-    if said["compared"]:
+    if summary["compared"]:
         more = "   legacy before    after [sqrt(mm)]" if legacy else ""
         lines.append(f"RMSE at recordings       count   before    after    noise{more}")
-    for entry in said["compared"]:
+    for entry in summary["compared"]:
         noise, role = entry["noise_root_mean_square"], "   check" if entry["role"] == "check" else ""
         ways = [(entry["name"], entry["count"], "before", "after", "" if noise is None else f"{noise:.3f}")]
         if "mesh_to_recording_before" in entry:
@@ -90,10 +90,10 @@ def comparison_lines(said: Mapping[str, Any], legacy: bool) -> list[str]:
             if legacy and "legacy_sqrt_mm" in entry[before]:
                 line += f" {entry[before]['legacy_sqrt_mm']:>13.3f} {entry[after]['legacy_sqrt_mm']:>8.3f}"
             lines.append(line + role)
-    if said["compared"]:
+    if summary["compared"]:
         lines.append("  before: nothing moved; after: this simulation; noise: what the stated noise alone would leave")
-        lines += [f"  {sentence}" for sentence in said["in_words"]]
-    return lines + [f"  not compared: {reason}" for reason in said["not_compared"]]
+        lines += [f"  {sentence}" for sentence in summary["in_words"]]
+    return lines + [f"  not compared: {reason}" for reason in summary["not_compared"]]
 
 
 def write_comparisons(path: Path, case: Case, observed: Observed) -> None:
@@ -233,27 +233,27 @@ def _sizes(vectors: Floats, factor: float) -> dict[str, float]:
     return {"median": float(np.median(lengths)), "percentile_95": high, "largest": float(lengths.max())}
 
 
-def mesh_error_lines(said: Mapping[str, Any]) -> list[str]:
+def mesh_error_lines(summary: Mapping[str, Any]) -> list[str]:
     """The estimate, as printed."""
-    if "unknown" in said:
-        return [f"error of the mesh: not known: {said['unknown']}"]
+    if "unknown" in summary:
+        return [f"error of the mesh: not known: {summary['unknown']}"]
 
     def row(name: str, sizes: Mapping[str, float]) -> str:
         return f"  {name:<24} {sizes['median']:>8.3f} {sizes['percentile_95']:>8.3f} {sizes['largest']:>8.3f}"
 
     titles = {"all nodes": "displacement_mm", "locking": "locking_mm", "element size": "element_size_mm"}
     lines = ["error of the mesh, estimated  median     95 %      max"]
-    lines += [f"{row(title, said[key])} mm" for title, key in titles.items() if said[key] is not None]
-    for entry in said["recordings"]:
+    lines += [f"{row(title, summary[key])} mm" for title, key in titles.items() if summary[key] is not None]
+    for entry in summary["recordings"]:
         lines.append(
             f"{row(entry['name'], entry)} {entry['unit']}; RMSE {entry['root_mean_square_after']:.3f}, "
             f"without it {entry['root_mean_square_without_it']:.3f}"
         )
-    share = said["locking_share"]
+    share = summary["locking_share"]
     if share is not None and share > 1.0:
         lines.append(
             "  elements that do not lock move too far on this mesh: all of it may be locking, but not what they say"
         )
     elif share is not None:
         lines.append(f"  {100.0 * share:.0f} % of it is likely to be locking, the rest the size of elements")
-    return [*lines, f"  {said['how']}"]
+    return [*lines, f"  {summary['how']}"]

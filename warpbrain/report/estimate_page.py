@@ -45,27 +45,27 @@ def moved_of(posterior: Posterior) -> Moved:
     return Moved(*np.split(np.concatenate([np.zeros((0, 9)), *points]), 3, axis=1))
 
 
-def judged_of(said: Mapping[str, Any]) -> Explained:
+def judged_of(summary: Mapping[str, Any]) -> Explained:
     """Whether an estimate explains its recordings better than no motion at all."""
     entries = [
         {**one, "before": one["root_mean_square_before"], "after": one["root_mean_square_after"]}
-        for one in said["predictions"]
+        for one in summary["predictions"]
     ]
     return explained(entries, "this estimate")
 
 
 def write_estimate_page(
-    path: Path, said: Mapping[str, Any], posterior: Posterior, state: SavedState, pictures: Pictures | str
+    path: Path, summary: Mapping[str, Any], posterior: Posterior, state: SavedState, pictures: Pictures | str
 ) -> None:
     """Write the page.
 
-    `said` is what `estimate.json` holds, `state` the most probable one, with what is not known of it; without pictures
-    it is said why there are none.
+    `summary` is what `estimate.json` holds, `state` the most probable one, with what is not known of it; without
+    pictures it is said why there are none.
     """
-    case, judged, nothing = said["case"], judged_of(said), said["nothing_else"]
+    case, judged, nothing = summary["case"], judged_of(summary), summary["nothing_else"]
     whole = posterior.case.mesh
     places = views.places(whole)
-    names = ", ".join(_name(one) for one in said["parameters"])
+    names = ", ".join(_name(one) for one in summary["parameters"])
     agreement = Markup()
     if any(one.kind != "surface" for one in posterior.predictions):
         words = "Every component that was recorded beside what the estimate makes of it; on the line they agree."
@@ -74,8 +74,8 @@ def write_estimate_page(
         )
     causes = [] if nothing is None else [one for one in nothing["causes"] if one["probability"] >= _LIKELY]
     sections = sections_of(
-        "estimate.html", said=said, agreement=agreement,
-        tissue=[_parameter(one) for one in said["parameters"]],
+        "estimate.html", summary=summary, agreement=agreement,
+        tissue=[_parameter(one) for one in summary["parameters"]],
         tied=correlated(posterior), checks=checks(posterior),
         densities=inlined(
             lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
@@ -85,24 +85,24 @@ def write_estimate_page(
         averaged=[] if nothing is None else [
             [_name(one), f"{one['middle']:.4g}", _interval(one), _unit(one)] for one in nothing["tissue"]
         ],
-        recorded=[_recorded(one) for one in said["predictions"]],
+        recorded=[_recorded(one) for one in summary["predictions"]],
         pictures=before_and_after(pictures),
         known=known_displacement(state, whole, places, _KNOWN),
         view=body_view(state.mesh, state.u, fields_of(state), moved_of(posterior), places),
         left_out=left_out(model_of(posterior.case)),
-        seconds=[[name, f"{value:.1f}"] for name, value in said["seconds"].items()],
-        files=[[name, Markup("<code>{}</code>").format(value)] for name, value in said["inputs_sha256"].items()],
+        seconds=[[name, f"{value:.1f}"] for name, value in summary["seconds"].items()],
+        files=[[name, Markup("<code>{}</code>").format(value)] for name, value in summary["inputs_sha256"].items()],
     )  # fmt: skip
     facts = [
         (_name(one), f"{one['estimate']:.4g} Pa ({_interval(one)})")
-        for one in said["parameters"]
+        for one in summary["parameters"]
         if one["unit"] == "Pa"
     ]
     if judged.before is not None:
         facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
     if nothing is not None:
         facts.append(("probability that nothing else acts", percent(nothing["probability"])))
-    sentences = [*said["identifiability"]["sentences"], *judged.sentences]
+    sentences = [*summary["identifiability"]["sentences"], *judged.sentences]
     top = Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts)
     write_document(path, document(f"{case['name']}: tissue of {case['title']}", top, sections))
 

@@ -40,8 +40,8 @@ def html(what: Any) -> str:
     """
     title, rows = _told(what)
     body = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(said)}</td></tr>'
-        for name, said in rows
+        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(value)}</td></tr>'
+        for name, value in rows
     )
     return f"<div><strong>{escape(title)}</strong><table>{body}</table></div>"
 

@@ -299,6 +299,6 @@ def show(panel: Any, image: Any, notes: Annotations) -> None:
         panel.text(x, y, letter, fontsize=10, color="#6a6a6a", va="center", ha="center")
     for x, y, to_x, to_y in notes.lines:
         panel.plot([x, to_x], [y, to_y], color="#6a6a6a", linewidth=1.2)
-    left, low, length, said = notes.bar
+    left, low, length, words = notes.bar
     panel.plot([left, left + length], [low, low], color="#333333", linewidth=2.0)
-    panel.text(left + 0.5 * length, low + 0.03 * notes.high, said, fontsize=8, ha="center", color="#333333")
+    panel.text(left + 0.5 * length, low + 0.03 * notes.high, words, fontsize=8, ha="center", color="#333333")

@@ -50,7 +50,7 @@ def write_run_page(
     `summary` is what `summary.json` holds, `whole` the anatomy before anything was resected; without pictures it is
     said why there are none.
     """
-    case, said, solution = summary["case"], summary["result"], summary["solution"]
+    case, described, solution = summary["case"], summary["result"], summary["solution"]
     judged = explained_of(summary["recordings"]["compared"])
     fields = [
         Field(
@@ -65,7 +65,7 @@ def write_run_page(
     if "relative_residual" in solution:
         residual = f"{solution['relative_residual']:.1e} (goal {solution['tolerance']:.0e})"
         solved.append(f"relative out-of-balance force {residual}")
-    largest = said["displacement_mm"]["all nodes"]["largest"]
+    largest = described["displacement_mm"]["all nodes"]["largest"]
     facts = [("largest displacement", f"{largest:.3g} mm")]
     if judged.before is not None:
         facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
@@ -77,7 +77,7 @@ def write_run_page(
         displacements=[
             [SET_TITLES.get(name, name), s["nodes"]]
             + [f"{s[key]:.3f}" for key in ("mean", "root_mean_square", "percentile_95", "largest")]
-            for name, s in said["displacement_mm"].items()
+            for name, s in described["displacement_mm"].items()
         ],
         mesh_error=mesh_error_lines(summary["mesh_error"]) if "mesh_error" in summary else [],
         solution=solved,

@@ -84,18 +84,18 @@ def describe_specimen(
     }
 
 
-def specimen_lines(said: Mapping[str, Any]) -> list[str]:
+def specimen_lines(summary: Mapping[str, Any]) -> list[str]:
     """The specimen and its assumptions, as printed."""
-    specimen = said["specimen"]
+    specimen = summary["specimen"]
     lines = [
-        said["title"],
-        f"  specimen  {_size(specimen)}, {said['volume_cm3']:.3g} cm3; ends {specimen['grips']}",
-        f"  mesh      {said['nodes']} nodes, {said['tetrahedra']} tetrahedra"
+        summary["title"],
+        f"  specimen  {_size(specimen)}, {summary['volume_cm3']:.3g} cm3; ends {specimen['grips']}",
+        f"  mesh      {summary['nodes']} nodes, {summary['tetrahedra']} tetrahedra"
         if specimen["grips"] == "glued"
         else "  mesh      one element: the state is homogeneous",
-        *(elements_lines(said) if specimen["grips"] == "glued" else []),
+        *(elements_lines(summary) if specimen["grips"] == "glued" else []),
     ]
-    return lines + tissue_lines(said) + sentence_lines(said)
+    return lines + tissue_lines(summary) + sentence_lines(summary)
 
 
 def _size(specimen: Mapping[str, Any]) -> str:

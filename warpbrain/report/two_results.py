@@ -38,20 +38,20 @@ class SavedResult:
 
     folder: Path
     command: str
-    said: Mapping[str, Any]
+    summary: Mapping[str, Any]
     state: SavedState | None
 
     def inputs(self) -> dict[str, str]:
         """What it was made from and how, as text by name."""
-        said = self.said
+        summary = self.summary
         found = {"command": self.command}
-        found |= {f"sha256 of {name}": digest[:16] for name, digest in (said.get("inputs_sha256") or {}).items()}
+        found |= {f"sha256 of {name}": digest[:16] for name, digest in (summary.get("inputs_sha256") or {}).items()}
         for part in ("case", *_INPUTS):
-            value = said.get(part)
+            value = summary.get(part)
             if isinstance(value, dict):
                 value = {key: item for key, item in value.items() if key not in _NO_INPUT and "iterations" not in key}
             found |= dict(_flat(part, value))
-        return found | dict(_flat("version of", said.get("versions", {})))
+        return found | dict(_flat("version of", summary.get("versions", {})))
 
     def errors(self) -> dict[str, Quantity]:
         """Root mean square differences from what was recorded, by what they are of."""
@@ -61,16 +61,16 @@ class SavedResult:
             by_name[f"{name}, nothing moved"] = Quantity(before, unit)
             by_name[name] = Quantity(after, unit, interval)
 
-        for one in (self.said.get("recordings") or {}).get("compared", []):
+        for one in (self.summary.get("recordings") or {}).get("compared", []):
             add(one["name"], one["unit"], one["before"]["root_mean_square"], one["after"]["root_mean_square"])
-        for one in self.said.get("predictions", []):
+        for one in self.summary.get("predictions", []):
             add(one["name"], one["unit"], one["root_mean_square_before"], one["root_mean_square_of_run"])
             by_name[f"{one['name']}, moved back"] = Quantity(one["root_mean_square_after"], one["unit"])
-        for name, one in ((self.said.get("result") or {}).get("rmse_at_recordings") or {}).items():
+        for name, one in ((self.summary.get("result") or {}).get("rmse_at_recordings") or {}).items():
             after = one["after"]
             add(name, one["unit"], one["before"], after["p50"], (after["p05"], after["p95"]))
         for kind, where in (("rmse_m", "all fitted"), ("heldout_rmse_m", "held out"), ("check_rmse_m", "check")):
-            for stage, value in ((self.said.get("fit") or {}).get(kind) or {}).items():
+            for stage, value in ((self.summary.get("fit") or {}).get(kind) or {}).items():
                 if value is not None:
                     by_name[f"{where}, {stage}"] = Quantity(MILLIMETRES * value, "mm")
         return by_name
@@ -78,13 +78,13 @@ class SavedResult:
     def tissue(self) -> dict[str, Quantity]:
         """Parameters of the tissues, by tissue and name."""
         by_name: dict[str, Quantity] = {}
-        for one in ((self.said.get("case") or {}).get("tissues") or {}).values():
+        for one in ((self.summary.get("case") or {}).get("tissues") or {}).values():
             by_name[f"{one['name']}, shear modulus"] = Quantity(one["shear_modulus_Pa"], "Pa")
         estimated = [
-            *((one, "estimate", "") for one in self.said.get("parameters") or [] if self.command == "estimate"),
+            *((one, "estimate", "") for one in self.summary.get("parameters") or [] if self.command == "estimate"),
             *(
                 (one, "middle", ", over what may act")
-                for one in (self.said.get("nothing_else") or {}).get("tissue") or []
+                for one in (self.summary.get("nothing_else") or {}).get("tissue") or []
             ),
         ]
         for one, key, more in estimated:
@@ -107,14 +107,14 @@ def read_result(folder: Path) -> SavedResult:
     if name is None:
         raise InputError(f"{folder}: found none of {', '.join(_KINDS)}: it is no folder of results")
     try:
-        said = json.loads((folder / name).read_text(encoding="utf-8"))
+        summary = json.loads((folder / name).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{folder / name}: cannot be read: {' '.join(str(error).split())}") from None
-    if not isinstance(said, dict) or not isinstance(said.get("case"), dict):
+    if not isinstance(summary, dict) or not isinstance(summary.get("case"), dict):
         raise InputError(f"{folder / name}: is no summary of a result")
     command = "ensemble" if (folder / "ensemble.json").is_file() and name == "summary.json" else _KINDS[name]
     with_body = any((folder / file).is_file() for file in FILES)
-    return SavedResult(folder, command, said, read_state(folder) if with_body else None)
+    return SavedResult(folder, command, summary, read_state(folder) if with_body else None)
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, str]]:
@@ -205,7 +205,7 @@ def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
         "displacement": asdict(difference(first.state, second.state)) if bodies else None,  # type: ignore[arg-type]
         "tissue": _pairs(first.tissue(), second.tissue()),
         # of a diagnosis, in a word and in a sentence
-        **{key: [result.said.get(key) or None for result in (first, second)] for key in ("verdict", "sentence")},
+        **{key: [result.summary.get(key) or None for result in (first, second)] for key in ("verdict", "sentence")},
     }
 
 
@@ -221,10 +221,10 @@ def _pairs(one: dict[str, Quantity], two: dict[str, Quantity]) -> dict[str, Any]
     return pairs
 
 
-def two_lines(said: dict[str, Any]) -> list[str]:
+def two_lines(summary: dict[str, Any]) -> list[str]:
     """What is printed."""
-    lines = [f"A  {said['folders'][0]}", f"B  {said['folders'][1]}", ""]
-    differ = said["inputs_that_differ"]
+    lines = [f"A  {summary['folders'][0]}", f"B  {summary['folders'][1]}", ""]
+    differ = summary["inputs_that_differ"]
     if differ:
         lines.append("inputs that differ")
         for name, both in differ.items():
@@ -232,9 +232,9 @@ def two_lines(said: dict[str, Any]) -> list[str]:
             lines += [f"  {name}", *(f"    {letter}  {value}" for letter, value in zip("AB", values, strict=True))]
     else:
         lines.append("inputs that differ: none")
-    if said["rmse"]:
-        lines += ["", f"{'RMSE at recordings':<44}{'A':>22}{'B':>22}", *_table(said["rmse"])]
-    apart = said["displacement"]
+    if summary["rmse"]:
+        lines += ["", f"{'RMSE at recordings':<44}{'A':>22}{'B':>22}", *_table(summary["rmse"])]
+    apart = summary["displacement"]
     if apart is not None:
         at = ", ".join(f"{x:.0f}" for x in apart["at_mm"])
         body = "on the same mesh" if apart["same_mesh"] else f"at {apart['nodes']} nodes of A that are in B"
@@ -247,11 +247,11 @@ def two_lines(said: dict[str, Any]) -> list[str]:
         ]
         if apart["outside"]:
             lines.append(f"  {apart['outside']} nodes of A are outside of B and not compared")
-    if said["tissue"]:
-        lines += ["", f"{'tissue (95 % interval)':<44}{'A':>22}{'B':>22}", *_table(said["tissue"])]
-    if any(said["verdict"]):
+    if summary["tissue"]:
+        lines += ["", f"{'tissue (95 % interval)':<44}{'A':>22}{'B':>22}", *_table(summary["tissue"])]
+    if any(summary["verdict"]):
         lines += ["", "verdict"]
-        for letter, verdict, sentence in zip("AB", said["verdict"], said["sentence"], strict=True):
+        for letter, verdict, sentence in zip("AB", summary["verdict"], summary["sentence"], strict=True):
             lines.append(f"  {letter}  {'none: no diagnosis' if verdict is None else f'{verdict}: {sentence}'}")
     return lines
 

@@ -126,8 +126,8 @@ def write_warped(
         files += write_moved(folder, moved)
     image_after, labels_after = (None if each is None else _after(each.path) for each in (asked.image, asked.labels))
     files += write_slicer_scene(folder, state, asked.image, image_after, labels_after, asked.points, files)
-    said = [*_lines(asked, field, inside, back, moved), *_partly_outside(asked, state.mesh), *_trust_lines(state)]
-    return said, files
+    lines = [*_lines(asked, field, inside, back, moved), *_partly_outside(asked, state.mesh), *_trust_lines(state)]
+    return lines, files
 
 
 def in_the_way(folder: Path, asked: Asked) -> list[str]:
