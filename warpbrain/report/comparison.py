@@ -254,6 +254,6 @@ def mesh_error_lines(summary: Mapping[str, Any]) -> list[str]:
         lines.append(
             "  elements that do not lock move too far on this mesh: all of it may be locking, but not what they say"
         )
-    elif share is not None:
+    elif share is not None and not math.isnan(share):
         lines.append(f"  {100.0 * share:.0f} % of it is likely to be locking, the rest the size of elements")
     return [*lines, f"  {summary['how']}"]

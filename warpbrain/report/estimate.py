@@ -30,20 +30,13 @@ _METHODS = {"laplace": "Laplace's approximation", "chain": "a Markov chain"}
 def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissue | None = None) -> dict[str, Any]:
     """Everything that is known of an estimate, with units in keys or beside the values; docs/estimation.md."""
     prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
-    identifiability, check, chain, best = (
-        posterior.identifiability,
-        posterior.importance,
-        posterior.chain,
-        posterior.best,
-    )
+    check, chain, best, known = posterior.importance, posterior.chain, posterior.best, posterior.identifiability
     noise, laplace = best.point.noise, best.laplace
     return {
         "case": picked(case, "name", "title", "origin", "assumptions"),
         "inputs_sha256": fingerprints(case),
         "identifiability": {
-            **picked(
-                identifiability, "nothing", "sentences", "informed", "weakly_informed", "hidden", "scale_is_hidden"
-            ),
+            **picked(known, "nothing", "sentences", "informed", "weakly_informed", "hidden", "scale_is_hidden"),
             "directions": [
                 {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": told, "undone": undone}
                 for gain, told, undone in zip(
