@@ -11,7 +11,7 @@ import numpy as np
 
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
-from warpbrain.estimation.prediction import INTERVALS, Prediction
+from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
 from warpbrain.estimation.registration import registration_of
 from warpbrain.inference.probability import percent
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
@@ -32,17 +32,21 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
     check, chain, best, known = posterior.importance, posterior.chain, posterior.best, posterior.identifiability
     noise, laplace = best.point.noise, best.laplace
+    each = zip(laplace.gains.tolist(), laplace.combinations, laplace.directions, strict=True)
+    directions = [
+        {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": told, "undone": undone}
+        for gain, told, undone in each
+    ]
+    drawn = None
+    if chain is not None:
+        numbers = picked(chain, equilibria="solves", accepted="accepted", effective_draws="effective")
+        drawn = {"draws": len(chain.theta), **numbers}
     return {
         "case": picked(case, "name", "title", "origin", "assumptions"),
         "inputs_sha256": fingerprints(case),
         "identifiability": {
             **picked(known, "nothing", "sentences", "informed", "weakly_informed", "hidden", "scale_is_hidden"),
-            "directions": [
-                {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": told, "undone": undone}
-                for gain, told, undone in zip(
-                    laplace.gains.tolist(), laplace.combinations, laplace.directions, strict=True
-                )
-            ],
+            "directions": directions,
         },
         "parameters": [_describe(marginal, posterior) for marginal in posterior.marginals],
         "nothing_else": None if averaged is None else _describe_nothing_else(averaged),
@@ -56,27 +60,13 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             **picked(check, standard_deviation="standard_deviations"),
             "doubts": posterior.doubts,
         },
-        "chain": None
-        if chain is None
-        else {
-            "draws": len(chain.theta),
-            **picked(chain, equilibria="solves", accepted="accepted", effective_draws="effective"),
-        },
+        "chain": drawn,
         "modes": [
             {"theta": mode.theta, "probability": probability, "share_of_prior": mode.problem.mode.share}
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
         ],
         "predictions": [_describe_prediction(prediction) for prediction in posterior.predictions],
-        "all_recordings": [
-            {
-                **picked(one, "role", "count"),
-                **{
-                    f"root_mean_square_{key}_mm": MILLIMETRES * getattr(one, key)
-                    for key in ("before", "after", "of_run")
-                },
-            }
-            for one in posterior.overall_errors
-        ],
+        "all_recordings": [picked(one, "role", "count") | _errors_mm(one) for one in posterior.overall_errors],
         "likelihood": {
             "density": "normal, shared by neighbours" + ("" if noise.outliers is None else ", with gross errors"),
             "degrees_of_freedom": None,
@@ -100,6 +90,10 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
         "device": device,
         "versions": machine(),
     }
+
+
+def _errors_mm(one: OverallErrors) -> dict[str, float]:
+    return {f"root_mean_square_{key}_mm": MILLIMETRES * getattr(one, key) for key in ("before", "after", "of_run")}
 
 
 def _describe(marginal: Marginal, posterior: Posterior) -> dict[str, Any]:
