@@ -79,9 +79,19 @@ def _bench(options: argparse.Namespace) -> None:
         command.write(options.json, {"versions": versions, "host": where, "rows": [_json(r) for r in results]})
 
 
-def _lines(measured: Any) -> list[str]:
+def _columns(measured: Any) -> dict[str, tuple[list[float], tuple[float, float | None]]]:
+    """Samples beside the paper's mean and sd [ms], by what they are of."""
     from warpbrain.bench.table3 import MAIN_LOOP
 
+    row = measured.row
+    return {
+        "pre-processing": (measured.preprocessing, (row.preprocessing, None)),
+        **{name: (samples, row.phases[name]) for name, samples in measured.phases.items()},
+        "step without instruments": (measured.step, row.phases[MAIN_LOOP]),
+    }
+
+
+def _lines(measured: Any) -> list[str]:
     row = measured.row
     cg = statistics.median(measured.cg_iterations)
     lines = [
@@ -90,18 +100,13 @@ def _lines(measured: Any) -> list[str]:
         f"{cg:g} CG iterations (median)",
         f"  {'':<28}{'warpbrain':>18}{'paper':>18}{'x faster':>10}",
     ]
-
-    def line(label: str, samples: list[float], paper: tuple[float, float | None]) -> str:
-        mean, sd = statistics.fmean(samples), statistics.pstdev(samples)
-        theirs = f"{paper[0]:.2f}" + ("" if paper[1] is None else f" ({paper[1]:.1f})")
-        return f"  {label:<28}{f'{mean:.3f} ({sd:.3f})':>18}{theirs:>18}{paper[0] / mean:>10.1f}"
-
     # a body's first step is replayed once it is captured: both stand between a mesh in memory and that step
     both = [made + captured for made, captured in zip(measured.preprocessing, measured.capture, strict=True)]
-    lines.append(line("pre-processing", measured.preprocessing, (row.preprocessing, None)))
-    lines.append(line("and capture of the step", both, (row.preprocessing, None)))
-    lines += [line(name, samples, row.phases[name]) for name, samples in measured.phases.items()]
-    lines.append(line("step without instruments", measured.step, row.phases[MAIN_LOOP]))
+    first, *others = _columns(measured).items()
+    for label, (samples, paper) in (first, ("and capture of the step", (both, first[1][1])), *others):
+        mean, sd = statistics.fmean(samples), statistics.pstdev(samples)
+        theirs = f"{paper[0]:.2f}" + ("" if paper[1] is None else f" ({paper[1]:.1f})")
+        lines.append(f"  {label:<28}{f'{mean:.3f} ({sd:.3f})':>18}{theirs:>18}{paper[0] / mean:>10.1f}")
     median = statistics.median(measured.step)
     bandwidth = measured.bytes_per_step / median / 1e6
     each = 1000.0 * median / measured.launches_per_step
@@ -114,31 +119,16 @@ def _lines(measured: Any) -> list[str]:
 
 def _table(results: list[Any]) -> list[str]:
     """The paper's table again: a line for each row, each cell our mean (sd) | the paper's mean = how often faster."""
-    from warpbrain.bench.table3 import MAIN_LOOP
-
-    heads = {
-        "pre-processing": "pre-processing",
-        **{name: name for name in results[0].phases},
-        "step": "without instruments",
-    }
-    lines = [
-        f"{'row':<10} {'nodes':>6} {'tets':>6} {'CG':>5}  "
-        + "  ".join(f"{head:<30}" for head in heads.values()).rstrip()
-    ]
+    heads = (f"{label.removeprefix('step '):<30}" for label in _columns(results[0]))
+    lines = [f"{'row':<10} {'nodes':>6} {'tets':>6} {'CG':>5}  " + "  ".join(heads).rstrip()]
     for measured in results:
-        row = measured.row
-        columns = [(measured.preprocessing, row.preprocessing)]
-        columns += [(samples, row.phases[name][0]) for name, samples in measured.phases.items()]
-        columns.append((measured.step, row.phases[MAIN_LOOP][0]))
         cells = []
-        for samples, paper in columns:
+        for samples, (paper, _) in _columns(measured).values():
             mean = statistics.fmean(samples)
-            cell = f"{mean:.3g} ({statistics.pstdev(samples):.2g}) | {paper:g} = {paper / mean:.3g}x"
-            cells.append(f"{cell:<30}")
+            cells.append(f"{mean:.3g} ({statistics.pstdev(samples):.2g}) | {paper:g} = {paper / mean:.3g}x".ljust(30))
         cg = statistics.median(measured.cg_iterations)
-        lines.append(
-            f"{row.name:<10} {measured.nodes:>6} {measured.tetrahedra:>6} {cg:>5g}  " + "  ".join(cells).rstrip()
-        )
+        sizes = f"{measured.row.name:<10} {measured.nodes:>6} {measured.tetrahedra:>6} {cg:>5g}  "
+        lines.append(sizes + "  ".join(cells).rstrip())
     return lines
 
 
