@@ -29,7 +29,7 @@ from warpbrain.cases.assuming import assume
 from warpbrain.cases.shipped import find_case
 from warpbrain.physics.mechanisms import mechanisms
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[1] / "docs"
 PAGES, FIGURES = DOCS / "mechanisms", DOCS / "figures"
 EFFECTS = read_effects(PAGES / "effects.json")
 COSTS = read_costs(sorted((DOCS.parent / "bench" / "results").glob("mechanisms_*.json")))
