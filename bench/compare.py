@@ -16,7 +16,7 @@ from typing import Any
 
 from process import whole_process
 
-from warpbrain.bench.host import host
+from warpbrain.bench.command import host
 
 HERE = Path(__file__).parent
 REPEATS = 3

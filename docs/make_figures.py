@@ -11,10 +11,7 @@ from pathlib import Path
 from PIL import Image
 
 from warpbrain.gp.trained import trained
-from warpbrain.report.generative.draws_picture import draw_draws
-from warpbrain.report.generative.extrapolation_picture import draw_extrapolation
-from warpbrain.report.generative.page import save
-from warpbrain.report.generative.studies_picture import draw_studies
+from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
 
 FIGURES = Path(__file__).parent / "figures"
 #: Pictures of runs, of ensembles and of cases, by file.

@@ -12,20 +12,29 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.colors import to_rgb
+from mechanism_pages import (
+    Effect,
+    digest_of,
+    index,
+    made_from,
+    page,
+    pairs_page,
+    pairs_table,
+    read_costs,
+    read_effects,
+    table,
+    write_effects,
+)
+from mechanism_picture import INKS, write_picture
 from numpy.typing import NDArray
 from PIL import Image
 
+from warpbrain.bench.mechanisms import BASE
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import read_costs, table
-from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
-from warpbrain.report.mechanisms.index import index
-from warpbrain.report.mechanisms.page import page
-from warpbrain.report.mechanisms.pairs import pairs_page, pairs_table
-from warpbrain.report.mechanisms.picture import INKS, write_picture
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of

@@ -14,7 +14,7 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.cli import main
-from warpbrain.report.rendering.scene import NAMES
+from warpbrain.report.rendering import NAMES
 
 
 @contextmanager
@@ -30,7 +30,7 @@ def white(_scene: object, _cameras: object, size: tuple[int, int]) -> dict[str, 
     return {name: np.full((size[1], size[0], 3), 255, np.uint8) for name in NAMES}
 
 
-def _saved(_figure: object, path: Path) -> None:
+def _saved(_figure: object, path: Path, *_title: object, **_options: object) -> None:
     with whole_file(path) as scratch:
         scratch.write_bytes(b"\x89PNG" + bytes(5000) + b"IEND\xaeB`\x82")
 

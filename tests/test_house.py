@@ -40,7 +40,6 @@ NAMED = {
     "cases/building/pipeline.py": "names of sets of a shipped mesh",
     "report/summary.py": "name of a set of a shipped mesh, in words",
     "report/views.py": "name of a set of a shipped mesh",
-    "report/mechanisms/picture.py": "name of a node set that is drawn",
     "report/files.py": "name of a field of the states that `run` writes",
 }
 

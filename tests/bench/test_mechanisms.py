@@ -6,9 +6,10 @@ import sys
 
 import pytest
 from command import Ran
+from mechanism_pages import read_costs, table
 
+from warpbrain.bench.mechanisms import PLAIN, ratio
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import PLAIN, ratio, read_costs, table
 
 
 def bench(monkeypatch, capsys, *arguments: str) -> Ran:

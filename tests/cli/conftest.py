@@ -29,6 +29,6 @@ def _pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(views, "save", _not_drawn)
 
 
-def _not_drawn(figure: object, path: Path) -> None:
+def _not_drawn(figure: object, path: Path, *_title: object, **_options: object) -> None:
     assert figure is not None
     path.write_bytes(b"\x89PNG")

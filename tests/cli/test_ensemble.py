@@ -16,7 +16,7 @@ from command import run, warpbrain
 from folders import write_recorded
 
 from warpbrain.mesh.vtu import read_vtu
-from warpbrain.report.ensemble_text import ensemble_lines
+from warpbrain.report.ensemble import ensemble_lines
 
 GREY, WHITE = (f"hyperelastic/{anatomy}" for anatomy in ("grey matter", "white matter"))
 SOFT = ("mu = 1000.0", f'mu = 1000.0\nprior = "{GREY}"')

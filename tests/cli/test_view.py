@@ -8,8 +8,8 @@ from command import run, warpbrain
 from folders import write_folder
 
 from warpbrain.errors import InputError
+from warpbrain.report.body_sections import write_view_page
 from warpbrain.report.state_files import read_state
-from warpbrain.report.view import write_view_page
 
 
 @pytest.fixture(scope="module")

@@ -21,9 +21,9 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import LAWS
 from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording, TestRecording
-from warpbrain.report import case_body
-from warpbrain.report.case_picture import _headline, _Scene, write_case_picture
-from warpbrain.report.rendering.offscreen import RenderingError
+from warpbrain.report import case_picture
+from warpbrain.report.case_picture import _headline, _render, _Scene, write_case_picture
+from warpbrain.report.rendering import RenderingError
 from warpbrain.report.views import scale_length
 
 FIRST, SECOND, RESECTED = "#b9aea6", "#efe8df", "#d9483b"
@@ -70,7 +70,7 @@ def draw(path: Path, case: Case, capfd: pytest.CaptureFixture[str]) -> NDArray[n
 @pytest.fixture
 def picture(tmp_path, capfd, monkeypatch):
     """Draws a case and gives its pixels, of the body from outside only what is drawn over it: rendering takes long."""
-    monkeypatch.setattr(case_body, "render", lambda scene, cameras, size: dict.fromkeys(cameras, _white(size)))
+    monkeypatch.setattr(case_picture, "render", lambda scene, cameras, size: dict.fromkeys(cameras, _white(size)))
     return lambda case: draw(tmp_path / "a.png", case, capfd)
 
 
@@ -82,7 +82,7 @@ def _white(size):
 def renderer():
     """Skipped where nothing can be rendered, but not where tests must not be."""
     try:
-        case_body.render_body(case_of(tetrahedron(0.01)), np.zeros(1, dtype=bool))
+        _render(_Scene(case_of(tetrahedron(0.01))))
     except RenderingError as error:
         if os.environ.get("CI"):
             raise
@@ -145,7 +145,7 @@ def test_where_nothing_can_be_rendered(tmp_path, monkeypatch):
     def fails(scene, cameras, size):
         raise RenderingError("VTK crashed: apt-get install libegl1")
 
-    monkeypatch.setattr(case_body, "render", fails)
+    monkeypatch.setattr(case_picture, "render", fails)
     assert write_case_picture(tmp_path / "a.png", case_of(body())) == "VTK crashed: apt-get install libegl1"
     assert len(places(panel(matplotlib.image.imread(tmp_path / "a.png")[..., :3], 0, 0), FIRST)) > 5000
 

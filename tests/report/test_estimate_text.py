@@ -7,7 +7,7 @@ from synthetic import WHITE, block
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.probability import percent
-from warpbrain.report.estimate_text import averaged_lines
+from warpbrain.report.estimate import averaged_lines
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue, LikelyCause
 
 

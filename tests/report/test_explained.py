@@ -2,7 +2,7 @@
 
 import pytest
 
-from warpbrain.report.explained import IN_PART, NEARER, NO_NEARER, UNKNOWN, WORSE, explained
+from warpbrain.report.comparison import IN_PART, NEARER, NO_NEARER, UNKNOWN, WORSE, explained
 
 
 def entry(name, before, after, count=10, unit="mm"):

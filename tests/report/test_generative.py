@@ -12,10 +12,8 @@ from warpbrain.gp.hierarchical import Hierarchical
 from warpbrain.gp.literature.groups import GROUPS
 from warpbrain.gp.literature.study import Study
 from warpbrain.gp.trained import trained
-from warpbrain.report.generative import page
-from warpbrain.report.generative.draws_picture import draw_draws
-from warpbrain.report.generative.extrapolation_picture import draw_extrapolation
-from warpbrain.report.generative.studies_picture import draw_studies
+from warpbrain.report import generative_pictures as page
+from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies
 
 GREY, BRAIN = "hyperelastic/grey matter", "hyperelastic/brain"
 MODELS = {"hierarchical": ("hierarchical", "corrected"), "coregionalised": ("coregionalised", "as_published")}

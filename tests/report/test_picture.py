@@ -14,8 +14,7 @@ from shapes import box
 from warpbrain.mesh import TetMesh
 from warpbrain.report import picture
 from warpbrain.report.picture import Moved, draw, pictures_of, round_factor
-from warpbrain.report.rendering.offscreen import RenderingError
-from warpbrain.report.rendering.scene import AFTER, AXIAL, BEFORE, CORONAL, MOTION, NAMES, SAGITTAL
+from warpbrain.report.rendering import AFTER, AXIAL, BEFORE, CORONAL, MOTION, NAMES, SAGITTAL, RenderingError
 
 NO_POINTS = Moved(*np.zeros((3, 0, 3)))
 #: Edge of the block [mm].

@@ -7,8 +7,7 @@ import pytest
 
 from warpbrain.errors import InputError
 from warpbrain.estimation.sweep import SweepPoint
-from warpbrain.report.sweep import read_sweep, write_sweep
-from warpbrain.report.sweep_picture import estimated_in
+from warpbrain.report.sweep import estimated_in, read_sweep, write_sweep
 
 HEADER = ["k grey", "k white", "mu grey", "mu white", "rms [m or N]", "no equilibrium; inputs abc", "checksum"]
 POINTS = [

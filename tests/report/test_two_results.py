@@ -9,9 +9,8 @@ from folders import block, write_recorded
 from shapes import box
 
 from warpbrain.errors import InputError
-from warpbrain.report.saved_result import SavedResult, read_result
 from warpbrain.report.state_files import SavedState
-from warpbrain.report.two_results import describe_two, difference, two_lines
+from warpbrain.report.two_results import SavedResult, describe_two, difference, read_result, two_lines
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 

@@ -3,55 +3,45 @@
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
 import sys
-from pathlib import Path
+from importlib import import_module
 from typing import Any
 
-from warpbrain.bench import diagnosing, ensemble, mechanisms, threads
+from warpbrain.bench import command
 from warpbrain.errors import InputError
-from warpbrain.terminal.command import OneLineParser, exit_status
+
+#: Modules of the commands that have a name.
+_COMMANDS = {"ensemble": "batches", "diagnose": "diagnosing", "mechanisms": "mechanisms", "threads": "threads"}
+_DESCRIPTION = (
+    "Times each phase of a step on the phantom's meshes beside the paper's Table 3. "
+    "python -m warpbrain.bench ensemble times batches, mechanisms what each costs, diagnose a diagnosis, threads a "
+    "step and an equilibrium by how many cores of the CPU they have."
+)
+_OPTIONS: dict[str, command.Options] = {
+    "--device": {"metavar": "NAME", "help": "cpu, cuda:0, ... or all (default: the GPU if there is one)"},
+    "--rows": {"metavar": "ROW,...", "help": "st/coarse, st/fine, mt/coarse, mt/fine (default: all)"},
+    "--steps": {"type": int, "default": 100, "help": "samples (default: 100)"},
+    "--warmup": {"type": int, "default": 10, "help": "steps before them (default: 10)"},
+    "--tol": {"type": float, "default": 1e-6, "help": "relative tolerance of the linear solves (default: 1e-6)"},
+    "--precision": command.PRECISION,
+    "--json": command.JSON,
+}
 
 
 def main() -> int:
     """Parse, measure, print; returns the exit status."""
-    if sys.argv[1:2] == ["ensemble"]:
-        return ensemble.main(sys.argv[2:])
-    if sys.argv[1:2] == ["diagnose"]:
-        return diagnosing.main(sys.argv[2:])
-    if sys.argv[1:2] == ["mechanisms"]:
-        return mechanisms.main(sys.argv[2:])
-    if sys.argv[1:2] == ["threads"]:
-        return threads.main(sys.argv[2:])
-    parser = OneLineParser(
-        prog="python -m warpbrain.bench",
-        description="Times each phase of a step on the phantom's meshes beside the paper's Table 3. "
-        "python -m warpbrain.bench ensemble times batches, mechanisms what each costs, diagnose a diagnosis, threads a "
-        "step and an equilibrium by how many cores of the CPU they have.",
-    )
-    add = parser.add_argument
-    add("--device", default=None, metavar="NAME", help="cpu, cuda:0, ... or all (default: the GPU if there is one)")
-    add("--rows", default=None, metavar="ROW,...", help="st/coarse, st/fine, mt/coarse, mt/fine (default: all)")
-    add("--steps", type=int, default=100, help="samples (default: 100)")
-    add("--warmup", type=int, default=10, help="steps before them (default: 10)")
-    add("--tol", type=float, default=1e-6, help="relative tolerance of the linear solves (default: 1e-6)")
-    add("--precision", choices=("double", "single"), default="double", help="default: double")
-    add("--json", type=Path, metavar="FILE", help="write every sample")
-    options = parser.parse_args()
-
-    return exit_status(parser.prog, lambda: _bench(options))
+    if sys.argv[1:2] and sys.argv[1] in _COMMANDS:
+        # what only one of them needs is loaded for it alone
+        return int(import_module(f"warpbrain.bench.{_COMMANDS[sys.argv[1]]}").main(sys.argv[2:]))
+    return command.run("", _DESCRIPTION, _OPTIONS, _bench, sys.argv[1:])
 
 
 def _bench(options: argparse.Namespace) -> None:
-    for name in ("steps", "warmup"):
-        if getattr(options, name) < 1:
-            raise InputError(f"--{name} {getattr(options, name)}: expected a whole number of at least 1")
     if not 0.0 < options.tol < 1.0:
         raise InputError(f"--tol {options.tol:g}: expected a number between 0 and 1")
 
-    from warpbrain.atomic import check_writable, whole_file
-    from warpbrain.bench.host import host
+    from warpbrain.atomic import check_writable
     from warpbrain.bench.measure import BODIES, RESTART, measure_row
     from warpbrain.bench.table3 import TABLE3
     from warpbrain.report.summary import machine
@@ -62,13 +52,10 @@ def _bench(options: argparse.Namespace) -> None:
 
     if options.json is not None:
         check_writable(options.json)
-    names = list(TABLE3) if options.rows is None else options.rows.split(",")
-    for name in names:
-        if name not in TABLE3:
-            raise InputError(f"--rows {name}: expected some of {', '.join(TABLE3)}")
+    names = command.chosen("--rows", options.rows, list(TABLE3))
     wp = start_warp_quietly()
     devices = [d.alias for d in wp.get_devices()] if options.device == "all" else [find_device(options.device).alias]
-    versions, where = machine(), host()
+    versions, where = machine(), command.host()
     results = []
     for alias in devices:
         device = wp.get_device(alias)
@@ -89,15 +76,22 @@ def _bench(options: argparse.Namespace) -> None:
             print(*_lines(measured), sep="\n")
         print("", *_table(results[-len(names) :]), sep="\n")
     if options.json is not None:
-        with whole_file(options.json) as scratch:
-            written = {"versions": versions, "host": where, "rows": [_json(r) for r in results]}
-            scratch.write_text(json.dumps(written, indent=1) + "\n")
-        print(f"written to {options.json}")
+        command.write(options.json, {"versions": versions, "host": where, "rows": [_json(r) for r in results]})
+
+
+def _columns(measured: Any) -> dict[str, tuple[list[float], tuple[float, float | None]]]:
+    """Samples beside the paper's mean and sd [ms], by what they are of."""
+    from warpbrain.bench.table3 import MAIN_LOOP
+
+    row = measured.row
+    return {
+        "pre-processing": (measured.preprocessing, (row.preprocessing, None)),
+        **{name: (samples, row.phases[name]) for name, samples in measured.phases.items()},
+        "step without instruments": (measured.step, row.phases[MAIN_LOOP]),
+    }
 
 
 def _lines(measured: Any) -> list[str]:
-    from warpbrain.bench.table3 import MAIN_LOOP
-
     row = measured.row
     cg = statistics.median(measured.cg_iterations)
     lines = [
@@ -106,18 +100,13 @@ def _lines(measured: Any) -> list[str]:
         f"{cg:g} CG iterations (median)",
         f"  {'':<28}{'warpbrain':>18}{'paper':>18}{'x faster':>10}",
     ]
-
-    def line(label: str, samples: list[float], paper: tuple[float, float | None]) -> str:
-        mean, sd = statistics.fmean(samples), statistics.pstdev(samples)
-        theirs = f"{paper[0]:.2f}" + ("" if paper[1] is None else f" ({paper[1]:.1f})")
-        return f"  {label:<28}{f'{mean:.3f} ({sd:.3f})':>18}{theirs:>18}{paper[0] / mean:>10.1f}"
-
     # a body's first step is replayed once it is captured: both stand between a mesh in memory and that step
     both = [made + captured for made, captured in zip(measured.preprocessing, measured.capture, strict=True)]
-    lines.append(line("pre-processing", measured.preprocessing, (row.preprocessing, None)))
-    lines.append(line("and capture of the step", both, (row.preprocessing, None)))
-    lines += [line(name, samples, row.phases[name]) for name, samples in measured.phases.items()]
-    lines.append(line("step without instruments", measured.step, row.phases[MAIN_LOOP]))
+    first, *others = _columns(measured).items()
+    for label, (samples, paper) in (first, ("and capture of the step", (both, first[1][1])), *others):
+        mean, sd = statistics.fmean(samples), statistics.pstdev(samples)
+        theirs = f"{paper[0]:.2f}" + ("" if paper[1] is None else f" ({paper[1]:.1f})")
+        lines.append(f"  {label:<28}{f'{mean:.3f} ({sd:.3f})':>18}{theirs:>18}{paper[0] / mean:>10.1f}")
     median = statistics.median(measured.step)
     bandwidth = measured.bytes_per_step / median / 1e6
     each = 1000.0 * median / measured.launches_per_step
@@ -130,46 +119,24 @@ def _lines(measured: Any) -> list[str]:
 
 def _table(results: list[Any]) -> list[str]:
     """The paper's table again: a line for each row, each cell our mean (sd) | the paper's mean = how often faster."""
-    from warpbrain.bench.table3 import MAIN_LOOP
-
-    heads = {
-        "pre-processing": "pre-processing",
-        **{name: name for name in results[0].phases},
-        "step": "without instruments",
-    }
-    lines = [
-        f"{'row':<10} {'nodes':>6} {'tets':>6} {'CG':>5}  "
-        + "  ".join(f"{head:<30}" for head in heads.values()).rstrip()
-    ]
+    heads = (f"{label.removeprefix('step '):<30}" for label in _columns(results[0]))
+    lines = [f"{'row':<10} {'nodes':>6} {'tets':>6} {'CG':>5}  " + "  ".join(heads).rstrip()]
     for measured in results:
-        row = measured.row
-        columns = [(measured.preprocessing, row.preprocessing)]
-        columns += [(samples, row.phases[name][0]) for name, samples in measured.phases.items()]
-        columns.append((measured.step, row.phases[MAIN_LOOP][0]))
         cells = []
-        for samples, paper in columns:
+        for samples, (paper, _) in _columns(measured).values():
             mean = statistics.fmean(samples)
-            cell = f"{mean:.3g} ({statistics.pstdev(samples):.2g}) | {paper:g} = {paper / mean:.3g}x"
-            cells.append(f"{cell:<30}")
+            cells.append(f"{mean:.3g} ({statistics.pstdev(samples):.2g}) | {paper:g} = {paper / mean:.3g}x".ljust(30))
         cg = statistics.median(measured.cg_iterations)
-        lines.append(
-            f"{row.name:<10} {measured.nodes:>6} {measured.tetrahedra:>6} {cg:>5g}  " + "  ".join(cells).rstrip()
-        )
+        sizes = f"{measured.row.name:<10} {measured.nodes:>6} {measured.tetrahedra:>6} {cg:>5g}  "
+        lines.append(sizes + "  ".join(cells).rstrip())
     return lines
 
 
 def _json(measured: Any) -> dict[str, Any]:
+    plain = ("device", "precision", "tolerance", "nodes", "tetrahedra", "blocks", "cg_iterations", "bytes_per_step")
     return {
         "row": measured.row.name,
-        "device": measured.device,
-        "precision": measured.precision,
-        "tolerance": measured.tolerance,
-        "nodes": measured.nodes,
-        "tetrahedra": measured.tetrahedra,
-        "blocks": measured.blocks,
-        "cg_iterations": measured.cg_iterations,
-        "bytes_per_step": measured.bytes_per_step,
-        "launches_per_step": measured.launches_per_step,
+        **{name: getattr(measured, name) for name in (*plain, "launches_per_step")},
         "milliseconds": {
             "pre-processing": measured.preprocessing,
             "capture": measured.capture,

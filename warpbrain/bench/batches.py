@@ -1,25 +1,36 @@
-"""Measures batches: the time of a step and sample over the size of a batch, and the gain of several processes."""
+"""`python -m warpbrain.bench ensemble`: how fast batches are, and what they gain over single runs.
+
+The time of a step and sample over the size of a batch, and the gain of several processes.
+"""
 
 from __future__ import annotations
 
+import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import warp as wp
 
+from warpbrain.atomic import check_writable
+from warpbrain.bench import command
 from warpbrain.cases.shipped import find_case
 from warpbrain.ensemble.batch import Batch
 from warpbrain.ensemble.choosing import drawn_samples, swept_samples
 from warpbrain.ensemble.course import step_batch
 from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.workers import Here, Prepare, Processes, bytes_per_slot
+from warpbrain.errors import InputError
 from warpbrain.gp.trained import trained
 from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.tetrahedron import PAIRS
+from warpbrain.report.summary import machine
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.system import System
+from warpbrain.simulation.system import System, find_device
+from warpbrain.terminal.progress import Progress
+from warpbrain.terminal.quiet import start_warp_quietly
 
 #: Steps of a motion from rest, as many as the bench of a single run takes before it starts again.
 STEPS = 20
@@ -27,30 +38,96 @@ STEPS = 20
 REPEATS = 3
 
 
+def main(arguments: Sequence[str]) -> int:
+    """Parse, measure, print; returns the exit status."""
+    description = "Times batches of the coarse single-tissue phantom, 20 steps from rest, over their size."
+    options: dict[str, command.Options] = {
+        "--device": command.DEVICE,
+        "--batches": {
+            "metavar": "B,...", "help": "sizes (default: 1,2,4,8 on a CPU, 1,4,16,32,64,128,256,512 on a GPU)"
+        },
+        "--precision": command.PRECISION,
+        "--processes": {"metavar": "P,...", "help": "on a CPU: also the rate of so many processes, as 1,2"},
+        "--samples": {"type": int, "default": 48, "help": "samples that the processes compute (default: 48)"},
+        "--sweep": {
+            "choices": ("single", "multi"), "help": "also the paper's sweep to rest, 17 samples or 289 pairs"
+        },
+        "--json": command.JSON,
+    }  # fmt: skip
+    return command.run("ensemble", description, options, _bench, arguments)
+
+
+def _sizes(name: str, text: str) -> list[int]:
+    numbers = text.split(",")
+    for number in numbers:
+        if not number.isdecimal() or int(number) < 1:
+            raise InputError(f"--{name} {text}: expected whole numbers of at least 1, as 1,2,4")
+    return [int(number) for number in numbers]
+
+
+def _bench(options: argparse.Namespace) -> None:
+    batches = None if options.batches is None else _sizes("batches", options.batches)
+    processes = [] if options.processes is None else _sizes("processes", options.processes)
+    if options.json is not None:
+        check_writable(options.json)
+    start_warp_quietly()
+    device, versions = find_device(options.device), machine()
+    if batches is None:
+        batches = [1, 4, 16, 32, 64, 128, 256, 512] if device.is_cuda else [1, 2, 4, 8]
+    print(
+        f"{device.name} ({device.alias}), {options.precision} precision, coarse phantom of one tissue, draws of its "
+        f"prior, {STEPS} steps of 1 ms from rest; warpbrain {versions['warpbrain']}, Warp {versions['warp-lang']}"
+    )
+    written: dict[str, Any] = {"versions": versions, "device": device.name, "precision": options.precision}
+    progress = Progress("bench")
+    progress.show(0.0, "single runs")
+    single = measure_single(device.alias, options.precision)
+    progress.clear()
+    print(f"single run: {single:.3f} ms a step")
+    print(" batch  ms a step and sample  x single     CG  MB a step    GB/s  GB held")
+    written |= {"single_milliseconds": single, "batches": []}
+    for measured in measure_batches(batches, device.alias, options.precision):
+        print(
+            f"{measured.slots:>6} {measured.best:>21.4f} {single / measured.best:>9.1f} {measured.cg_iterations:>6.1f} "
+            f"{measured.bytes_per_step / 1e6:>10.1f} {measured.bandwidth:>7.0f} {measured.memory / 1e9:>8.2f}"
+            + (f"   {measured.failed} failed" if measured.failed else ""),
+            flush=True,
+        )
+        written["batches"].append(vars(measured))
+    rates: dict[str, float] = {}
+    for count in processes:
+        progress.show(0.5, f"{count} processes")
+        rates[str(count)] = measure_processes(count, options.samples, options.precision, start_warp_quietly)
+        progress.clear()
+        rate = rates[str(count)]
+        print(
+            f"{count} processes: {rate:.2f} samples a second, {rate / next(iter(rates.values())):.2f} times the first"
+        )
+    written["samples_a_second_by_processes"] = rates
+    if options.sweep is not None:
+        progress.show(0.9, "sweep")
+        seconds, samples, failed, iterations = measure_sweep(options.sweep, device.alias, options.precision)
+        progress.clear()
+        print(f"the paper's sweep to rest, {options.sweep}: {samples} samples in {seconds:.1f} s, {failed} failed, "
+              f"{iterations} CG iterations")  # fmt: skip
+        written["sweep"] = {"seconds": seconds, "samples": samples, "failed": failed, "cg_iterations": iterations}
+    if options.json is not None:
+        command.write(options.json, written)
+
+
 @dataclass(frozen=True)
 class MeasuredBatch:
-    """Times of one size of batch.
-
-    Attributes
-    ----------
-    slots : int
-    samples, failed : int
-        In a motion, and how many of them had no answer.
-    milliseconds : list of float
-        A step and sample, for each motion.
-    cg_iterations : float
-        Mean over all steps.
-    bytes_per_step : int
-        Of a step and sample, each array counted once a kernel.
-    memory : int
-        Of the batch [bytes].
-    """
+    """Times of one size of batch."""
 
     slots: int
+    #: In a motion, and how many of them had no answer.
     samples: int
     failed: int
+    #: A step and sample, for each motion.
     milliseconds: list[float]
+    #: Mean over all steps.
     cg_iterations: float
+    #: Of a step and sample, each array counted once a kernel; and memory of the batch [bytes].
     bytes_per_step: int
     memory: int
 

@@ -3,47 +3,46 @@
 from __future__ import annotations
 
 import argparse
-import json
 import platform
 import time
 from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
-from warpbrain.errors import InputError
-from warpbrain.terminal.command import OneLineParser, exit_status
+from warpbrain.atomic import output_folder, safe_name
+from warpbrain.bench import command
+from warpbrain.cases.shipped import find_case
+from warpbrain.diagnosis.diagnose import Diagnosing
+from warpbrain.report.summary import machine
+from warpbrain.simulation.system import find_device
+from warpbrain.terminal.progress import Progress
+from warpbrain.terminal.quiet import start_warp_quietly
+from warpbrain.worlds.listener import Listener
 
 
 def main(arguments: Sequence[str]) -> int:
     """Parse, measure, print; returns the exit status."""
-    parser = OneLineParser(
-        prog="python -m warpbrain.bench diagnose",
-        description="Times each stage of a diagnosis with every mechanism: of 0529 with 289 points, if no other "
-        "case is named. The first run also loads kernels and makes what is kept of the mesh.",
+    description = (
+        "Times each stage of a diagnosis with every mechanism: of 0529 with 289 points, if no other case is named. The "
+        "first run also loads kernels and makes what is kept of the mesh."
     )
-    add = parser.add_argument
-    add("--device", default=None, metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one)")
-    add("--case", default="0529", metavar="NAME", help="0529, ... or the path of a case folder (default: 0529)")
-    add("--tissue", choices=("single", "multi"), default="multi", help="one tissue, or grey and white (default)")
-    add("--runs", type=int, default=2, help="one after the other (default: 2)")
-    add("--out", type=Path, metavar="DIR", help="folder for a file with every run, diagnose_DEVICE_DATE.json")
-    options = parser.parse_args(arguments)
-    return exit_status(parser.prog, lambda: _bench(options))
+    options: dict[str, command.Options] = {
+        "--device": command.DEVICE,
+        "--case": {
+            "default": "0529", "metavar": "NAME", "help": "0529, ... or the path of a case folder (default: 0529)"
+        },
+        "--tissue": {
+            "choices": ("single", "multi"), "default": "multi", "help": "one tissue, or grey and white (default)"
+        },
+        "--runs": {"type": int, "default": 2, "help": "one after the other (default: 2)"},
+        "--out": {
+            "type": Path, "metavar": "DIR", "help": "folder for a file with every run, diagnose_DEVICE_DATE.json"
+        },
+    }  # fmt: skip
+    return command.run("diagnose", description, options, _bench, arguments)
 
 
 def _bench(options: argparse.Namespace) -> None:
-    if options.runs < 1:
-        raise InputError(f"--runs {options.runs}: expected a whole number of at least 1")
-
-    from warpbrain.atomic import output_folder, safe_name, whole_file
-    from warpbrain.cases.shipped import find_case
-    from warpbrain.diagnosis.diagnose import Diagnosing
-    from warpbrain.report.summary import machine
-    from warpbrain.simulation.system import find_device
-    from warpbrain.terminal.progress import Progress
-    from warpbrain.terminal.quiet import start_warp_quietly
-    from warpbrain.worlds.listener import Listener
-
     start_warp_quietly()
     device, versions, today = find_device(options.device), machine(), date.today().isoformat()
     out = None if options.out is None else output_folder(options.out)
@@ -64,27 +63,19 @@ def _bench(options: argparse.Namespace) -> None:
     print(
         f"{equilibria} equilibria; seconds of each run; warpbrain {versions['warpbrain']}, Warp {versions['warp-lang']}"
     )
-    print(*table_of(runs), sep="\n")
-    if out is None:
-        return
-    file = out / f"diagnose_{safe_name(device.alias)}_{today}.json"
-    told = {
-        "case": case.name,
-        "numbers": sensors,
-        "equilibria": equilibria,
-        "device": f"{device.name} ({device.alias})",
-        "processor": platform.processor() or platform.machine(),
-        "date": today,
-        "versions": versions,
-        "verdict": found.verdict,
-        "seconds": runs,
-    }
-    with whole_file(file) as scratch:
-        scratch.write_text(json.dumps(told, indent=1) + "\n")
-    print(f"written to {file}")
-
-
-def table_of(runs: Sequence[dict[str, float]]) -> list[str]:
-    """A line for each stage, a column for each run."""
     width = max(len(stage) for stage in runs[0])
-    return [f"  {stage:<{width}}" + "".join(f"{run[stage]:10.2f}" for run in runs) for stage in runs[0]]
+    for stage in runs[0]:
+        print(f"  {stage:<{width}}" + "".join(f"{run[stage]:10.2f}" for run in runs))
+    if out is not None:
+        told = {
+            "case": case.name,
+            "numbers": sensors,
+            "equilibria": equilibria,
+            "device": f"{device.name} ({device.alias})",
+            "processor": platform.processor() or platform.machine(),
+            "date": today,
+            "versions": versions,
+            "verdict": found.verdict,
+            "seconds": runs,
+        }
+        command.write(out / f"diagnose_{safe_name(device.alias)}_{today}.json", told)

@@ -21,7 +21,7 @@ those above or those to come, can answer for it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,44 +34,27 @@ from warpbrain.mesh import TetMesh
 SHIFT = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class MeshArrays:
-    """A mesh in memory: the arguments of `TetMesh`, of which nothing is known yet."""
+def fresh_arrays(mesh: TetMesh, number: int) -> dict[str, Any]:
+    """Copies of the arguments of a mesh, of the same body but not the same bytes: `number` differs.
 
-    points: NDArray[np.float64]
-    tetrahedra: NDArray[np.int32]
-    tissue: NDArray[np.int32]
-    node_sets: Mapping[str, NDArray[np.bool_]]
-    element_sets: Mapping[str, NDArray[np.bool_]]
-    element_vectors: Mapping[str, NDArray[np.float64]]
-    cut: NDArray[np.int32]
-
-
-def fresh_arrays(mesh: TetMesh, number: int) -> MeshArrays:
-    """Copies of the arrays of a mesh, of the same body but not the same bytes.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    number : int
-        How often `SHIFT` to the right the body lies, and by how many places the numbers of its elements are turned
-        round: neighbours in memory stay neighbours. Different numbers give different bytes.
+    It is how often `SHIFT` to the right the body lies, and by how many places the numbers of its elements are turned
+    round: neighbours in memory stay neighbours.
     """
 
     def turned(values: NDArray[Any]) -> NDArray[Any]:
         return np.roll(values, number, axis=0)
 
-    return MeshArrays(
-        mesh.points + np.array([SHIFT * number, 0.0, 0.0]),
-        turned(mesh.tetrahedra),
-        turned(mesh.tissue),
-        {name: members.copy() for name, members in mesh.node_sets.items()},
-        {name: turned(members) for name, members in mesh.element_sets.items()},
-        {name: turned(vectors) for name, vectors in mesh.element_vectors.items()},
-        mesh.cut.copy(),
-    )
+    return {
+        "points": mesh.points + np.array([SHIFT * number, 0.0, 0.0]),
+        "tetrahedra": turned(mesh.tetrahedra),
+        "tissue": turned(mesh.tissue),
+        "node_sets": {name: members.copy() for name, members in mesh.node_sets.items()},
+        "element_sets": {name: turned(members) for name, members in mesh.element_sets.items()},
+        "element_vectors": {name: turned(vectors) for name, vectors in mesh.element_vectors.items()},
+        "cut": mesh.cut.copy(),
+    }
 
 
-def case_of(case: Case, arrays: MeshArrays) -> Case:
+def case_of(case: Case, arrays: Mapping[str, Any]) -> Case:
     """The same case of a mesh that is checked anew."""
-    return replace(case, mesh=TetMesh(**vars(arrays)))
+    return replace(case, mesh=TetMesh(**arrays))

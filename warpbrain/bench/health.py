@@ -6,14 +6,14 @@ import ctypes
 import os
 import platform
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
 
 from warpbrain import __version__
-from warpbrain.bench.host import processor
+from warpbrain.bench.command import processor
 from warpbrain.bench.self_test import SelfTest, self_test
 from warpbrain.threads import processors, thread_count
 
@@ -23,19 +23,15 @@ _GIB = 2.0**30
 def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, Any]:
     """Look at the machine and run the self-test on each of its devices; Warp must have been started.
 
-    Parameters
-    ----------
-    on_test : callable
-        Called with the alias of each device before its test.
-
-    Returns
-    -------
-    dict
-        For JSON. Memory is in GiB, and None where the system does not tell.
+    `on_test` is called with the alias of each device before its test. The dictionary is for JSON; memory is in GiB, and
+    None where the system does not tell.
     """
     import warp as wp
 
-    devices = [_device(device) for device in wp.get_devices()]
+    devices = []
+    for device in wp.get_devices():
+        memory = {"total": device.total_memory / _GIB, "free": device.free_memory / _GIB} if device.is_cuda else {}
+        devices.append({"alias": device.alias, "name": device.name, "arch": device.arch, "memory_GiB": memory})
     tests: list[SelfTest] = []
     for device in devices:
         on_test(device["alias"])
@@ -45,7 +41,7 @@ def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, An
         "python": platform.python_version(),
         "platform": platform.platform(),
         "processor": {"name": processor(), "usable": processors(), "threads": thread_count()},
-        "memory_GiB": _memory(),
+        "memory_GiB": {"total": _memory("SC_PHYS_PAGES"), "free": _memory("SC_AVPHYS_PAGES")},
         "packages": _packages(),
         "devices": devices,
         "cuda": {"driver": _joined(wp.get_cuda_driver_version), "toolkit": _joined(wp.get_cuda_toolkit_version)},
@@ -53,11 +49,6 @@ def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, An
         "pictures": _pictures(),
         "self_test": [asdict(test) for test in tests],
     }
-
-
-def _device(device: Any) -> dict[str, Any]:
-    memory = {"total": device.total_memory / _GIB, "free": device.free_memory / _GIB} if device.is_cuda else {}
-    return {"alias": device.alias, "name": device.name, "arch": device.arch, "memory_GiB": memory}
 
 
 def _joined(ask: Callable[[], Any]) -> str | None:
@@ -69,13 +60,9 @@ def _joined(ask: Callable[[], Any]) -> str | None:
     return ".".join(map(str, found)) if found and any(found) else None
 
 
-def _memory() -> dict[str, float | None]:
-    names = os.sysconf_names if hasattr(os, "sysconf_names") else {}
-
-    def gib(name: str) -> float | None:
-        return os.sysconf(name) * os.sysconf("SC_PAGE_SIZE") / _GIB if name in names else None
-
-    return {"total": gib("SC_PHYS_PAGES"), "free": gib("SC_AVPHYS_PAGES")}
+def _memory(name: str) -> float | None:
+    known = name in getattr(os, "sysconf_names", {})
+    return os.sysconf(name) * os.sysconf("SC_PAGE_SIZE") / _GIB if known else None
 
 
 def _packages() -> dict[str, str | None]:
@@ -113,3 +100,40 @@ def _pictures() -> str | None:
             continue
         return None
     return "there is no OpenGL library: on Debian and Ubuntu, apt-get install libegl1"
+
+
+def health_lines(found: Mapping[str, Any]) -> list[str]:
+    """As printed; `found` is of `health`."""
+    memory, processor, cuda, kernels = (found[name] for name in ("memory_GiB", "processor", "cuda", "kernels"))
+    installed = [f"{name} {version}" for name, version in found["packages"].items() if version]
+    missing = [name for name, version in found["packages"].items() if not version]
+    driver = f"CUDA driver {cuda['driver']}" if cuda["driver"] else "no CUDA driver"
+    writable = "" if kernels["writable"] else "; CANNOT BE WRITTEN TO: set WARP_CACHE_PATH to a folder that can"
+    devices = []
+    for one in found["devices"]:
+        size = one["memory_GiB"]
+        more = size and f", architecture {one['arch']}, {_gib(size['total'])}, {_gib(size['free'])} free"
+        devices.append(f"device     {one['alias']}: {one['name']}{more or ''}")
+    lines = [
+        f"warpbrain  {found['warpbrain']['version']} in {found['warpbrain']['folder']}",
+        f"python     {found['python']} on {found['platform']}",
+        f"processor  {processor['name']}, {processor['usable']} usable, {processor['threads']} threads",
+        f"memory     {_gib(memory['total'])}, {_gib(memory['free'])} free",
+        f"installed  {', '.join(installed)}",
+        f"optional   {', '.join(missing) or 'nothing'} not installed",
+        f"cuda       {driver}, Warp built with {cuda['toolkit'] or 'none'}",
+        *devices,
+        f"kernels    {kernels['folder']}, {kernels['size_GiB']:.2f} GiB{writable}",
+        f"pictures   {found['pictures'] or 'an OpenGL library is there'}",
+    ]
+    for test in found["self_test"]:
+        result = f"FAILED: {test['problem']}" if test["problem"] else (
+            f"passed: {test['nodes']} nodes found to {test['error']:.0e} of their displacement in "
+            f"{test['solve_s']:.1f} s, after {test['kernels_s']:.1f} s for kernels"
+        )  # fmt: skip
+        lines.append(f"self-test  {test['device']}: {result}")
+    return lines
+
+
+def _gib(size: float | None) -> str:
+    return "not known" if size is None else f"{size:.1f} GiB"

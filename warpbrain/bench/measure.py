@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import gc
 import time
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import warp as wp
 
-from warpbrain.bench.fresh import MeshArrays, case_of, fresh_arrays
+from warpbrain.bench.fresh import case_of, fresh_arrays
 from warpbrain.bench.table3 import MAIN_LOOP, Row
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
@@ -28,18 +30,7 @@ BODIES = 10
 
 @dataclass(frozen=True)
 class Measured:
-    """Samples of one row on one device [ms], and what they were measured on.
-
-    Attributes
-    ----------
-    preprocessing, capture : list of float
-        Of the same fresh bodies: from a mesh in memory to a simulator, and capturing the step that it replays. Their
-        sum is what stands between a mesh and the first step.
-    phases : dict of str to list of float
-        By `PHASES` and `MAIN_LOOP`, with the clock stopped between them.
-    step : list of float
-        A step as users get it.
-    """
+    """Samples of one row on one device [ms], and what they were measured on."""
 
     row: Row
     device: str
@@ -48,9 +39,13 @@ class Measured:
     nodes: int
     tetrahedra: int
     blocks: int
+    #: Of the same fresh bodies: from a mesh in memory to a simulator, and capturing the step that it replays. Their sum
+    #: is what stands between a mesh and the first step.
     preprocessing: list[float]
     capture: list[float]
+    #: By `PHASES` and `MAIN_LOOP`, with the clock stopped between them.
     phases: dict[str, list[float]]
+    #: A step as users get it.
     step: list[float]
     cg_iterations: list[int]
     bytes_per_step: int
@@ -58,20 +53,9 @@ class Measured:
 
 
 def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, tolerance: float) -> Measured:
-    """Measure a row.
+    """Measure a row: so many samples of each kind after steps that also load every kernel.
 
-    Parameters
-    ----------
-    row : Row
-    device : str
-        Warp device.
-    precision : str
-    steps : int
-        Samples of each kind.
-    warmup : int
-        Steps before them, which also load every kernel.
-    tolerance : float
-        Relative tolerance of the linear solves.
+    `tolerance` is that of the linear solves, relative.
     """
     case = find_case(row.case, row.tissue)
     # loads every kernel, which is done once in a process and not for a mesh
@@ -83,28 +67,31 @@ def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, 
     del first
     preprocessing, capture, simulator = measure_preprocessing(case, device, precision, tolerance, BODIES)
 
+    def samples() -> Iterator[bool]:
+        """Whether each step counts; the motion begins again when it has to."""
+        for sample in range(-warmup, steps):
+            if sample % RESTART == 0:
+                simulator.reset()
+            yield sample >= 0
+
     phases: dict[str, list[float]] = {name: [] for name in (*PHASES, MAIN_LOOP)}
     iterations = []
-    for sample in range(-warmup, steps):
-        if sample % RESTART == 0:
-            simulator.reset()
+    for counts in samples():
         clock = PhaseClock(simulator.system.device)
         simulator.timed_step(clock)
-        if sample >= 0:
+        if counts:
             for name in PHASES:
                 phases[name].append(1000.0 * clock.seconds[name])
             phases[MAIN_LOOP].append(1000.0 * sum(clock.seconds.values()))
             iterations.append(_checked(simulator))
 
     step = []
-    for sample in range(-warmup, steps):
-        if sample % RESTART == 0:
-            simulator.reset()
+    for counts in samples():
         wp.synchronize_device(device)
         start = time.perf_counter()
         simulator.step()
         wp.synchronize_device(device)
-        if sample >= 0:
+        if counts:
             step.append(1000.0 * (time.perf_counter() - start))
             _checked(simulator)
 
@@ -129,7 +116,7 @@ def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, 
     )
 
 
-def preprocess(case: Case, arrays: MeshArrays, device: str, precision: str, tolerance: float) -> Simulator:
+def preprocess(case: Case, arrays: Mapping[str, Any], device: str, precision: str, tolerance: float) -> Simulator:
     """Everything between a mesh in memory and a simulator that can take its first step."""
     model = model_of(case_of(case, arrays))
     simulator = Simulator(System(model, device, precision), tolerance=tolerance)

@@ -1,61 +1,73 @@
-"""`python -m warpbrain.bench mechanisms`: what each mechanism costs beside the plain model."""
+"""`python -m warpbrain.bench mechanisms`: what each mechanism costs beside the plain model.
+
+Steps and equilibria of a case with it and without it take turns.
+"""
 
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Sequence
-from dataclasses import asdict
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any
+from statistics import median
+from typing import Any, TypeVar
 
-from warpbrain.errors import InputError
-from warpbrain.terminal.command import OneLineParser, exit_status
+import warp as wp
+
+from warpbrain.atomic import output_folder, safe_name
+from warpbrain.bench import command
+from warpbrain.bench.measure import RESTART
+from warpbrain.cases.assuming import assume
+from warpbrain.cases.case import Case
+from warpbrain.cases.shipped import find_case
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.report.summary import machine
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.equilibrium import EquilibriumSolver
+from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.system import System, find_device
+from warpbrain.terminal.progress import Progress
+from warpbrain.terminal.quiet import start_warp_quietly
+
+Result = TypeVar("Result")
+
+#: The case that examples of mechanisms are said of, and the row of the plain model beside itself.
+BASE, PLAIN = "phantom-loaded", "plain"
+#: Both sides of a pair, in the order in which they are measured.
+SIDES = ("plain", "with")
+#: Steps of each that are not counted: they load kernels and warm up what is warmed up.
+WARMUP = 5
+
+
+def ratio(samples: Mapping[str, Sequence[float]]) -> float:
+    """How much longer it took with a mechanism than without: the median over neighbours in time."""
+    return median(b / a for a, b in zip(samples["plain"], samples["with"], strict=True))
 
 
 def main(arguments: Sequence[str]) -> int:
     """Parse, measure, print; returns the exit status."""
-    parser = OneLineParser(
-        prog="python -m warpbrain.bench mechanisms",
-        description="Times a step and an iteration of Newton's method with each mechanism's example on the phantom "
-        "under a light load, in turns with the plain model; the plain model beside itself says how exact that is.",
+    description = (
+        "Times a step and an iteration of Newton's method with each mechanism's example on the phantom under a light "
+        "load, in turns with the plain model; the plain model beside itself says how exact that is."
     )
-    add = parser.add_argument
-    add("--device", default=None, metavar="NAME", help="cpu, cuda:0, ... (default: the GPU if there is one)")
-    add("--kinds", metavar="KIND,...", help="mechanisms (default: all)")
-    add("--steps", type=int, default=100, help="time steps of each (default: 100)")
-    add("--equilibria", type=int, default=7, help="equilibria of each (default: 7)")
-    add("--precision", choices=("double", "single"), default="double", help="default: double")
-    add("--out", type=Path, metavar="DIR", help="folder for a file with every sample, mechanisms_DEVICE_DATE.json")
-    options = parser.parse_args(arguments)
-    return exit_status(parser.prog, lambda: _bench(options))
+    options: dict[str, command.Options] = {
+        "--device": command.DEVICE,
+        "--kinds": {"metavar": "KIND,...", "help": "mechanisms (default: all)"},
+        "--steps": {"type": int, "default": 100, "help": "time steps of each (default: 100)"},
+        "--equilibria": {"type": int, "default": 7, "help": "equilibria of each (default: 7)"},
+        "--precision": command.PRECISION,
+        "--out": {
+            "type": Path, "metavar": "DIR", "help": "folder for a file with every sample, mechanisms_DEVICE_DATE.json"
+        },
+    }  # fmt: skip
+    return command.run("mechanisms", description, options, _bench, arguments)
 
 
 def _bench(options: argparse.Namespace) -> None:
-    for name in ("steps", "equilibria"):
-        if getattr(options, name) < 1:
-            raise InputError(f"--{name} {getattr(options, name)}: expected a whole number of at least 1")
-
-    from warpbrain.physics.mechanisms import mechanisms
-
     known = mechanisms()
-    kinds = list(known) if options.kinds is None else options.kinds.split(",")
-    for kind in kinds:
-        if kind not in known:
-            raise InputError(f"--kinds {kind}: expected some of {', '.join(known)}")
-
-    from warpbrain.atomic import output_folder, safe_name, whole_file
-    from warpbrain.bench.host import processor
-    from warpbrain.bench.mechanism_cost import measure_cost
-    from warpbrain.cases.shipped import find_case
-    from warpbrain.report.mechanisms.cost import PLAIN, ratio
-    from warpbrain.report.mechanisms.effect import BASE
-    from warpbrain.report.summary import machine
-    from warpbrain.simulation.system import find_device
-    from warpbrain.terminal.progress import Progress
-    from warpbrain.terminal.quiet import start_warp_quietly
-
+    kinds = command.chosen("--kinds", options.kinds, list(known))
     start_warp_quietly()
     device, versions, today = find_device(options.device), machine(), date.today().isoformat()
     out = None if options.out is None else output_folder(options.out)
@@ -74,26 +86,22 @@ def _bench(options: argparse.Namespace) -> None:
         cost = measure_cost(case, kind, example, device.alias, options.precision, options.steps, options.equilibria)
         progress.clear()
         rows.append(asdict(cost))
-        print(_line(rows[-1], ratio), flush=True)
+        print(_line(rows[-1]), flush=True)
     if out is not None:
         short = "cpu" if device.is_cpu else safe_name(device.name.lower().removeprefix("nvidia "))
         path = out / f"mechanisms_{short}_{today}.json"
         written = {
             "versions": versions,
-            "device": processor() if device.is_cpu else device.name,
+            "device": command.processor() if device.is_cpu else device.name,
             "date": today,
             "precision": options.precision,
             "case": BASE,
             "rows": rows,
         }
-        with whole_file(path) as scratch:
-            scratch.write_text(json.dumps(written, indent=1) + "\n", encoding="utf-8")
-        print(f"written to {path}")
+        command.write(path, written)
 
 
-def _line(row: dict[str, Any], ratio: Any) -> str:
-    from statistics import median
-
+def _line(row: dict[str, Any]) -> str:
     def both(samples: dict[str, list[int]]) -> str:
         return f"{median(samples['with']):g}/{median(samples['plain']):g}"
 
@@ -102,3 +110,77 @@ def _line(row: dict[str, Any], ratio: Any) -> str:
         f"{both(row['cg_iterations']):>9} {ratio(row['newton']):>7.2f} {median(row['newton']['with']):>8.3f} "
         f"{both(row['newton_iterations']):>7}"
     )
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Samples of a mechanism beside the plain model, by `SIDES`; those of one index are neighbours in time."""
+
+    #: Mechanism and what was said of it; the plain model beside itself has no example.
+    kind: str
+    example: str
+    #: Time of a time step, captured in a graph, and of an iteration of Newton's method, mean over an equilibrium [ms].
+    step: dict[str, list[float]]
+    newton: dict[str, list[float]]
+    #: Of each time step, and of each equilibrium.
+    cg_iterations: dict[str, list[int]]
+    newton_iterations: dict[str, list[int]]
+
+
+def measure_cost(case: Case, kind: str, example: str, device: str, precision: str, steps: int, equilibria: int) -> Cost:
+    """Measure a mechanism beside a case without it, so many samples of each; no example is the plain model once more.
+
+    Raises
+    ------
+    SolveError
+        If a step or an equilibrium has no solution: there is no cost of that.
+    """
+    cases = (case, assume(case, example) if example else case)
+    systems = {side: System(model_of(one), device, precision) for side, one in zip(SIDES, cases, strict=True)}
+    simulators = {side: Simulator(system) for side, system in systems.items()}
+    for simulator in simulators.values():
+        simulator.capture()
+
+    def taken(side: str, sample: int) -> tuple[float, int]:
+        simulator = simulators[side]
+        if sample % RESTART == 0 or sample == -WARMUP:
+            simulator.reset()
+        seconds, _ = _timed(simulator.step, systems[side])
+        simulator.check()
+        return seconds, simulator.last_solve().iterations
+
+    def solved(side: str, sample: int) -> tuple[float, int]:
+        seconds, state = _timed(EquilibriumSolver(systems[side]).solve, systems[side])
+        return seconds / len(state.history), len(state.history)
+
+    step, cg = _in_turns(systems, WARMUP, steps, taken)
+    newton, iterations = _in_turns(systems, 1, equilibria, solved)
+    return Cost(kind, example, step, newton, cg, iterations)
+
+
+def _in_turns(
+    systems: dict[str, System], warmup: int, count: int, take: Callable[[str, int], tuple[float, int]]
+) -> tuple[dict[str, list[float]], dict[str, list[int]]]:
+    """Samples of both sides in turns: time [ms] and iterations of `take(side, sample)`, negative ones not counted."""
+    taken: dict[str, list[float]] = {side: [] for side in SIDES}
+    iterations: dict[str, list[int]] = {side: [] for side in SIDES}
+    for sample in range(-warmup, count):
+        for side in systems:
+            seconds, number = take(side, sample)
+            if sample >= 0:
+                taken[side].append(1000.0 * seconds)
+                iterations[side].append(number)
+    return taken, iterations
+
+
+def _timed(call: Callable[[], Result], system: System) -> tuple[float, Result]:
+    """Seconds that a call takes, until the device has done it, and what it returns.
+
+    Of the processor on a CPU, which other work on the machine disturbs less.
+    """
+    now = time.process_time if system.device.is_cpu else time.perf_counter
+    wp.synchronize_device(system.device)
+    start = now()
+    result = call()
+    wp.synchronize_device(system.device)
+    return now() - start, result

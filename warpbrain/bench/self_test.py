@@ -27,27 +27,17 @@ _GRADIENT = np.array([[1.10, 0.05, 0.0], [0.0, 0.97, 0.0], [0.0, 0.02, 1.0]])
 
 @dataclass(frozen=True)
 class SelfTest:
-    """What came of it on one device.
-
-    Attributes
-    ----------
-    device : str
-        Its alias.
-    nodes : int
-        That had to find their place.
-    error : float
-        Largest error of a displacement, of the largest displacement; NaN if there was no equilibrium.
-    kernels_s, solve_s : float
-        Seconds that loading (the first time compiling) the kernels and all the rest took.
-    problem : str
-        Empty if it passed.
-    """
+    """What came of it on one device, by its alias."""
 
     device: str
+    #: That had to find their place.
     nodes: int
+    #: Largest error of a displacement, of the largest displacement; NaN if there was no equilibrium.
     error: float
+    #: Seconds that loading (the first time compiling) the kernels and all the rest took.
     kernels_s: float
     solve_s: float
+    #: Empty if it passed.
     problem: str = ""
 
 

@@ -17,23 +17,13 @@ MAIN_LOOP = "main loop"
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the table.
+    """A row of the table."""
 
-    Attributes
-    ----------
-    name : str
-        ``"st/coarse"`` and so on: single or multi tissue, and the mesh.
-    case, tissue : str
-        The shipped case that stands for it.
-    preprocessing : float
-        [ms]
-    phases : dict of str to (mean, sd)
-        [ms], by `PHASES` and `MAIN_LOOP`.
-    """
-
+    #: ``"st/coarse"`` and so on: single or multi tissue, and the mesh; and the shipped case that stands for it.
     name: str
     case: str
     tissue: str
+    #: [ms], the second mean and sd by `PHASES` and `MAIN_LOOP`.
     preprocessing: float
     phases: dict[str, tuple[float, float]]
 

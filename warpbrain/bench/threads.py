@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
-from pathlib import Path
 from statistics import median
 from typing import Any
 
+from warpbrain.atomic import check_writable
+from warpbrain.bench import command
+from warpbrain.bench.table3 import TABLE3, Row
+from warpbrain.cases.shipped import find_case
 from warpbrain.errors import InputError
-from warpbrain.terminal.command import OneLineParser, exit_status
+from warpbrain.report.summary import machine
+from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.equilibrium import solve_equilibrium
+from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.system import System
+from warpbrain.terminal.quiet import start_warp_quietly
+from warpbrain.threads import MOST, processors
 
 #: Counts that are measured if none are named, as far as there are processors.
 COUNTS = (1, 2, 4, 8, 16)
@@ -25,42 +33,41 @@ STEPS, TURNS = 20, 5
 
 def main(arguments: Sequence[str]) -> int:
     """Parse, measure, print; returns the exit status."""
-    parser = OneLineParser(
-        prog="python -m warpbrain.bench threads",
-        description="Times a step of the phantom's meshes and the equilibrium of 0529 on the CPU by the number of "
-        "threads, in turns; the answers must be the same to the bit.",
+    description = (
+        "Times a step of the phantom's meshes and the equilibrium of 0529 on the CPU by the number of threads, in "
+        "turns; the answers must be the same to the bit."
     )
-    add = parser.add_argument
-    add("--row", default="mt/fine", metavar="ROW", help="st/coarse, st/fine, mt/coarse or mt/fine (default)")
-    add("--counts", default=None, metavar="N,...", help="threads (default: 1, 2, 4, 8, 16, as there are processors)")
-    add("--turns", type=int, default=TURNS, help=f"of {STEPS} steps and an equilibrium each (default: {TURNS})")
-    add("--json", type=Path, metavar="FILE", help="write every sample")
-    options = parser.parse_args(arguments)
-    return exit_status(parser.prog, lambda: _bench(options))
+    options: dict[str, command.Options] = {
+        "--row": {
+            "default": "mt/fine", "metavar": "ROW", "help": "st/coarse, st/fine, mt/coarse or mt/fine (default)"
+        },
+        "--counts": {
+            "metavar": "N,...", "help": "threads (default: 1, 2, 4, 8, 16, as there are processors)"
+        },
+        "--turns": {
+            "type": int, "default": TURNS, "help": f"of {STEPS} steps and an equilibrium each (default: {TURNS})"
+        },
+        "--json": command.JSON,
+    }  # fmt: skip
+    return command.run("threads", description, options, _bench, arguments)
 
 
 def _bench(options: argparse.Namespace) -> None:
-    from warpbrain.bench.table3 import TABLE3
-    from warpbrain.threads import MOST, processors
-
-    if options.turns < 1:
-        raise InputError(f"--turns {options.turns}: expected a whole number of at least 1")
     if options.row not in TABLE3:
         raise InputError(f"--row {options.row}: expected one of {', '.join(TABLE3)}")
-    said = options.counts
-    counts = [n for n in COUNTS if n <= processors()] if said is None else [int(n or 0) for n in _numbers(said)]
+    listed = options.counts
+    counts = (
+        [n for n in COUNTS if n <= processors()]
+        if listed is None
+        else [int(n) if n.strip().isdecimal() else 0 for n in listed.split(",")]
+    )
     if not counts or not all(0 < n <= MOST for n in counts):
-        raise InputError(f"--counts {said}: expected whole numbers from 1 to {MOST}, with commas between them")
-
-    from warpbrain.atomic import check_writable, whole_file
-    from warpbrain.bench.host import host
-    from warpbrain.report.summary import machine
-    from warpbrain.terminal.quiet import start_warp_quietly
+        raise InputError(f"--counts {listed}: expected whole numbers from 1 to {MOST}, with commas between them")
 
     if options.json is not None:
         check_writable(options.json)
     start_warp_quietly()
-    where = host()
+    where = command.host()
     print(f"{where['processor']}, {processors()} processors; median ms of {options.turns} turns, times as fast as one")
     measured = []
     for name, turn in (("a step", _steps(TABLE3[options.row])), ("equilibrium of 0529", _equilibria())):
@@ -70,15 +77,8 @@ def _bench(options: argparse.Namespace) -> None:
             print(f"  {name:<20}{count:4d} threads{value:10.2f}{medians[counts[0]] / value:8.2f}")
         measured.append({"what": name, "milliseconds": milliseconds, "medians": medians})
     if options.json is not None:
-        with whole_file(options.json) as scratch:
-            told = {"versions": machine(), "host": where, "row": options.row, "measured": measured}
-            scratch.write_text(json.dumps(told, indent=1) + "\n")
-        print(f"written to {options.json}")
-
-
-def _numbers(said: str) -> list[str | None]:
-    """Whole numbers of a list; None for what is none."""
-    return [part.strip() if part.strip().isdecimal() else None for part in said.split(",")]
+        told = {"versions": machine(), "host": where, "row": options.row, "measured": measured}
+        command.write(options.json, told)
 
 
 def _in_turns(turn: Callable[[], tuple[list[float], bytes]], counts: Sequence[int], turns: int) -> dict[int, Any]:
@@ -111,13 +111,8 @@ def _threads(count: int) -> Iterator[None]:
             os.environ["OMP_NUM_THREADS"] = before
 
 
-def _steps(row: Any) -> Callable[[], tuple[list[float], bytes]]:
+def _steps(row: Row) -> Callable[[], tuple[list[float], bytes]]:
     """Steps from rest, each captured in a graph for the threads that there are."""
-    from warpbrain.cases.shipped import find_case
-    from warpbrain.simulation.dynamics import Simulator
-    from warpbrain.simulation.of_case import model_of
-    from warpbrain.simulation.system import System
-
     simulator = Simulator(System(model_of(find_case(row.case, row.tissue)), "cpu"))
 
     def turn() -> tuple[list[float], bytes]:
@@ -135,11 +130,6 @@ def _steps(row: Any) -> Callable[[], tuple[list[float], bytes]]:
 
 
 def _equilibria() -> Callable[[], tuple[list[float], bytes]]:
-    from warpbrain.cases.shipped import find_case
-    from warpbrain.simulation.equilibrium import solve_equilibrium
-    from warpbrain.simulation.of_case import model_of
-    from warpbrain.simulation.system import System
-
     system = System(model_of(find_case("0529", "multi")), "cpu")
 
     def turn() -> tuple[list[float], bytes]:

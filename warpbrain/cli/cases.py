@@ -111,7 +111,7 @@ def _add_build(actions: argparse._SubParsersAction[Any]) -> None:
 
 def _list(options: argparse.Namespace) -> None:
     from warpbrain.cases.shipped import catalogue
-    from warpbrain.report.case_list import list_lines
+    from warpbrain.report.case_text import list_lines
 
     print(*list_lines(catalogue()), sep="\n")
     print(

@@ -84,8 +84,8 @@ def _ensemble(options: argparse.Namespace) -> None:
     from warpbrain.ensemble.run import chosen_workers
     from warpbrain.ensemble.store import Store, discard
     from warpbrain.report import summary as tables
-    from warpbrain.report.ensemble_text import describe_ensemble, ensemble_lines
-    from warpbrain.report.fingerprints import fingerprints
+    from warpbrain.report.ensemble import describe_ensemble, ensemble_lines
+    from warpbrain.report.files import fingerprints
     from warpbrain.simulation.of_case import model_of
     from warpbrain.terminal.quiet import start_warp_quietly
     from warpbrain.terminal.result_folder import choose_folder, results_in
@@ -148,8 +148,7 @@ def _write(
     out: Path, result: EnsembleResult, summary: dict[str, Any], chosen: str, title: str, count: int
 ) -> list[str]:
     """Write what an ensemble gave; returns the names of the files."""
-    from warpbrain.report.ensemble_files import table_of, write_fields, write_table
-    from warpbrain.report.ensemble_picture import write_spread_picture
+    from warpbrain.report.ensemble import table_of, write_fields, write_spread_picture, write_table
     from warpbrain.report.files import write_summary
 
     files = [*write_table(out, table_of(result)), "summary.json"]

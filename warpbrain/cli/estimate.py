@@ -151,9 +151,7 @@ def _estimate(
     from warpbrain.estimation.fit import GaussNewtonStep
     from warpbrain.gp.trained import find_model
     from warpbrain.report import estimate_picture
-    from warpbrain.report.estimate import describe_estimate
-    from warpbrain.report.estimate_files import write_predictions
-    from warpbrain.report.estimate_text import estimate_lines
+    from warpbrain.report.estimate import describe_estimate, estimate_lines, write_predictions
     from warpbrain.report.files import write_summary
     from warpbrain.report.state_files import write_estimated_state
     from warpbrain.simulation.system import find_device
@@ -243,9 +241,16 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     from warpbrain.estimation.parameters import Parameters
     from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
     from warpbrain.gp.trained import find_model
-    from warpbrain.report.fingerprints import fingerprint_of
-    from warpbrain.report.sweep import TABLE, columns, read_sweep, sweep_lines, write_sweep
-    from warpbrain.report.sweep_picture import estimated_in, write_sweep_picture
+    from warpbrain.report.files import fingerprint_of
+    from warpbrain.report.sweep import (
+        TABLE,
+        columns,
+        estimated_in,
+        read_sweep,
+        sweep_lines,
+        write_sweep,
+        write_sweep_picture,
+    )
     from warpbrain.terminal.result_folder import results_in
 
     record: Record = options.record

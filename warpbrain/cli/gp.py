@@ -14,7 +14,7 @@ from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.gp.process import Process
-    from warpbrain.report.generative.laws_table import LawRow
+    from warpbrain.report.generative_text import LawRow
 
 #: As in `warpbrain.gp`, which takes time to import: variants of the literature, kinds of models and laws; the default
 #: of each stands first.
@@ -79,12 +79,8 @@ def _show(options: argparse.Namespace) -> None:
     from warpbrain.gp.hierarchical import Hierarchical
     from warpbrain.gp.moduli import moduli
     from warpbrain.gp.trained import trained
-    from warpbrain.report.generative.asymmetry_text import asymmetry_lines
-    from warpbrain.report.generative.draws_picture import draw_draws
-    from warpbrain.report.generative.extrapolation_picture import draw_extrapolation
-    from warpbrain.report.generative.moduli_text import moduli_lines, write_moduli
-    from warpbrain.report.generative.page import save
-    from warpbrain.report.generative.studies_picture import draw_studies
+    from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
+    from warpbrain.report.generative_text import asymmetry_lines, moduli_lines, write_moduli
 
     model = _chosen_model(options)
     if options.group is not None and options.group not in model.groups:
@@ -151,7 +147,7 @@ def _fit(options: argparse.Namespace) -> None:
     from warpbrain.atomic import check_new_folder, whole_folder
     from warpbrain.gp.fitting import fit_model
     from warpbrain.gp.trained import write_model
-    from warpbrain.report.generative.fit_text import fit_lines
+    from warpbrain.report.generative_text import fit_lines
 
     out = options.out or Path(f"warpbrain-gp-{options.gp}-{options.variant}")
     check_new_folder(out)
@@ -172,7 +168,7 @@ def _print_change(options: argparse.Namespace, model: Process) -> None:
     from warpbrain.gp.literature.studies import read_studies
     from warpbrain.gp.moduli import moduli
     from warpbrain.gp.trained import trained
-    from warpbrain.report.generative.moduli_text import moduli_lines
+    from warpbrain.report.generative_text import moduli_lines
 
     added = model.studies[len(read_studies(options.variant)) :]
     for group in dict.fromkeys(study.group for study in added):
@@ -229,7 +225,7 @@ def _sample(options: argparse.Namespace) -> None:
         raise InputError(f"--group {' '.join(options.group)}: a group is given twice")
 
     from warpbrain.atomic import check_writable
-    from warpbrain.report.generative.laws_table import law_lines, write_laws
+    from warpbrain.report.generative_text import law_lines, write_laws
 
     if options.csv is not None:
         check_writable(options.csv.absolute())
@@ -253,7 +249,7 @@ def _sample(options: argparse.Namespace) -> None:
 
 def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
     from warpbrain.gp.sampling import draw_many
-    from warpbrain.report.generative.laws_table import LawRow, redrawn_lines
+    from warpbrain.report.generative_text import LawRow, redrawn_lines
 
     draws, seed = [], options.seed or 0
     with Progress("draws") as bar:
@@ -267,7 +263,7 @@ def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
 def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
     from warpbrain.gp.metamodels.stability import unstable
     from warpbrain.gp.sampling import law_of_curve
-    from warpbrain.report.generative.laws_table import LawRow
+    from warpbrain.report.generative_text import LawRow
 
     places = [-2.0 + 4.0 * i / (options.sweep - 1) for i in range(options.sweep)]
     fits = {(group, k): law_of_curve(model, group, k, options.model) for group in options.group for k in places}

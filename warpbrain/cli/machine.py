@@ -29,8 +29,7 @@ def add_doctor(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def _doctor(options: argparse.Namespace) -> None:
-    from warpbrain.bench.health import health
-    from warpbrain.report.health_text import health_lines
+    from warpbrain.bench.health import health, health_lines
     from warpbrain.terminal.quiet import start_warp_quietly
 
     record: Record = options.record

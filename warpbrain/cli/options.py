@@ -98,7 +98,7 @@ def require_positive(name: str, value: float | None, expected: str) -> None:
 
 def note_case(record: Record, case: Case, device: str) -> None:
     """Say in the log what is computed of which files, where, and by which versions."""
-    from warpbrain.report.fingerprints import fingerprints
+    from warpbrain.report.files import fingerprints
     from warpbrain.report.summary import machine
 
     record.note(

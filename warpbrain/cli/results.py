@@ -37,12 +37,12 @@ def _view(options: argparse.Namespace) -> None:
     elif not _has_display():
         raise InputError("view: there is no display here: --html FILE writes a page that any browser shows")
 
+    from warpbrain.report.body_sections import window, write_view_page
     from warpbrain.report.state_files import read_state
-    from warpbrain.report.view import show, write_view_page
 
     state = read_state(options.result)
     if options.html is None:
-        show(state, options.exaggeration)
+        window(state, options.exaggeration).show(title=f"warpbrain: {state.path}")
         return
     write_view_page(options.html, state, options.exaggeration)
     print(f"written: {options.html}")
@@ -70,8 +70,7 @@ def add_compare(commands: argparse._SubParsersAction[Any]) -> None:
 
 def _compare(options: argparse.Namespace) -> None:
     from warpbrain.report.files import write_summary
-    from warpbrain.report.saved_result import read_result
-    from warpbrain.report.two_results import describe_two, two_lines
+    from warpbrain.report.two_results import describe_two, read_result, two_lines
 
     if options.json is not None:
         check_writable(options.json.absolute())

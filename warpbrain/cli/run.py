@@ -117,10 +117,9 @@ def _run(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import safe_name
     from warpbrain.report import summary as tables
-    from warpbrain.report.comparison import comparison_lines, describe_comparisons, write_comparisons
+    from warpbrain.report.comparison import comparison_lines, describe_comparisons, mesh_error_lines, write_comparisons
     from warpbrain.report.files import write_result, write_summary
-    from warpbrain.report.mesh_error import mesh_error_lines
-    from warpbrain.report.prior_text import describe_prior, prior_lines
+    from warpbrain.report.summary import describe_prior, prior_lines
     from warpbrain.simulation.courses import Course
     from warpbrain.simulation.run import Running
     from warpbrain.simulation.system import begin_loading_kernels, find_device, find_precision
@@ -210,7 +209,7 @@ def head_of_summary(
     options: argparse.Namespace, case: Case, described: Mapping[str, Any], prior: dict[str, Any] | None, system: System
 ) -> dict[str, Any]:
     """How every summary of a run begins: what was computed, of which files, and where."""
-    from warpbrain.report.fingerprints import fingerprints
+    from warpbrain.report.files import fingerprints
 
     return {
         "case": described,
@@ -333,7 +332,7 @@ def _mesh_error(
     """The error of the mesh and what is to be said of it; nothing, if it was not asked for, no error if not found."""
     if options.mesh_error is None:
         return None, None
-    from warpbrain.report.mesh_error import describe_mesh_error
+    from warpbrain.report.comparison import describe_mesh_error
     from warpbrain.simulation.mesh_error import mesh_error, observe_without
 
     smaller = options.mesh_error == "size"

@@ -20,13 +20,12 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     be said of laws that the generative model gave."""
     _check(options, case)
 
-    from warpbrain.report import specimen_text as text
+    from warpbrain.report import specimen as text
     from warpbrain.report.comparison import describe_comparisons
     from warpbrain.report.files import write_summary
-    from warpbrain.report.prior_text import prior_lines
-    from warpbrain.report.specimen_page import write_specimen_page
-    from warpbrain.report.specimen_picture import write_tests_picture
-    from warpbrain.report.summary import machine, timing_lines
+    from warpbrain.report.run_page import write_specimen_page
+    from warpbrain.report.specimen import write_tests_picture
+    from warpbrain.report.summary import machine, prior_lines, timing_lines
     from warpbrain.simulation.observation import Observed
     from warpbrain.simulation.specimen_run import SpecimenRunning
     from warpbrain.terminal.result_folder import results_in

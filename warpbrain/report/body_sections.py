@@ -1,98 +1,74 @@
-"""What the pages of a run and of an estimate share: a body before and after, in pictures and in a view."""
+"""What pages of bodies share: pictures before and after, a view, how well the displacement is known; and `view`."""
 
 from __future__ import annotations
 
-import base64
 import io
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
+from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.generative.page import BLUE, VERMILLION
-from warpbrain.report.page.document import Section, section, text
-from warpbrain.report.page.scene import Arrows, Field, View
-from warpbrain.report.page.viewer import viewer
-from warpbrain.report.picture import Moved, Pictures, annotations_of, arrow_colours, heading, round_factor
-from warpbrain.report.state_files import LEFT, SavedState
-from warpbrain.report.views import RESECTED, tissue_colours
+from warpbrain.report.page import Section, Top, document, part, write_document
+from warpbrain.report.page.figures import TEXT, data, inlined, panels
+from warpbrain.report.page.scene import Arrows, Field, View, viewer
+from warpbrain.report.picture import Moved, Pictures, annotations_of, arrow_colours, heading, round_factor, scene_of
+from warpbrain.report.slices import cut
+from warpbrain.report.state_files import LEFT, TRUST, UNSEEN, SavedState
+from warpbrain.report.views import BLUE, QUIET, VERMILLION
 
 #: A large displacement is shown this long in a view, as a part of the size of the body.
 _MOVED = 0.08
+_NO_POINTS = Moved(*np.zeros((3, 0, 3)))
 
 
-def before_and_after(pictures: Pictures | None, why_not: str) -> Section:
+def before_and_after(pictures: Pictures | str) -> Markup:
     """The rendered body; without pictures, why there are none."""
-    if pictures is None:
-        said = f'<p class="note">The body is not drawn here: {text(why_not)}. The view below needs a browser only.</p>'
-        return section("Before and after", said)
+    if isinstance(pictures, str):
+        return Markup(
+            '<p class="note">The body is not drawn here: {}. The view below needs a browser only.</p>'
+        ).format(pictures)
     scene = pictures.scene
-    panels = "".join(_panel(pictures, name) for name in pictures.images)
     stops = ", ".join(f"rgb({r} {g} {b})" for r, g, b in scene.table[[*range(0, 256, 32), 255]].tolist())
-    bar = (
-        f'<div class="bar"><div class="ends"><span>0</span><span>displacement [mm]</span><span>≥ {scene.top:.3g}</span>'
-        f'</div><div class="scale" style="background:linear-gradient(to right, {stops})"></div></div>'
-    )
     caption = (
         "The body before, and after with a corner cut out; three cuts, each plane drawn where it went. Red: where "
         "the body was before. Black arrows go from where tissue was to where it went."
     )
     if len(scene.where):
         caption += f" {len(scene.where)} points were recorded: how far they moved, and how far they move here."
-    left = set(pictures.whole.tissue[~pictures.resected].tolist())
-    colours = tissue_colours(pictures.names, pictures.whole)
-    names = {colour: pictures.names.get(label, str(label)) for label, colour in colours.items() if label in left}
-    if pictures.resected.any():
-        names[RESECTED] = "resected"
-    names |= {colour: name for name, colour in arrow_colours(scene).items()}
-    legend = "".join(
-        f'<li><span class="swatch" style="background:{colour}"></span> {text(name)}</li>'
-        for colour, name in names.items()
-    )
-    return section(
-        "Before and after",
-        f'<figure><div class="panels">{panels}</div>{bar}<ul class="legend">{legend}</ul>'
-        f"<figcaption>{text(caption)}</figcaption></figure>",
-    )
+    legend = [*views.tissue_legend(pictures.names, pictures.whole, pictures.resected), *arrow_colours(scene).items()]
+    drawn = [_panel(pictures, name) for name in pictures.images]
+    return part("pictures", drawn, f"{scene.top:.3g}", stops, legend, caption)
 
 
-def _panel(pictures: Pictures, name: str) -> str:
+def _panel(pictures: Pictures, name: str) -> dict[str, Any]:
     """A picture with what is written on it, as a drawing that has any size."""
-    notes, image = annotations_of(pictures, name), pictures.images[name]
-    high, across = image.shape[:2]
-    scale = across / (2.0 * notes.across)
-
-    def at(x: float, y: float) -> tuple[float, float]:
-        return scale * (x + notes.across), scale * (notes.high - y)
-
-    marks = []
-    for x, y, letter in notes.letters:
-        column, row = at(x, y)
-        marks.append(f'<text x="{column:.0f}" y="{row:.0f}" dominant-baseline="central">{letter}</text>')
-    left, low, length, said = notes.bar
-    for line in (*notes.lines, (left, low, left + length, low)):
-        (x1, y1), (x2, y2) = at(*line[:2]), at(*line[2:])
-        marks.append(f'<line x1="{x1:.0f}" y1="{y1:.0f}" x2="{x2:.0f}" y2="{y2:.0f}"/>')
-    column, row = at(left + 0.5 * length, low)
-    marks.append(f'<text x="{column:.0f}" y="{row - 10:.0f}">{text(said)}</text>')
-    first, second = heading(pictures, name).split("\n")
-    title = text(f"{first}, {second}" if second else first)
-    return (
-        f'<figure class="panel"><svg viewBox="0 0 {across} {high}" role="img" aria-label="{title}">'
-        f'<image href="{_data(image)}" width="{across}" height="{high}"/>{"".join(marks)}</svg>'
-        f"<figcaption><b>{text(first)}</b><br>{text(second)}</figcaption></figure>"
-    )
-
-
-def _data(image: Any) -> str:
     from PIL import Image
 
+    notes, image = annotations_of(pictures, name), pictures.images[name]
+    height, width = image.shape[:2]
+    scale = width / (2.0 * notes.across)
+
+    def at(x: float, y: float) -> tuple[str, str]:
+        return f"{scale * (x + notes.across):.0f}", f"{scale * (notes.high - y):.0f}"
+
+    left, low, length, words = notes.bar
+    middle, base = scale * (left + 0.5 * length + notes.across), scale * (notes.high - low)
+    lines = [(*at(x, y), *at(to_x, to_y)) for x, y, to_x, to_y in (*notes.lines, (left, low, left + length, low))]
+    first, second = heading(pictures, name).split("\n")
     stream = io.BytesIO()
     Image.fromarray(image).save(stream, format="JPEG", quality=90, subsampling=0)
-    return f"data:image/jpeg;base64,{base64.b64encode(stream.getvalue()).decode()}"
+    return {
+        "image": data("jpeg", stream), "width": width, "height": height, "lines": lines,
+        "letters": [(*at(x, y), letter) for x, y, letter in notes.letters],
+        "bar": (f"{middle:.0f}", f"{base - 10:.0f}", words),
+        "heading": (first, second), "title": f"{first}, {second}" if second else first,
+    }  # fmt: skip
 
 
 def fields_of(state: SavedState) -> list[Field]:
@@ -108,28 +84,18 @@ def fields_of(state: SavedState) -> list[Field]:
     return fields
 
 
-def in_three_dimensions(
+def body_view(
     mesh: TetMesh,
     u: Floats,
     fields: Sequence[Field],
     moved: Moved,
     places: Sequence[float],
     exaggeration: float | None = None,
-) -> Section:
-    """The view of a displaced body, with what was recorded and computed at points.
+) -> Markup:
+    """The view of a body displaced by u (n, 3) [m], with what was recorded and computed at points.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-    u : (n, 3) array
-        Displacement [m].
-    fields : sequence of Field
-        Beside the size of the displacement.
-    moved : Moved
-    places : sequence of float
-        Of the axial, the coronal and the sagittal cut [m].
-    exaggeration : float, optional
-        How many times as large motion is shown at first; chosen so that it is seen.
+    `fields` stand beside the size of the displacement, `places` [m] are those of the axial, the coronal and the
+    sagittal cut; how many times as large motion is shown at first is chosen so that it is seen, unless it is given.
     """
     sizes = np.linalg.norm(u, axis=1)
     large, size = float(np.percentile(sizes, 99.5)), float(np.ptp(mesh.points, axis=0).max())
@@ -138,7 +104,71 @@ def in_three_dimensions(
     arrows = []
     if len(moved.where):
         arrows = [Arrows("recorded", VERMILLION, moved.recorded), Arrows("computed", BLUE, moved.computed)]
-    cuts = dict(zip(("axial", "coronal", "sagittal"), zip((2, 1, 0), places, strict=True), strict=True))
+    cuts = {view.name: (view.axis, place) for view, place in zip(views.VIEWS, places, strict=True)}
     view = View(mesh, shown, moved.where, arrows, None, u, factor, cuts)
-    note = "Motion as large as it is: 1 times; before: 0 times."
-    return section("In three dimensions", viewer(view, "points", note))
+    return viewer(view, "points", "Motion as large as it is: 1 times; before: 0 times.")
+
+
+def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float], known: str) -> Markup:
+    """Where the displacement is known and how well; nothing where nothing is known of it.
+
+    `whole` is the anatomy before anything was resected, `places` [m] as of `body_view`, and `known` a sentence: what
+    the standard deviation is of.
+    """
+    if state.deviation is None or not state.deviation.any():
+        return Markup()
+    at = int(state.deviation.argmax())
+    moves = float(np.linalg.norm(state.u[at]))
+    words = (
+        f"Standard deviation of the displacement: at most {MILLIMETRES * state.deviation[at]:.2g} mm, where the body "
+        f"moves by {MILLIMETRES * moves:.2g} mm. {known}"
+    )
+    if state.trust is not None:
+        volumes = state.mesh.node_volumes
+        unseen, left = (100.0 * volumes[state.trust == value].sum() / volumes.sum() for value in (UNSEEN, LEFT))
+        words += (
+            f" Hatched: {TRUST[UNSEEN]} of a force there, {unseen:.0f} % of the body. Dotted: {TRUST[LEFT]}, "
+            f"{left:.0f} % of it."
+        )
+    words += " With --image: displacement_sd.nii.gz" + (" and trust.nii.gz." if state.trust is not None else ".")
+    values = MILLIMETRES * state.deviation
+
+    def draw(narrow: bool) -> Any:
+        figure, axes = panels(narrow, 3.4, 3)
+        drawn: Any = None
+        for panel, view, place in zip(axes, views.VIEWS, places, strict=True):
+            drawn = views.draw_values(panel, state.mesh, values, view, place, float(values.max()))
+            if state.trust is not None:
+                # hatched: what recordings do not see; dots, and a line around them: where they and the case disagree
+                left = (state.trust == LEFT).astype(np.float64)
+                section = cut(state.mesh.points, state.mesh.tetrahedra, left, view.axis, place)
+                for value, hatch, colour in ((UNSEEN, "//////", "white"), (LEFT, "....", VERMILLION)):
+                    inside = (state.trust == value)[state.mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
+                    style = {"facecolor": "none", "edgecolor": colour, "hatch": hatch, "linewidth": 0.0, "zorder": 2.0}
+                    views.draw_part(panel, section, inside, **style)
+                views.draw_level(panel, section, 0.5, VERMILLION, zorder=2.5)
+            panel.set_title(views.heading(whole, view, place), fontsize=TEXT)
+        bar = figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.9 if narrow else 0.5, aspect=40, pad=0.02)
+        bar.set_label("standard deviation of the displacement [mm]", fontsize=TEXT - 1)
+        bar.ax.tick_params(labelsize=TEXT - 2)
+        return figure
+
+    return inlined(draw, "Three cuts with the deviation.", words)
+
+
+def window(state: SavedState, exaggeration: float | None, off_screen: bool = False) -> Any:
+    """A plotter of PyVista that shows a body, before it is shown; `exaggeration` is chosen if it is None."""
+    # a graphics library is asked for here only
+    from warpbrain.report.rendering.drawing import interactive
+
+    return interactive(scene_of(state.mesh, state.mesh, state.u, {}, _NO_POINTS), exaggeration, off_screen)
+
+
+def write_view_page(path: Path, state: SavedState, exaggeration: float | None) -> None:
+    """Write a body as one HTML file; `exaggeration` is chosen if it is None."""
+    places = views.places(state.mesh)
+    body = body_view(state.mesh, state.u, fields_of(state), _NO_POINTS, places, exaggeration)
+    largest = MILLIMETRES * float(np.linalg.norm(state.u, axis=1).max())
+    facts = [("largest displacement", f"{largest:.3g} mm"), ("nodes", f"{len(state.mesh.points)}")]
+    top = Top(str(state.path), "a deformed body", (QUIET, "#ffffff"), [], facts)
+    write_document(path, document(f"warpbrain: {state.path.name}", top, [Section("In three dimensions", body)]))

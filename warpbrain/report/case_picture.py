@@ -6,6 +6,7 @@ Three cuts as a radiologist holds them, and the body from outside with a corner 
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,17 +17,15 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
-from warpbrain.mesh import TetMesh, boundary_faces, face_vectors
-from warpbrain.recordings.recording import PointsRecording, SurfaceRecording, count_of
+from warpbrain.mesh import TetMesh, face_vectors
+from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording, count_of
 from warpbrain.report import views
-from warpbrain.report.case_body import RenderedBody, render_body
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.rendering.offscreen import RenderingError
-from warpbrain.report.slices import Cut, cut
+from warpbrain.report.picture import Moved, cameras_of, notes_on, scene_of, show
+from warpbrain.report.rendering import BEFORE, Camera, RenderingError, render
+from warpbrain.report.slices import cut
 from warpbrain.report.summary import SET_TITLES
 from warpbrain.report.views import View
-
-Ints = NDArray[np.int32]
 
 #: Colour and shape of each node set, the largest set first; told apart by the colour-blind and without any colour.
 _SET_STYLES = (
@@ -47,6 +46,9 @@ _SPECIMEN_VIEWS = (
     View("cut", 1, ("+x", "-x", "-z", "+z")),
     View("cut", 0, ("+y", "-y", "-z", "+z")),
 )
+_SPECIMEN_ENDS = ("+x", "+y", "+z", "-x", "-y", "-z")
+_SIZE = (960, 840)  # pixels of the body from outside
+_RIM = {"markeredgecolor": "#333333", "markeredgewidth": 0.4}
 _SEAM = 0.8  # width of the rims of polygons of one colour, below which their seams show
 _CHARACTERS = 105  # of a line above the panels
 _LABEL = 30  # characters of a name in the legend
@@ -73,17 +75,6 @@ class _Scene:
         return views.resected_elements(self.mesh, *([] if resection is None else [resection.elements]))
 
     @cached_property
-    def places(self) -> tuple[float, float, float]:
-        return views.places(self.mesh, self.resected)
-
-    @cached_property
-    def sections(self) -> tuple[Cut, ...]:
-        """The cuts, in the order of `views`."""
-        mesh, nothing = self.mesh, np.zeros(len(self.mesh.points))
-        cuts = zip(self.views, self.places, strict=True)
-        return tuple(cut(mesh.points, mesh.tetrahedra, nothing, view.axis, place) for view, place in cuts)
-
-    @cached_property
     def names(self) -> dict[int, str]:
         """Of the tissues, by label."""
         return {label: tissue.name for label, tissue in self.case.tissues.items()}
@@ -93,18 +84,9 @@ class _Scene:
         return views.element_colours(self.mesh, self.resected, self.names)
 
     @cached_property
-    def boundary(self) -> Ints:
-        return boundary_faces(self.mesh.tetrahedra)
-
-    @cached_property
     def extent(self) -> float:
         """Largest side of the box around the body [m]."""
         return float(np.ptp(self.mesh.points, axis=0).max())
-
-    @property
-    def margin(self) -> float:
-        """Room around the body [mm]: for letters and a scale bar beside a body with corners."""
-        return 0.085 * MILLIMETRES * self.extent
 
     @cached_property
     def near(self) -> float:
@@ -135,6 +117,11 @@ class _Scene:
     def surfaces(self) -> list[SurfaceRecording]:
         return [r for r in self.case.recordings if isinstance(r, SurfaceRecording)]
 
+    @property
+    def arrows(self) -> int:
+        """How many there are."""
+        return sum(map(count_of, self.tracked))
+
     @cached_property
     def enlarged(self) -> float:
         """Factor of the arrows: 1 if the longer ones can be seen at their true length."""
@@ -148,31 +135,15 @@ class _Scene:
 
 
 def write_case_picture(path: Path, case: Case) -> str:
-    """Draw a case.
-
-    Parameters
-    ----------
-    path : Path
-        PNG file.
-    case : Case
-
-    Returns
-    -------
-    str
-        Why the body from outside is not in it; empty if it is.
-    """
-    from matplotlib.figure import Figure
-
+    """Draw a case as PNG; returns why the body from outside is not in it, empty if it is."""
     scene = _Scene(case)
-    figure = Figure(figsize=(15.0, 11.6), layout="constrained")
-    panels = figure.subplots(2, 2).ravel()
-    for axes, view, place, section in zip(panels[:3], scene.views, scene.places, scene.sections, strict=True):
-        _draw_cut(axes, scene, view, place, section)
+    figure, panels = views.panels(2, 2, (15.0, 11.6))
+    for axes, view, place in zip(panels[:3], scene.views, views.places(case.mesh, scene.resected), strict=True):
+        _draw_cut(axes, scene, view, place)
     missing = _draw_open(panels[3], scene)
     _draw_legend(figure, scene)
     # on the left, for the legend is in the other corner
-    figure.suptitle(_headline(case), x=0.01, ha="left", fontsize=12, parse_math=False)
-    views.save(figure, path)
+    views.save(figure, path, _headline(case), x=0.01, ha="left")
     return missing
 
 
@@ -182,23 +153,25 @@ def _headline(case: Case) -> str:
     origin = "stand-in, not the patient's images" if case.origin == "stand-in" else case.origin
     size = f"{len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra, {1e6 * mesh.volume:.4g} cm3"
     recorded = ", ".join(f"{r.name} ({r.kind}, {count_of(r)})" for r in case.recordings) or "nothing"
-    return "\n".join((_lines(case.title), f"{origin}; {size}", _lines(f"recorded: {recorded}")))
-
-
-def _lines(text: str) -> str:
-    """Free text as two lines at most."""
-    return "\n".join(textwrap.wrap(text, _CHARACTERS, max_lines=2, placeholder=" ..."))
+    title, recordings = (
+        "\n".join(textwrap.wrap(text, _CHARACTERS, max_lines=2, placeholder=" ..."))
+        for text in (case.title, f"recorded: {recorded}")
+    )
+    return "\n".join((title, f"{origin}; {size}", recordings))
 
 
 # the cuts ----------------------------------------------------------------------------------------------------------
 
 
-def _draw_cut(axes: Any, scene: _Scene, view: View, place: float, section: Cut) -> None:
+def _draw_cut(axes: Any, scene: _Scene, view: View, place: float) -> None:
+    mesh = scene.mesh
+    section = cut(mesh.points, mesh.tetrahedra, np.zeros(len(mesh.points)), view.axis, place)
     views.draw_tissue(axes, section, scene.colours, _SEAM)
-    views.draw_outline(axes, scene.boundary, scene.mesh.points, view, place)
-    near = np.abs(scene.mesh.points[:, view.axis] - place) <= scene.near
+    views.draw_outline(axes, mesh, view, place)
+    near = np.abs(mesh.points[:, view.axis] - place) <= scene.near
     for number, (_, members) in enumerate(scene.node_sets):
-        _dots(axes, views.in_view(scene.mesh.points[members & near][:, view.plane]), number)
+        at, (colour, shape) = views.in_view(mesh.points[members & near][:, view.plane]), _SET_STYLES[number]
+        axes.plot(*at.T, shape, markersize=_dot_size(number), color=colour, **_RIM)
     for number, surface in enumerate(scene.surfaces):
         close = np.abs(surface.points[:, view.axis] - place) <= scene.near_recorded
         _crosses(axes, views.in_view(surface.points[close][:, view.plane]), number)
@@ -208,24 +181,19 @@ def _draw_cut(axes: Any, scene: _Scene, view: View, place: float, section: Cut) 
         start, along = (x[close][:, view.plane] for x in (tracked.points, scene.enlarged * tracked.displacement))
         _arrows(axes, views.in_view(start), views.in_view(along), number)
         shown += int(close.sum())
-    views.frame(axes, scene.mesh, view, scene.margin)
-    total = sum(map(count_of, scene.tracked))
-    counted = f"   ({shown} of {total} arrows)" if total else ""
-    axes.set_title(views.heading(scene.mesh, view, place) + counted, fontsize=11)
-
-
-def _dots(axes: Any, at: Floats, number: int) -> None:
-    """Members of a node set; smaller the later, so that a node of two sets shows both."""
-    colour, shape = _SET_STYLES[number]
-    axes.plot(*at.T, shape, markersize=_dot_size(number), color=colour, markeredgecolor="#333333", markeredgewidth=0.4)
+    # room for letters and a scale bar beside a body with corners
+    views.frame(axes, mesh, view, 0.085 * MILLIMETRES * scene.extent)
+    counted = f"   ({shown} of {scene.arrows} arrows)" if scene.arrows else ""
+    axes.set_title(views.heading(mesh, view, place) + counted, fontsize=11)
 
 
 def _dot_size(number: int) -> float:
+    """Smaller the later, so that a node of two sets shows both."""
     return 6.2 - 0.4 * number
 
 
 def _crosses(axes: Any, at: Floats, number: int) -> None:
-    axes.plot(*at.T, "x", markersize=4.0, markeredgewidth=0.9, color=_cross_colour(number))
+    axes.plot(*at.T, "x", markersize=4.0, markeredgewidth=0.9, color=_CROSSES[number % len(_CROSSES)])
 
 
 def _arrows(axes: Any, start: Floats, along: Floats, number: int) -> None:
@@ -243,18 +211,10 @@ def _arrows(axes: Any, start: Floats, along: Floats, number: int) -> None:
         headwidth=3.6,
         headlength=4.0,
         headaxislength=3.6,
-        color=_arrow_colour(number),
+        color=_ARROWS[number % len(_ARROWS)],
         path_effects=[withStroke(linewidth=1.3, foreground="white")],
         zorder=5,
     )
-
-
-def _arrow_colour(number: int) -> str:
-    return _ARROWS[number % len(_ARROWS)]
-
-
-def _cross_colour(number: int) -> str:
-    return _CROSSES[number % len(_CROSSES)]
 
 
 # the body cut open -------------------------------------------------------------------------------------------------
@@ -262,96 +222,103 @@ def _cross_colour(number: int) -> str:
 
 def _draw_open(axes: Any, scene: _Scene) -> str:
     """The body with a corner cut out and all that was recorded; why it is not rendered, or nothing."""
-    total = sum(map(count_of, scene.tracked))
-    arrows = f"; all {total} arrows, seen through the tissue" if total else ""
+    from scipy.spatial import KDTree
+
+    arrows = f"; all {scene.arrows} arrows, seen through the tissue" if scene.arrows else ""
     axes.set_title(f"a corner cut out{arrows}", fontsize=11)
     try:
-        body = render_body(scene.case, scene.resected)
+        image, camera = _render(scene)
     except RenderingError as error:
         views.bare(axes)
         axes.text(0.5, 0.5, textwrap.fill(str(error), 50), ha="center", va="center", transform=axes.transAxes)
         return str(error)
-    body.show(axes)
+    ends = {} if scene.case.specimen is None else {"ends": _SPECIMEN_ENDS}
+    show(axes, image, notes_on(camera, image.shape, scene.mesh, **ends))
+
+    def at(points: Floats) -> Floats:
+        """Where in the panel, in mm from its middle, positions (n, 3) [m] are."""
+        return (MILLIMETRES * points - camera.centre) @ np.column_stack([camera.right, camera.up])
+
+    corners = scene.mesh.points[scene.mesh.boundary]
+    this_side = face_vectors(scene.mesh.points, scene.mesh.boundary) @ camera.towards > 0.0
     for number, surface in enumerate(scene.surfaces):
-        _crosses(axes, body.picture(surface.points[_on_this_side(surface.points, scene, body)]), number)
+        # what is on the far side of the body is hidden
+        _crosses(axes, at(surface.points[this_side[KDTree(corners.mean(axis=1)).query(surface.points)[1]]]), number)
     for number, tracked in enumerate(scene.tracked):
-        along = body.picture(tracked.points + scene.enlarged * tracked.displacement)
-        start = body.picture(tracked.points)
-        _arrows(axes, start, along - start, number)
+        start, end = at(tracked.points), at(tracked.points + scene.enlarged * tracked.displacement)
+        _arrows(axes, start, end - start, number)
     return ""
 
 
-def _on_this_side(points: Floats, scene: _Scene, body: RenderedBody) -> Bools:
-    """Which points of a surface are not on the far side of the body."""
-    from scipy.spatial import KDTree
-
-    corners = scene.mesh.points[scene.boundary]
-    nearest = KDTree(corners.mean(axis=1)).query(points)[1]
-    return np.asarray((face_vectors(scene.mesh.points, scene.boundary) @ body.camera.towards)[nearest] > 0.0)
+def _render(scene: _Scene) -> tuple[Any, Camera]:
+    """The anatomy, and what is taken out of it in red, seen from where there is most to see; and from where that is."""
+    whole = scene.mesh
+    left = whole.without(scene.resected)[0] if scene.resected.any() else whole
+    recorded: list[PointsRecording | SurfaceRecording] = [*scene.tracked, *scene.surfaces]
+    where = np.concatenate([np.zeros((0, 3)), *(one.points for one in recorded)])
+    still = np.zeros_like(where)
+    drawn = scene_of(whole, left, np.zeros_like(left.points), scene.names, Moved(where, still, still))
+    camera = cameras_of(drawn)[BEFORE]
+    return render(drawn, {BEFORE: camera}, _SIZE)[BEFORE], camera
 
 
 # the legend --------------------------------------------------------------------------------------------------------
 
 
 def _draw_legend(figure: Any, scene: _Scene) -> None:
-    groups = (
-        ("tissue", _tissues(scene)),
-        (f"nodes within {_millimetres(scene.near)} of a cut", _sets(scene)),
-        (f"recorded (in a cut: within {_millimetres(scene.near_recorded)})", _recordings(scene)),
+    near, near_recorded = (
+        np.format_float_positional(MILLIMETRES * length, precision=2, fractional=False, trim="-") + " mm"
+        for length in (scene.near, scene.near_recorded)
     )
+    names = {label: _short(name) for label, name in scene.names.items()}
+    groups = {
+        "tissue": _first(views.tissue_entries(names, scene.mesh, scene.resected)),
+        f"nodes within {near} of a cut": _sets(scene),
+        f"recorded (in a cut: within {near_recorded})": _recordings(scene),
+    }
     entries: list[tuple[Any, str]] = []
     headings = []
-    for title, group in groups:
+    for title, group in groups.items():
         if group:
             headings.append(len(entries))
-            entries += [(_line(), title), *group, (_line(), "")]
+            entries += [(_mark(), title), *group, (_mark(), "")]
     texts = views.legend(figure, entries[:-1], loc="outside right upper", fontsize=10)
     for number in headings:
         texts[number].set_fontweight("bold")
-
-
-def _tissues(scene: _Scene) -> list[tuple[Any, str]]:
-    names = {label: _short(tissue.name) for label, tissue in scene.case.tissues.items()}
-    return _first(views.tissue_entries(names, scene.mesh, scene.resected))
-
-
-def _millimetres(length: float) -> str:
-    return np.format_float_positional(MILLIMETRES * length, precision=2, fractional=False, trim="-") + " mm"
 
 
 def _sets(scene: _Scene) -> list[tuple[Any, str]]:
     entries = []
     for number, (name, members) in enumerate(scene.node_sets):
         colour, shape = _SET_STYLES[number]
-        dot = _line(marker=shape, markersize=_dot_size(number), color=colour, markeredgecolor="#333333")
+        dot = _mark(marker=shape, markersize=_dot_size(number), color=colour, markeredgecolor="#333333")
         entries.append((dot, f"{_short(SET_TITLES.get(name, name))}: {members.sum()}"))
     left_out = len(scene.mesh.node_sets) - len(entries)
-    return entries + ([(_line(), f"and {left_out} larger, not drawn")] if left_out else [])
+    return entries + ([(_mark(), f"and {left_out} larger, not drawn")] if left_out else [])
 
 
 def _recordings(scene: _Scene) -> list[tuple[Any, str]]:
-    entries = []
-    for number, tracked in enumerate(scene.tracked):
-        arrow = _line(marker=">", linestyle="-", linewidth=1.8, markersize=6.0, color=_arrow_colour(number))
-        entries.append((arrow, f"{_short(tracked.name)}: {count_of(tracked)}"))
-    for number, surface in enumerate(scene.surfaces):
-        cross = _line(marker="x", markersize=5.0, color=_cross_colour(number))
-        entries.append((cross, f"{_short(surface.name)}: {count_of(surface)}"))
+    arrow = {"marker": ">", "linestyle": "-", "linewidth": 1.8, "markersize": 6.0}
+    cross = {"marker": "x", "markersize": 5.0}
+    kinds: tuple[tuple[Sequence[Recording], Any, tuple[str, ...]], ...]
+    kinds = ((scene.tracked, arrow, _ARROWS), (scene.surfaces, cross, _CROSSES))
+    entries = [
+        (_mark(color=colours[number % len(colours)], **style), f"{_short(one.name)}: {count_of(one)}")
+        for recordings, style, colours in kinds
+        for number, one in enumerate(recordings)
+    ]
     length = "true length" if scene.enlarged == 1.0 else f"drawn {scene.enlarged:g} times as long"
-    return _first(entries) + ([(_line(), f"arrows: {length}")] if scene.tracked else [])
+    return _first(entries) + ([(_mark(), f"arrows: {length}")] if scene.tracked else [])
 
 
 def _first(entries: list[tuple[Any, str]]) -> list[tuple[Any, str]]:
     """As many as there is room for."""
     left_out = len(entries) - _LISTED
-    return entries if left_out <= 0 else [*entries[:_LISTED], (_line(), f"and {left_out} more")]
+    return entries if left_out <= 0 else [*entries[:_LISTED], (_mark(), f"and {left_out} more")]
 
 
-def _line(**style: Any) -> Any:
-    """A handle of the legend; nothing to be seen without a style."""
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], **{"linestyle": "none", **style})
+def _mark(**style: Any) -> Any:
+    return views.line(**{"linestyle": "none", **style})
 
 
 def _short(name: str) -> str:

@@ -1,11 +1,14 @@
-"""A case in words: all that it says, and what checking it found."""
+"""Cases in words: the list of those that ship, all that one says, and what checking it found."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.checking import Checked
+from warpbrain.cases.shipped import Entry
 from warpbrain.mesh import Quality, measure
 from warpbrain.physics.words import length
 from warpbrain.recordings.recording import (
@@ -16,17 +19,26 @@ from warpbrain.recordings.recording import (
     TestRecording,
     count_of,
 )
-from warpbrain.report.summary import SET_TITLES
+from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.summary import SET_TITLES, STAND_IN
 
-#: Said wherever a stand-in is met.
-STAND_IN = "a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
+_ROW = "{:<14} {:<7} {:<10} {:>7} {:>9} {:>9}   {}"
+
+
+def list_lines(entries: Sequence[Entry]) -> list[str]:
+    """A head, and one line about each case."""
+    lines = [_ROW.format("case", "tissue", "origin", "nodes", "elements", "cm3", "recordings")]
+    for entry in entries:
+        recordings = ", ".join(f"{name} ({count})" for name, count in entry.recordings.items()) or "none"
+        numbers = (entry.nodes, entry.tetrahedra, f"{entry.volume_cm3:.1f}")
+        lines.append(_ROW.format(entry.name, entry.tissue, entry.origin, *numbers, recordings))
+    return lines
 
 
 def show_lines(case: Case) -> list[str]:
     """Everything a case says, as printed."""
-    lines = [case.title, f"  file      {case.path}", f"  origin    {case.origin}"]
-    if case.origin == "stand-in":
-        lines[-1] = f"  origin    {STAND_IN}"
+    origin = STAND_IN if case.origin == "stand-in" else case.origin
+    lines = [case.title, f"  file      {case.path}", f"  origin    {origin}"]
     lines += [f"  {line}" for line in _mesh_lines(case, measure(case.mesh))]
     for label, tissue in sorted(case.tissues.items()):
         law = f"mu = {tissue.law.shear_modulus:g} Pa" if tissue.law is not None else f"from the prior '{tissue.prior}'"
@@ -41,9 +53,7 @@ def show_lines(case: Case) -> list[str]:
 
 def _mesh_lines(case: Case, quality: Quality) -> list[str]:
     units = f"files in {case.frame.unit}, {case.frame.axes}"
-    sets = {SET_TITLES.get(k, k): int(v.sum()) for k, v in case.mesh.node_sets.items()}
-    elements = {k: int(v.sum()) for k, v in case.mesh.element_sets.items()}
-    volume, edge = 1e6 * quality.volume, 1000.0 * quality.mean_edge
+    volume, edge = 1e6 * quality.volume, MILLIMETRES * quality.mean_edge
     lines = [
         f"mesh      {quality.nodes} nodes, {quality.tetrahedra} tetrahedra of {edge:.3g} mm edge; {units}",
         f"volume    {volume:.4g} cm3, {case.density * quality.volume:.4g} kg at {case.density:g} kg/m3",
@@ -51,10 +61,10 @@ def _mesh_lines(case: Case, quality: Quality) -> list[str]:
         f"percentile of each tetrahedron's smallest {quality.first_percentile_dihedral:.1f}; "
         f"{quality.components} part(s)",
     ]
-    if sets:
-        lines.append("node sets " + ", ".join(f"{name} ({count})" for name, count in sets.items()))
-    if elements:
-        lines.append("elements  " + ", ".join(f"{name} ({count})" for name, count in elements.items()))
+    for kind, members in (("node sets", case.mesh.node_sets), ("elements ", case.mesh.element_sets)):
+        if members:
+            counts = ", ".join(f"{SET_TITLES.get(name, name)} ({inside.sum()})" for name, inside in members.items())
+            lines.append(f"{kind} {counts}")
     return lines
 
 
@@ -64,7 +74,7 @@ def recording_line(recording: Recording) -> str:
     role = "" if recording.role == "fit" else "; only checked, never fitted"
     lengths = isinstance(recording, PointsRecording | SurfaceRecording)
     lengths |= isinstance(recording, TestRecording) and recording.answer[0] == "displacement"
-    scale, unit = (1000.0, "mm") if lengths else (1.0, "")
+    scale, unit = (MILLIMETRES, "mm") if lengths else (1.0, "")
     noise = f"; noise {scale * recording.sigma:g} {unit}".rstrip() if recording.sigma is not None else ""
     if isinstance(recording, PointsRecording):
         sizes = np.linalg.norm(recording.displacement, axis=1)

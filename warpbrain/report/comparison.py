@@ -1,24 +1,40 @@
-"""Recordings beside a simulated state: the table that is printed, its JSON, and every row as CSV."""
+"""Recordings beside a simulated state: errors as a table and as JSON, every row as CSV, whether the state explains
+them better than nothing at all would, and what of the errors is likely to be the mesh's."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from warpbrain.atomic import whole_file
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
-from warpbrain.report.explained import Explained, explained
-from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.files import MILLIMETRES, picked, write_csv
+from warpbrain.simulation.mesh_error import MeshError
 from warpbrain.simulation.observation import Observed
 
 #: Units as people read them, by that of a comparison, the factor and the name.
 SHOWN = {"m": (MILLIMETRES, "mm")} | {unit: (1.0, unit) for unit in ("N", "Pa", "N m", "rad", "")}
+#: What "before" is, by the unit of an error: nothing moves, or nothing pushes.
+_NOTHING = {"mm": "no motion", "N": "no force", "Pa": "no stress"}
+WORSE, IN_PART, NO_NEARER, NEARER, UNKNOWN = (
+    "worse than no motion at all", "in part worse than no motion", "no nearer than no motion", "nearer than no motion",
+    "not compared",
+)  # fmt: skip
+
+
+def error_text(value: float, unit: str) -> str:
+    """An error as people read it: micrometres of lengths, three digits of what has any size."""
+    return f"{value:.3f}" if unit == "mm" else f"{value:.3g}"
+
+
+# errors at recordings -------------------------------------------------------------------------------------------------
 
 
 def describe_comparisons(observed: Observed) -> dict[str, Any]:
@@ -31,32 +47,17 @@ def describe_comparisons(observed: Observed) -> dict[str, Any]:
     }
 
 
-def explained_of(compared: Sequence[Mapping[str, Any]], what: str = "this simulation") -> Explained:
-    """Whether a state explains what `describe_comparisons` compared it with."""
-    numbers = [
-        {**entry, "before": entry["before"]["root_mean_square"], "after": entry["after"]["root_mean_square"]}
-        for entry in compared
-    ]
-    return explained(numbers, what)
-
-
 def _describe(comparison: Comparison) -> dict[str, Any]:
     factor, unit = SHOWN[comparison.unit]
 
     def error(value: Error | None) -> dict[str, Any] | None:
         if value is None:
             return None
-        said = {
-            "root_mean_square": factor * value.root_mean_square,
-            "percentile_95": factor * value.percentile_95,
-            "largest": factor * value.largest,
-        }
-        return said if value.legacy is None else {**said, "legacy_sqrt_mm": value.legacy}
+        sizes = {key: factor * getattr(value, key) for key in ("root_mean_square", "percentile_95", "largest")}
+        return sizes if value.legacy is None else {**sizes, "legacy_sqrt_mm": value.legacy}
 
-    said = {
-        "name": comparison.name,
-        "kind": comparison.kind,
-        "role": comparison.role,
+    described = {
+        **picked(comparison, "name", "kind", "role"),
         "unit": unit,
         "count": comparison.count,
         "before": error(comparison.before),
@@ -64,69 +65,195 @@ def _describe(comparison: Comparison) -> dict[str, Any]:
         "noise_root_mean_square": None if comparison.noise is None else factor * comparison.noise,
     }
     if comparison.reverse_before is not None:
-        said["mesh_to_recording_before"] = error(comparison.reverse_before)
-        said["mesh_to_recording_after"] = error(comparison.reverse_after)
-    return said
+        described["mesh_to_recording_before"] = error(comparison.reverse_before)
+        described["mesh_to_recording_after"] = error(comparison.reverse_after)
+    return described
 
 
-def comparison_lines(said: Mapping[str, Any], legacy: bool) -> list[str]:
+def comparison_lines(summary: Mapping[str, Any], legacy: bool) -> list[str]:
     """The table of errors, as printed."""
     lines = []
-    if said["compared"]:
-        lines.append(
-            "RMSE at recordings       count   before    after    noise"
-            + ("   legacy before    after [sqrt(mm)]" if legacy else "")
-        )
-    for entry in said["compared"]:
-        ways = [(entry["name"], entry["before"], entry["after"])]
+    if summary["compared"]:
+        more = "   legacy before    after [sqrt(mm)]" if legacy else ""
+        lines.append(f"RMSE at recordings       count   before    after    noise{more}")
+    for entry in summary["compared"]:
+        noise, role = entry["noise_root_mean_square"], "   check" if entry["role"] == "check" else ""
+        ways = [(entry["name"], entry["count"], "before", "after", "" if noise is None else f"{noise:.3f}")]
         if "mesh_to_recording_before" in entry:
             ways = [
-                (f"{entry['name']} to mesh", entry["before"], entry["after"]),
-                (f"mesh to {entry['name']}", entry["mesh_to_recording_before"], entry["mesh_to_recording_after"]),
+                (f"{entry['name']} to mesh", *ways[0][1:]),
+                (f"mesh to {entry['name']}", "", "mesh_to_recording_before", "mesh_to_recording_after", ""),
             ]
-        for number, (name, before, after) in enumerate(ways):
-            noise = entry["noise_root_mean_square"] if number == 0 else None
-            line = (
-                f"  {name:<20} {entry['count'] if number == 0 else '':>7} {before['root_mean_square']:>8.3f} "
-                f"{after['root_mean_square']:>8.3f} {'' if noise is None else f'{noise:.3f}':>8} {entry['unit']}"
-            )
-            if legacy and "legacy_sqrt_mm" in before:
-                line += f" {before['legacy_sqrt_mm']:>13.3f} {after['legacy_sqrt_mm']:>8.3f}"
-            lines.append(line + ("   check" if entry["role"] == "check" else ""))
-    if said["compared"]:
+        for name, count, before, after, left in ways:
+            errors = (entry[before]["root_mean_square"], entry[after]["root_mean_square"])
+            line = f"  {name:<20} {count:>7} {errors[0]:>8.3f} {errors[1]:>8.3f} {left:>8} {entry['unit']}"
+            if legacy and "legacy_sqrt_mm" in entry[before]:
+                line += f" {entry[before]['legacy_sqrt_mm']:>13.3f} {entry[after]['legacy_sqrt_mm']:>8.3f}"
+            lines.append(line + role)
+    if summary["compared"]:
         lines.append("  before: nothing moved; after: this simulation; noise: what the stated noise alone would leave")
-        lines += [f"  {sentence}" for sentence in said["in_words"]]
-    lines += [f"  not compared: {reason}" for reason in said["not_compared"]]
-    return lines
+        lines += [f"  {sentence}" for sentence in summary["in_words"]]
+    return lines + [f"  not compared: {reason}" for reason in summary["not_compared"]]
 
 
 def write_comparisons(path: Path, case: Case, observed: Observed) -> None:
     """Write every compared row: what was recorded, what was computed and the difference, in mm or N, axes RAS."""
+    write_csv(path, _rows(case, observed))
+
+
+def _rows(case: Case, observed: Observed) -> Iterator[list[Any]]:
+    vectors = [f"{what}_{axis}" for what in ("recorded", "computed", "difference") for axis in "xyz"]
+    yield ["recording", "kind", "unit", "row", "id", "x_mm", "y_mm", "z_mm", *vectors]
     recordings = {recording.name: recording for recording in case.recordings}
-    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
-        rows = csv.writer(stream)
-        rows.writerow(
-            ["recording", "kind", "unit", "row", "id", "x_mm", "y_mm", "z_mm"]
-            + [f"{what}_{axis}" for what in ("recorded", "computed", "difference") for axis in "xyz"]
-        )
-        for comparison in observed.comparisons:
-            factor, unit = SHOWN[comparison.unit]
-            recording = recordings[comparison.name]
-            for k, row in enumerate(comparison.rows):
-                place: Sequence[Any] = ("", "", "")
-                if isinstance(recording, PointsRecording | SurfaceRecording):
-                    place = _numbers(MILLIMETRES * recording.points[row])
-                ids = recording.ids if isinstance(recording, PointsRecording) else None
-                recorded = factor * comparison.residuals_before[k]
-                difference = factor * comparison.residuals_after[k]
-                if isinstance(
-                    recording, SurfaceRecording
-                ):  # unpaired: only the distance to the surface means something
-                    recorded = np.full(3, np.nan)
-                name = "" if ids is None else ids[row]
-                numbers = [*_numbers(recorded), *_numbers(recorded - difference), *_numbers(difference)]
-                rows.writerow([comparison.name, comparison.kind, unit, row, name, *place, *numbers])
+    for comparison in observed.comparisons:
+        factor, unit = SHOWN[comparison.unit]
+        recording = recordings[comparison.name]
+        for k, row in enumerate(comparison.rows):
+            place: Sequence[Any] = ("", "", "")
+            if isinstance(recording, PointsRecording | SurfaceRecording):
+                place = _numbers(MILLIMETRES * recording.points[row])
+            ids = recording.ids if isinstance(recording, PointsRecording) else None
+            recorded, difference = factor * comparison.residuals_before[k], factor * comparison.residuals_after[k]
+            if isinstance(recording, SurfaceRecording):
+                # unpaired: only the distance to the surface means something
+                recorded = np.full(3, np.nan)
+            numbers = [*_numbers(recorded), *_numbers(recorded - difference), *_numbers(difference)]
+            yield [comparison.name, comparison.kind, unit, row, "" if ids is None else ids[row], *place, *numbers]
 
 
 def _numbers(values: Any) -> list[str]:
     return ["" if np.isnan(value) else f"{value:.6g}" for value in values]
+
+
+# better or worse than nothing at all ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Explained:
+    """How a state compares with doing nothing."""
+
+    #: One of `WORSE`, `IN_PART`, `NO_NEARER`, `NEARER` and `UNKNOWN`, of lengths; of other units alone, `UNKNOWN`.
+    verdict: str
+    #: Root mean square over all rows in mm, with nothing moved and with the state.
+    before: float | None
+    after: float | None
+    #: Of all lengths together, and of each recording to which nothing is nearer than the state.
+    sentences: tuple[str, ...]
+
+
+def explained_of(compared: Sequence[Mapping[str, Any]]) -> Explained:
+    """Whether a simulation explains what `describe_comparisons` compared it with."""
+    return explained(
+        [
+            {**entry, "before": entry["before"]["root_mean_square"], "after": entry["after"]["root_mean_square"]}
+            for entry in compared
+        ]
+    )
+
+
+def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation") -> Explained:
+    """Judge a state, which sentences call `what`, by its comparisons.
+
+    Of each recording they have ``name``, ``unit``, ``count``, and root mean squares ``before`` and ``after`` in that
+    unit.
+    """
+    lengths = [one for one in entries if one["unit"] == "mm" and one["count"]]
+    count = sum(one["count"] for one in lengths)
+    before, after = (
+        math.sqrt(sum(one["count"] * one[key] ** 2 for one in lengths) / count) if count else None
+        for key in ("before", "after")
+    )
+    worse = [one for one in entries if one["after"] > one["before"]]
+    sentences = [
+        f"It explains '{one['name']}' worse than {_NOTHING.get(one['unit'], 'nothing')} at all: RMSE "
+        f"{error_text(one['after'], one['unit'])} {one['unit']} with it, {error_text(one['before'], one['unit'])} "
+        f"{one['unit']} without."
+        for one in worse
+    ]
+    if before is None or after is None:
+        return Explained(UNKNOWN, before, after, tuple(sentences))
+    # whole per cent of the error of no motion that are gone
+    gone = round(100.0 * (1.0 - after / before)) if before > 0.0 else 0
+    name = what[0].upper() + what[1:]
+    if after > before:
+        verdict, first = WORSE, (
+            f"{name} explains the recordings worse than no motion at all: RMSE {after:.3f} mm with it, {before:.3f} mm "
+            "if nothing had moved."
+        )  # fmt: skip
+    elif not gone:
+        verdict, first = IN_PART if worse else NO_NEARER, (
+            f"{name} explains the recordings no better than no motion at all: RMSE {after:.3f} mm with it and without."
+        )  # fmt: skip
+    else:
+        verdict, first = IN_PART if worse else NEARER, (
+            f"{name} takes {gone} % off the error of no motion at all: RMSE {before:.3f} mm if nothing had moved, "
+            f"{after:.3f} mm with it."
+        )  # fmt: skip
+    return Explained(verdict, before, after, (first, *sentences))
+
+
+# the error of the mesh ------------------------------------------------------------------------------------------------
+
+
+def describe_mesh_error(error: MeshError, elements: str, observed: Observed, without: Observed) -> dict[str, Any]:
+    """The estimate with units, for elements of a run.
+
+    `observed` is recordings beside the state, `without` beside the state with the estimated error taken off.
+    """
+    ways, linear = [], elements == "tet4"
+    if linear:
+        ways.append("elements of averaged gradients on the same mesh, which lock less")
+    if error.size is not None:
+        ways.append("such elements of half the size, whose difference is taken for three quarters of what is left")
+    recordings = []
+    for here, there in zip(observed.comparisons, without.comparisons, strict=True):
+        factor, unit = SHOWN[here.unit]
+        recordings.append(
+            {
+                "name": here.name,
+                "unit": unit,
+                **_sizes(np.nan_to_num(there.residuals_after - here.residuals_after), factor),
+                "root_mean_square_after": factor * here.after.root_mean_square,
+                "root_mean_square_without_it": factor * there.after.root_mean_square,
+            }
+        )
+    return {
+        "how": f"compared with {' and '.join(ways)}",
+        "displacement_mm": _sizes(error.u, MILLIMETRES),
+        "locking_mm": _sizes(error.locking, MILLIMETRES) if linear else None,
+        "element_size_mm": None if error.size is None else _sizes(error.size, MILLIMETRES),
+        "locking_share": error.locking_share if linear and error.size is not None else None,
+        "recordings": recordings,
+    }
+
+
+def _sizes(vectors: Floats, factor: float) -> dict[str, float]:
+    lengths = factor * np.linalg.norm(vectors, axis=1)
+    high = float(np.percentile(lengths, 95.0))
+    return {"median": float(np.median(lengths)), "percentile_95": high, "largest": float(lengths.max())}
+
+
+def mesh_error_lines(summary: Mapping[str, Any]) -> list[str]:
+    """The estimate, as printed."""
+    if "unknown" in summary:
+        return [f"error of the mesh: not known: {summary['unknown']}"]
+
+    def row(name: str, sizes: Mapping[str, float]) -> str:
+        return f"  {name:<24} {sizes['median']:>8.3f} {sizes['percentile_95']:>8.3f} {sizes['largest']:>8.3f}"
+
+    titles = {"all nodes": "displacement_mm", "locking": "locking_mm", "element size": "element_size_mm"}
+    lines = ["error of the mesh, estimated  median     95 %      max"]
+    lines += [f"{row(title, summary[key])} mm" for title, key in titles.items() if summary[key] is not None]
+    for entry in summary["recordings"]:
+        lines.append(
+            f"{row(entry['name'], entry)} {entry['unit']}; RMSE {entry['root_mean_square_after']:.3f}, "
+            f"without it {entry['root_mean_square_without_it']:.3f}"
+        )
+    share = summary["locking_share"]
+    if share is not None and share > 1.0:
+        lines.append(
+            "  elements that do not lock move too far on this mesh: all of it may be locking, but not what they say"
+        )
+    elif share is not None and not math.isnan(share):
+        lines.append(f"  {100.0 * share:.0f} % of it is likely to be locking, the rest the size of elements")
+    return [*lines, f"  {summary['how']}"]

@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.diagnosis.result import Diagnosis, Ranked
 from warpbrain.ensemble.results import EnsembleResult
 from warpbrain.errors import InputError
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.inference.probability import percent
+from warpbrain.recordings.comparison import Comparison
 from warpbrain.report.case_text import show_lines
 from warpbrain.report.comparison import SHOWN
-from warpbrain.report.ensemble_text import describe_ensemble, ensemble_lines
+from warpbrain.report.ensemble import describe_ensemble, ensemble_lines
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.summary import SET_TITLES, left_out
+from warpbrain.report.summary import SET_TITLES, describe_result, left_out
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.run import Run
 from warpbrain.simulation.specimen_run import SpecimenRun
@@ -39,8 +40,8 @@ def html(what: Any) -> str:
     """
     title, rows = _told(what)
     body = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(said)}</td></tr>'
-        for name, said in rows
+        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(value)}</td></tr>'
+        for name, value in rows
     )
     return f"<div><strong>{escape(title)}</strong><table>{body}</table></div>"
 
@@ -59,11 +60,8 @@ def _(what: Case) -> tuple[str, Rows]:
 @_told.register
 def _(what: Result) -> tuple[str, Rows]:
     rows = [
-        (
-            SET_TITLES.get(name, name),
-            f"mean {MILLIMETRES * s.mean:.3g} mm, at most {MILLIMETRES * s.largest:.3g} mm, {s.nodes} nodes",
-        )
-        for name, s in what.displacement_statistics().items()
+        (SET_TITLES.get(name, name), f"mean {s['mean']:.3g} mm, at most {s['largest']:.3g} mm, {s['nodes']} nodes")
+        for name, s in describe_result(what)["displacement_mm"].items()
     ]
     rows += [
         ("volume ratio J", f"{what.J.min():.3f} to {what.J.max():.3f}"),
@@ -76,16 +74,14 @@ def _(what: Result) -> tuple[str, Rows]:
 def _(what: Run) -> tuple[str, Rows]:
     largest = MILLIMETRES * float(np.linalg.norm(what.u, axis=1).max())
     rows = [("state", what.followed.solution["kind"]), ("moves by at most", f"{largest:.3g} mm")]
-    rows += [(name, _before_after(*error)) for name, error in _errors(what.observed.comparisons)]
+    rows += [(one.name, _before_after(one)) for one in what.observed.comparisons]
     return what.case.title, rows + [("left out", sentence) for sentence in left_out(what.model)]
 
 
 @_told.register
 def _(what: SpecimenRun) -> tuple[str, Rows]:
-    tests = [(t.recording.name, t.comparison, t.result.r_squared) for t in what.tests]
-    fits = {name: "" if math.isnan(r2) else f"; R² {r2:.4f}" for name, _, r2 in tests}
-    errors = _errors([comparison for _, comparison, _ in tests])
-    return what.case.title, [(name, _before_after(*error) + fits[name]) for name, error in errors]
+    fits = ((t, "" if math.isnan(t.result.r_squared) else f"; R² {t.result.r_squared:.4f}") for t in what.tests)
+    return what.case.title, [(t.recording.name, _before_after(t.comparison) + fit) for t, fit in fits]
 
 
 @_told.register
@@ -96,16 +92,12 @@ def _(what: Posterior) -> tuple[str, Rows]:
 
 
 @_told.register
-def _(what: Diagnosis) -> tuple[str, Rows]:
+def _(what: Diagnosis | SpecimenDiagnosis) -> tuple[str, Rows]:
     rows = [("verdict", what.sentence)]
-    rows += [(one.kind, f"probability {percent(one.probability)}") for one in what.ranking]
-    return f"Diagnosis of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
-
-
-@_told.register
-def _(what: SpecimenDiagnosis) -> tuple[str, Rows]:
-    rows = [("verdict", what.sentence)]
-    rows += [(one.name, f"probability {percent(one.probability)}") for one in what.ranking]
+    rows += [
+        (one.kind if isinstance(one, Ranked) else one.name, f"probability {percent(one.probability)}")
+        for one in what.ranking
+    ]
     return f"Diagnosis of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
 
 
@@ -115,16 +107,9 @@ def _(what: EnsembleResult) -> tuple[str, Rows]:
     return first, [("", line) for line in rest if line]
 
 
-def _errors(comparisons: Any) -> list[tuple[str, tuple[float, float, str]]]:
-    rows = []
-    for one in comparisons:
-        factor, unit = SHOWN[one.unit]
-        before, after = factor * one.before.root_mean_square, factor * one.after.root_mean_square
-        rows.append((one.name, (before, after, unit)))
-    return rows
-
-
-def _before_after(before: float, after: float, unit: str) -> str:
+def _before_after(one: Comparison) -> str:
+    factor, unit = SHOWN[one.unit]
+    before, after = factor * one.before.root_mean_square, factor * one.after.root_mean_square
     return f"RMSE {before:.3g} before, {after:.3g} {unit} after".rstrip()
 
 

@@ -16,8 +16,7 @@ from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import PointsRecording, Recording
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.rendering.offscreen import RenderingError, render
-from warpbrain.report.rendering.scene import (
+from warpbrain.report.rendering import (
     AFTER,
     AXIAL,
     BEFORE,
@@ -28,7 +27,9 @@ from warpbrain.report.rendering.scene import (
     RECORDED,
     SAGITTAL,
     Camera,
+    RenderingError,
     Scene,
+    render,
 )
 
 #: Pixels of one picture.
@@ -39,13 +40,7 @@ _MOVED, _RECORDED = 0.11, 0.15
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """Points that were recorded and where the simulation has them, all (k, 3) [m].
-
-    Attributes
-    ----------
-    where, recorded, computed : (k, 3) array
-        Positions before, displacements.
-    """
+    """Points that were recorded, how far they moved, and how far the simulation has them move, all (k, 3) [m]."""
 
     where: Floats
     recorded: Floats
@@ -61,29 +56,17 @@ class Moved:
             if isinstance(recording, PointsRecording):
                 moved = one.residuals_before - one.residuals_after
                 found.append(np.column_stack([recording.points[one.rows], one.residuals_before, moved]))
-        where, recorded, computed = np.split(np.concatenate(found), 3, axis=1)
-        return cls(where, recorded, computed)
+        return cls(*np.split(np.concatenate(found), 3, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """Renderings of a scene, and what makes a figure of them.
-
-    Attributes
-    ----------
-    scene : Scene
-    images : dict of str to (height, width, 3) uint8 array
-    cameras : dict of str to Camera
-    whole : TetMesh
-    resected : (m,) bool array
-        Elements of it that were taken out.
-    names : dict of int to str
-        Of the tissues.
-    """
+    """Renderings (height, width, 3) uint8 of a scene, and what makes a figure of them."""
 
     scene: Scene
     images: dict[str, Any]
     cameras: dict[str, Camera]
+    #: The anatomy, elements (m,) of it that were taken out, and the names of its tissues.
     whole: TetMesh
     resected: Bools
     names: dict[int, str]
@@ -92,15 +75,8 @@ class Pictures:
 def pictures_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Pictures:
     """Render a deformed body.
 
-    Parameters
-    ----------
-    whole, mesh : TetMesh
-        The anatomy before anything was resected, and what is left of it.
-    u : (n, 3) array
-        Displacement of the nodes of `mesh` [m].
-    names : dict
-        Names of the tissues by label.
-    moved : Moved
+    `whole` is the anatomy before anything was resected, `mesh` what is left of it, of whose nodes u (n, 3) [m] is the
+    displacement; `names` are those of the tissues by label.
 
     Raises
     ------
@@ -130,15 +106,11 @@ def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], mo
     sizes = MILLIMETRES * np.linalg.norm(u, axis=1)
     size = MILLIMETRES * float(np.ptp(whole.points, axis=0).max())
     resected = taken_out(whole, mesh)
-    removed = whole.without(resected)[0] if resected.any() else None
     # nodes of what is left first, as in `mesh`; those that only what was removed has come after them
-    points, tetrahedra = mesh.points, mesh.tetrahedra
-    tissue, gone = mesh.tissue, np.zeros(len(tetrahedra), dtype=bool)
-    if removed is not None:
-        points = np.concatenate([points, whole.points])
-        tetrahedra = np.concatenate([tetrahedra, whole.tetrahedra[resected] + len(mesh.points)])
-        tissue = np.concatenate([tissue, whole.tissue[resected]])
-        gone = np.concatenate([gone, np.ones(int(resected.sum()), dtype=bool)])
+    more = whole.points if resected.any() else whole.points[:0]
+    points, tissue = np.concatenate([mesh.points, more]), np.concatenate([mesh.tissue, whole.tissue[resected]])
+    tetrahedra = np.concatenate([mesh.tetrahedra, whole.tetrahedra[resected] + len(mesh.points)])
+    gone = np.arange(len(tetrahedra)) >= len(mesh.tetrahedra)
     by_label = {label: np.array(to_rgb(c)) for label, c in views.tissue_colours(names, whole).items()}
     colours = np.array([by_label[label] for label in tissue.tolist()])
     colours[gone] = to_rgb(views.RESECTED)
@@ -172,29 +144,29 @@ def round_factor(wanted: float, length: float) -> float:
     """How many times as long as it is a length is drawn: 1, 2 or 5 and zeros, never less than 1, 1 of what is not."""
     if length < 1e-6 * wanted:
         return 1.0
-    factor = max(1.0, wanted / length)
-    decade = 10.0 ** math.floor(math.log10(factor))
-    return max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= factor * (1.0 + 1e-9))
+    return views.round_below(max(1.0, wanted / length) * (1.0 + 1e-9))
 
 
 def cameras_of(scene: Scene) -> dict[str, Camera]:
     """Where each picture is seen from: the body, before and after, fills it."""
     moved = scene.points + scene.exaggeration * scene.u
     everything = np.concatenate([scene.points, moved[np.unique(scene.tetrahedra[~scene.removed])]])
-    oblique = _seen_from(scene.side * [0.80, 0.85, 0.62], everything)
     tips = np.concatenate([everything, scene.where + scene.arrows * scene.recorded])
-    cameras = {BEFORE: oblique, AFTER: oblique, MOTION: _seen_from(scene.side * [1.0, 0.25, 0.12], tips)}
+    cameras = {}
+    for name, towards, points in (
+        (BEFORE, [0.80, 0.85, 0.62], everything),
+        (AFTER, [0.80, 0.85, 0.62], everything),
+        (MOTION, [1.0, 0.25, 0.12], tips),
+    ):
+        # what is above is above
+        to_viewer = scene.side * towards
+        right = np.cross([0.0, 0.0, 1.0], to_viewer)
+        right /= np.linalg.norm(right)
+        cameras[name] = _fitted(points, right, np.cross(to_viewer / np.linalg.norm(to_viewer), right))
     x, y, z = np.eye(3)
     for name, (right, up) in {AXIAL: (-x, y), CORONAL: (-x, z), SAGITTAL: (-y, z)}.items():
         cameras[name] = _fitted(everything, right, up)
     return cameras
-
-
-def _seen_from(towards: Floats, points: Floats) -> Camera:
-    """A camera that points (n, 3) fill, with what is above in it above; `towards` is from them to the viewer."""
-    right = np.cross([0.0, 0.0, 1.0], towards)
-    right /= np.linalg.norm(right)
-    return _fitted(points, right, np.cross(towards / np.linalg.norm(towards), right))
 
 
 def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
@@ -218,62 +190,35 @@ def draw(
     title: str,
     subtitles: Sequence[str],
 ) -> Pictures | str:
-    """Render a deformed body and write the picture of it; see `pictures_of` and `write_picture`.
+    """Render a deformed body, see `pictures_of`, and write the picture of it below a title and more lines.
 
-    Returns
-    -------
-    Pictures or str
-        Or why nothing can be rendered here: no picture is then left at `path`, which would be one of something else.
+    Returns why, if nothing can be rendered here: no picture is then left at `path`, which would be one of something
+    else.
     """
     try:
         pictures = pictures_of(whole, mesh, u, names, moved)
     except RenderingError as error:
         path.unlink(missing_ok=True)
         return str(error)
-    write_picture(path, pictures, title, subtitles)
-    return pictures
-
-
-def write_picture(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -> None:
-    """Write the pictures of a deformed body as one PNG file.
-
-    Parameters
-    ----------
-    path : Path
-    pictures : Pictures
-    title : str
-    subtitles : sequence of str
-        Lines below it.
-    """
     from matplotlib.cm import ScalarMappable
-    from matplotlib.figure import Figure
 
     scene, lines = pictures.scene, len(subtitles) + 1
     high = 9.8 + 0.24 * lines
-    figure = Figure(figsize=(13.8, high), facecolor="white")
+    figure, axes = views.panels(2, 3, (13.8, high))
     # room for the title, which has any number of lines
     figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.24 * lines / high))
-    axes = figure.subplots(2, 3).ravel()
     for panel, (name, image) in zip(axes, pictures.images.items(), strict=True):
         show(panel, image, annotations_of(pictures, name))
         panel.set_title(heading(pictures, name), fontsize=10)
     shades = ScalarMappable(cmap="viridis")
     shades.set_clim(0.0, scene.top)
-    bar = figure.colorbar(shades, ax=list(axes), location="bottom", shrink=0.7, aspect=45, pad=0.01)
+    bar = figure.colorbar(shades, ax=axes, location="bottom", shrink=0.7, aspect=45, pad=0.01)
     bar.set_label("displacement [mm]; red: where it was before")
-    views.legend(figure, _entries(pictures), loc="outside lower center", fontsize=9, ncols=6)
-    # the title is the user's free text, in which a dollar sign begins no formula
-    figure.suptitle("\n".join([title, *subtitles]), fontsize=12, parse_math=False, y=1.0 - 0.08 / high, va="top")
-    views.save(figure, path)
-
-
-def _entries(pictures: Pictures) -> list[tuple[Any, str]]:
-    from matplotlib.lines import Line2D
-
-    entries = views.tissue_entries(pictures.names, pictures.whole, pictures.resected)
-    return entries + [
-        (Line2D([], [], color=colour, linewidth=2.5), name) for name, colour in arrow_colours(pictures.scene).items()
-    ]
+    entries = views.tissue_entries(names, whole, pictures.resected)
+    entries += [(views.line(color=colour, linewidth=2.5), name) for name, colour in arrow_colours(scene).items()]
+    views.legend(figure, entries, loc="outside lower center", fontsize=9, ncols=6)
+    views.save(figure, path, "\n".join([title, *subtitles]), y=1.0 - 0.08 / high, va="top")
+    return pictures
 
 
 def arrow_colours(scene: Scene) -> dict[str, str]:
@@ -284,44 +229,33 @@ def arrow_colours(scene: Scene) -> dict[str, str]:
 
 def heading(pictures: Pictures, name: str) -> str:
     """What stands above a picture, in two lines."""
-    scene = pictures.scene
+    scene, factor = pictures.scene, pictures.scene.exaggeration
     if name == BEFORE:
         return "before\n"
     if name == AFTER:
-        return f"after\n{_times(scene.exaggeration)}"
-    if name == MOTION:
-        if len(scene.where):
-            return f"recorded and computed\n{_times(scene.arrows)}"
-        return f"how the surface moves\n{_times(scene.exaggeration)}"
-    view = next(view for view in views.VIEWS if view.axis == CUTS[name])
-    said = views.heading(pictures.whole, view, float(scene.places[view.axis]) / MILLIMETRES)
-    return f"{said}\n{_times(scene.exaggeration)}"
-
-
-def _times(factor: float) -> str:
-    return "motion as large as it is" if factor == 1.0 else f"motion {factor:g} times as large"
+        above = "after"
+    elif name == MOTION and len(scene.where):
+        above, factor = "recorded and computed", scene.arrows
+    elif name == MOTION:
+        above = "how the surface moves"
+    else:
+        view = next(view for view in views.VIEWS if view.axis == CUTS[name])
+        above = views.heading(pictures.whole, view, float(scene.places[view.axis]) / MILLIMETRES)
+    return f"{above}\n" + ("motion as large as it is" if factor == 1.0 else f"motion {factor:g} times as large")
 
 
 @dataclass(frozen=True)
 class Annotations:
-    """Letters and lines on a picture, in mm from its middle to the right and up.
+    """Letters and lines on a picture, in mm from its middle to the right and up."""
 
-    Attributes
-    ----------
-    across, high : float
-        Half the width and half the height of the picture.
-    letters : tuple of tuple of float, float and str
-        Where, and which direction of the patient that is.
-    lines : tuple of tuple of four floats
-        From and to: of the directions, where they are not those of the picture.
-    bar : tuple of three floats and str
-        Left end and height of the scale bar, its length, and the words.
-    """
-
+    #: Half the width and half the height of the picture.
     across: float
     high: float
+    #: Where, and which direction of the patient that is.
     letters: tuple[tuple[float, float, str], ...]
+    #: From and to: of the directions, where they are not those of the picture.
     lines: tuple[tuple[float, float, float, float], ...]
+    #: Left end and height of the scale bar, its length, and the words.
     bar: tuple[float, float, float, str]
 
 
@@ -365,6 +299,6 @@ def show(panel: Any, image: Any, notes: Annotations) -> None:
         panel.text(x, y, letter, fontsize=10, color="#6a6a6a", va="center", ha="center")
     for x, y, to_x, to_y in notes.lines:
         panel.plot([x, to_x], [y, to_y], color="#6a6a6a", linewidth=1.2)
-    left, low, length, said = notes.bar
+    left, low, length, words = notes.bar
     panel.plot([left, left + length], [low, low], color="#333333", linewidth=2.0)
-    panel.text(left + 0.5 * length, low + 0.03 * notes.high, said, fontsize=8, ha="center", color="#333333")
+    panel.text(left + 0.5 * length, low + 0.03 * notes.high, words, fontsize=8, ha="center", color="#333333")

@@ -6,8 +6,6 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.ensemble.results import EnsembleResult
@@ -15,8 +13,8 @@ from warpbrain.errors import InputError
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.mesh import TetMesh
 from warpbrain.report.diagnosis.files import file_of_map
-from warpbrain.report.ensemble_files import file_of_fields
-from warpbrain.report.files import MILLIMETRES, file_of_result
+from warpbrain.report.ensemble import file_of_fields
+from warpbrain.report.files import body_file, file_of_result, sets_of
 from warpbrain.report.state_files import file_of_estimate
 from warpbrain.report.views import TISSUE_COLOURS
 from warpbrain.simulation.result import Result
@@ -86,15 +84,47 @@ def plot(
     InputError
         If it cannot be drawn, or has no such field: the message lists those it has.
     """
-    figure = _figure(what, field)
+    figure = None
+    if isinstance(what, SpecimenRun):
+        from warpbrain.report.specimen import COLUMNS, tests_figure
+
+        figure = tests_figure(what.tests, COLUMNS)
+    elif isinstance(what, Posterior) and field == "moduli":
+        from warpbrain.report.estimate_picture import densities_figure
+
+        figure = densities_figure(what, narrow=False)
     if figure is not None:
         if screenshot is not None:
             figure.savefig(screenshot)
         return figure
+    if cut not in _SIDES:
+        raise InputError(f"cut = {cut!r}: expected 'x', 'y', 'z' or None")
     import pyvista
 
+    file, usual = _file(what)
+    body = pyvista.from_meshio(file)
+    name = usual if field is None else field
+    known = [*body.point_data, *body.cell_data]
+    if name not in known:
+        raise InputError(f"field = {name!r}: there is none in a {type(what).__name__}; it has {', '.join(known)}")
+    moves = next((key for key in ("displacement", "displacement_mean") if key in body.point_data), None)
+    if moves is not None:
+        body.points = body.points + exaggeration * body.point_data[moves]
+    shown = body if cut is None else body.clip(normal=cut)
     plotter = pyvista.Plotter(off_screen=True if screenshot is not None else None)
-    _add(plotter, what, field, exaggeration, cut)
+    categories = name == "tissue"
+    plotter.add_mesh(
+        shown,
+        scalars=name,
+        cmap=list(TISSUE_COLOURS) if categories else "viridis",
+        smooth_shading=True,
+        split_sharp_edges=True,
+        categories=categories,
+        show_scalar_bar=not categories,
+        scalar_bar_args={"title": f"{_UNITS.get(name, name)}\n", "color": "#333333", "fmt": "%.3g", **_BAR},
+    )
+    plotter.set_background("white")
+    plotter.add_axes(xlabel="R", ylabel="A", zlabel="S", color="#333333")
     side = view or _SIDES[cut]
     plotter.view_vector(side, viewup=(0.0, 1.0, 0.0) if cut == "z" and view is None else (0.0, 0.0, 1.0))
     plotter.camera.zoom(1.1)
@@ -112,36 +142,6 @@ def grid(what: Any) -> Any:
     return pyvista.from_meshio(_file(what)[0])
 
 
-def _add(plotter: Any, what: Any, field: str | None, exaggeration: float, cut: str | None) -> None:
-    if cut not in _SIDES:
-        raise InputError(f"cut = {cut!r}: expected 'x', 'y', 'z' or None")
-    import pyvista
-
-    file, usual = _file(what)
-    body = pyvista.from_meshio(file)
-    name = usual if field is None else field
-    known = [*body.point_data, *body.cell_data]
-    if name not in known:
-        raise InputError(f"field = {name!r}: there is none in a {type(what).__name__}; it has {', '.join(known)}")
-    moves = next((key for key in ("displacement", "displacement_mean") if key in body.point_data), None)
-    if moves is not None:
-        body.points = body.points + exaggeration * body.point_data[moves]
-    shown = body if cut is None else body.clip(normal=cut)
-    categories = name == "tissue"
-    plotter.add_mesh(
-        shown,
-        scalars=name,
-        cmap=list(TISSUE_COLOURS) if categories else "viridis",
-        smooth_shading=True,
-        split_sharp_edges=True,
-        categories=categories,
-        show_scalar_bar=not categories,
-        scalar_bar_args={"title": f"{_UNITS.get(name, name)}\n", "color": "#333333", "fmt": "%.3g", **_BAR},
-    )
-    plotter.set_background("white")
-    plotter.add_axes(xlabel="R", ylabel="A", zlabel="S", color="#333333")
-
-
 @singledispatch
 def _file(what: Any) -> tuple[Any, str]:
     """A `meshio.Mesh` in mm, and the field of it that is shown unless another is asked for."""
@@ -153,38 +153,14 @@ def _file(what: Any) -> tuple[Any, str]:
 
 @_file.register
 def _(what: TetMesh) -> tuple[Any, str]:
-    import meshio
-
-    sets = {name: members.astype(np.uint8) for name, members in what.node_sets.items()}
-    cells = {name: [members.astype(np.uint8)] for name, members in what.element_sets.items()}
-    tetrahedra = [("tetra", what.tetrahedra)]
-    of_cells = {**cells, "tissue": [what.tissue]}
-    return meshio.Mesh(MILLIMETRES * what.points, tetrahedra, point_data=sets, cell_data=of_cells), "tissue"
+    return body_file(what, sets_of(what.node_sets), sets_of(what.element_sets)), "tissue"
 
 
-@_file.register
-def _(what: Case) -> tuple[Any, str]:
-    return _file(what.mesh)
-
-
-@_file.register
-def _(what: Result) -> tuple[Any, str]:
-    return file_of_result(what), "displacement"
-
-
-@_file.register
-def _(what: Run) -> tuple[Any, str]:
-    return _file(what.result)
-
-
-@_file.register
-def _(what: Posterior) -> tuple[Any, str]:
-    return file_of_estimate(what), "displacement"
-
-
-@_file.register
-def _(what: Diagnosis) -> tuple[Any, str]:
-    return file_of_map(what), "score"
+_file.register(Case, lambda what: _file(what.mesh))
+_file.register(Result, lambda what: (file_of_result(what), "displacement"))
+_file.register(Run, lambda what: _file(what.result))
+_file.register(Posterior, lambda what: (file_of_estimate(what), "displacement"))
+_file.register(Diagnosis, lambda what: (file_of_map(what), "score"))
 
 
 @_file.register
@@ -192,16 +168,3 @@ def _(what: EnsembleResult) -> tuple[Any, str]:
     if what.fields is None:
         raise InputError("what: no sample of this ensemble has an answer; the reasons are in its rows")
     return file_of_fields(what.fields), "displacement_sd"
-
-
-def _figure(what: Any, field: str | None) -> Any:
-    """The figure of what is drawn as curves; None of bodies."""
-    if isinstance(what, SpecimenRun):
-        from warpbrain.report.specimen_picture import COLUMNS, tests_figure
-
-        return tests_figure(what.tests, COLUMNS)
-    if isinstance(what, Posterior) and field == "moduli":
-        from warpbrain.report.estimate_picture import densities_figure
-
-        return densities_figure(what, narrow=False)
-    return None

@@ -1,4 +1,7 @@
-"""`report.html` of a run: what moved, how far that is from what was recorded, and what the model leaves out."""
+"""`report.html` of a run: what moved, how far that is from what was recorded, and what the model leaves out.
+
+Of tests of a specimen it is their curves in the place of a body. The words are in `page/run.html`.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,26 @@ from typing import Any
 
 from warpbrain.mesh import TetMesh
 from warpbrain.report import views
-from warpbrain.report.body_sections import before_and_after, in_three_dimensions
-from warpbrain.report.comparison import explained_of
-from warpbrain.report.explained import IN_PART, NEARER, NO_NEARER, UNKNOWN, WORSE, number
-from warpbrain.report.generative.page import BLACK, GREEN, ORANGE, QUIET, VERMILLION
-from warpbrain.report.mesh_error import mesh_error_lines
-from warpbrain.report.page.document import document, header, listed, section, text, write_document
+from warpbrain.report.body_sections import before_and_after, body_view
+from warpbrain.report.comparison import (
+    IN_PART,
+    NEARER,
+    NO_NEARER,
+    UNKNOWN,
+    WORSE,
+    error_text,
+    explained_of,
+    mesh_error_lines,
+)
+from warpbrain.report.page import Top, document, sections_of, write_document
+from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
-from warpbrain.report.page.tables import table
 from warpbrain.report.picture import Moved, Pictures
+from warpbrain.report.specimen import tests_figure
 from warpbrain.report.summary import SET_TITLES
+from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, QUIET, VERMILLION
 from warpbrain.simulation.result import Result
+from warpbrain.simulation.specimen_run import Tested
 
 #: Ground and letters of what stands on top.
 BADGES = {
@@ -33,21 +45,12 @@ BADGES = {
 def write_run_page(
     path: Path, summary: Mapping[str, Any], result: Result, whole: TetMesh, moved: Moved, pictures: Pictures | str
 ) -> None:
-    """Write the page.
+    """Write the page of a run.
 
-    Parameters
-    ----------
-    path : Path
-    summary : mapping
-        What `summary.json` holds.
-    result : Result
-    whole : TetMesh
-        The anatomy before anything was resected.
-    moved : Moved
-    pictures : Pictures or str
-        Or why there are none.
+    `summary` is what `summary.json` holds, `whole` the anatomy before anything was resected; without pictures it is
+    said why there are none.
     """
-    case, said = summary["case"], summary["result"]
+    case, described, solution = summary["case"], summary["result"], summary["solution"]
     judged = explained_of(summary["recordings"]["compared"])
     fields = [
         Field(
@@ -55,111 +58,70 @@ def write_run_page(
         )
         for name, values in result.nodal_pressures.items()
     ]
-    places = views.places(whole, views.resected_elements(whole))
-    drawn = None if isinstance(pictures, str) else pictures
-    sections = [
-        before_and_after(drawn, pictures if isinstance(pictures, str) else ""),
-        section("What was recorded", recordings_table(summary["recordings"]["compared"]), _not_compared(summary)),
-        section("What the model leaves out", listed(case["left_out"])),
-        in_three_dimensions(result.mesh, result.u, fields, moved, places),
-        section("Displacement", _displacements(said)),
-        section("Error of the mesh", _mesh_error(summary)),
-        section("What was assumed", listed(case["assumptions"]), tissue_table(case), remarks(case["remarks"])),
-        section("How it was computed", _solution(summary), versions(summary["versions"])),
-    ]
-    largest = said["displacement_mm"]["all nodes"]["largest"]
+    places = views.places(whole)
+    solved = [f"{solution['kind']}, {len(solution['history'])} recorded steps"]
+    if "time_s" in solution:
+        solved.append(f"until {solution['time_s']:.4g} s")
+    if "relative_residual" in solution:
+        residual = f"{solution['relative_residual']:.1e} (goal {solution['tolerance']:.0e})"
+        solved.append(f"relative out-of-balance force {residual}")
+    largest = described["displacement_mm"]["all nodes"]["largest"]
     facts = [("largest displacement", f"{largest:.3g} mm")]
     if judged.before is not None:
         facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
     sentences = judged.sentences or ["Nothing was recorded of this case that the simulation could be compared with."]
-    top = header(case["title"], judged.verdict, sentences, facts)
-    write_document(path, document(f"{case['name']}: {case['title']}", top, sections, BADGES[judged.verdict]))
+    _write(
+        path, summary, Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts),
+        pictures=before_and_after(pictures),
+        view=body_view(result.mesh, result.u, fields, moved, places),
+        displacements=[
+            [SET_TITLES.get(name, name), s["nodes"]]
+            + [f"{s[key]:.3f}" for key in ("mean", "root_mean_square", "percentile_95", "largest")]
+            for name, s in described["displacement_mm"].items()
+        ],
+        mesh_error=mesh_error_lines(summary["mesh_error"]) if "mesh_error" in summary else [],
+        solution=solved,
+    )  # fmt: skip
 
 
-def recordings_table(compared: Sequence[Mapping[str, Any]]) -> str:
-    """Errors at recordings, before and after."""
-    rows = []
-    for one in compared:
-        noise = one["noise_root_mean_square"]
-        rows.append(
-            [
-                text(one["name"]),
-                f"{one['count']}",
-                number(one["before"]["root_mean_square"], one["unit"]),
-                number(one["after"]["root_mean_square"], one["unit"]),
-                number(one["after"]["percentile_95"], one["unit"]),
-                number(one["after"]["largest"], one["unit"]),
-                "" if noise is None else number(noise, one["unit"]),
-                text(one["unit"]),
-                "check" if one["role"] == "check" else "",
-            ]
-        )
-    head = ("recording", "rows", "nothing moves", "this", "95 %", "largest", "noise alone", "unit", "role")
-    caption = "Root mean square; 95 % and largest of this state"
-    return table(head, rows, numbers=range(1, 7), caption=caption) if rows else "<p>Nothing was recorded.</p>"
+def write_specimen_page(path: Path, summary: Mapping[str, Any], tests: Sequence[Tested]) -> None:
+    """Write the page of tests; `summary` is what `summary.json` holds."""
+    figure = inlined(
+        lambda narrow: tests_figure(tests, 1 if narrow else 2),
+        f"Recorded and simulated curves of {len(tests)} tests.",
+        "Each test as it was recorded and as it is simulated. What is marked check is not to be fitted.",
+    )
+    worse = explained_of(summary["recordings"]["compared"]).sentences
+    sentences = worse or ["Every test is nearer to this simulation than to none."]
+    top = Top(
+        summary["case"]["title"], "tests of a specimen", (BLUE, "#ffffff"), sentences, [("tests", f"{len(tests)}")]
+    )
+    _write(path, summary, top, tests=figure)
 
 
-def _not_compared(summary: Mapping[str, Any]) -> str:
-    reasons = summary["recordings"]["not_compared"]
-    return f"<h3>Not compared</h3>{listed(reasons)}" if reasons else ""
+def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> None:
+    case = summary["case"]
+    nothing = {"tests": "", "pictures": "", "view": "", "displacements": [], "mesh_error": [], "solution": []}
+    sections = sections_of(
+        "run.html", summary=summary, **{**nothing, **values},
+        recorded=[_recorded(one) for one in summary["recordings"]["compared"]],
+        tissues=[
+            [label, one["name"], f"{one['law']} ({one['formulation']})", f"{one['shear_modulus_Pa']:.4g}"]
+            for label, one in case["tissues"].items()
+        ],
+        seconds=[[name, f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()],
+    )  # fmt: skip
+    write_document(path, document(f"{case['name']}: {case['title']}", top, sections))
 
 
-def _displacements(said: Mapping[str, Any]) -> str:
-    rows = [
-        [text(SET_TITLES.get(name, name)), f"{s['nodes']}"]
-        + [f"{s[key]:.3f}" for key in ("mean", "root_mean_square", "percentile_95", "largest")]
-        for name, s in said["displacement_mm"].items()
+def _recorded(one: Mapping[str, Any]) -> list[Any]:
+    noise, after = one["noise_root_mean_square"], one["after"]
+    errors = (
+        one["before"]["root_mean_square"],
+        *(after[key] for key in ("root_mean_square", "percentile_95", "largest")),
+    )
+    return [
+        *(one["name"], one["count"], *(error_text(value, one["unit"]) for value in errors)),
+        *("" if noise is None else error_text(noise, one["unit"]), one["unit"]),
+        "check" if one["role"] == "check" else "",
     ]
-    head = ("nodes of", "nodes", "mean [mm]", "RMS [mm]", "95 % [mm]", "largest [mm]")
-    J, stress = said["volume_ratio_J"], said["von_mises_Pa"]["largest"]
-    low, high = said["principal_stretch"]["smallest"], said["principal_stretch"]["largest"]
-    return table(head, rows, numbers=range(1, 6)) + (
-        f"<p>Volume ratio J {J['smallest']:.3f} to {J['largest']:.3f}; principal stretches {low:.3f} to {high:.3f}; "
-        f"largest von Mises stress {stress:.3g} Pa.</p>"
-    )
-
-
-def _mesh_error(summary: Mapping[str, Any]) -> str:
-    if "mesh_error" not in summary:
-        return ""
-    return f'<pre class="wide" tabindex="0">{text(chr(10).join(mesh_error_lines(summary["mesh_error"])))}</pre>'
-
-
-def tissue_table(case: Mapping[str, Any]) -> str:
-    """Laws of the tissues, and the mesh."""
-    rows = [
-        [label, text(one["name"]), text(f"{one['law']} ({one['formulation']})"), f"{one['shear_modulus_Pa']:.4g}"]
-        for label, one in case["tissues"].items()
-    ]
-    mesh = (
-        f"<p>{case['nodes']} nodes and {case['tetrahedra']} tetrahedra of elements {text(case['elements'])} "
-        f"({text(case['elements_chosen'])}); {case['volume_cm3']:.1f} cm³, {case['mass_kg']:.4g} kg, Poisson ratio "
-        f"{case['poisson']:g}.</p>"
-    )
-    return table(("label", "tissue", "law", "shear modulus [Pa]"), rows, numbers=(3,)) + mesh
-
-
-def remarks(sentences: Sequence[str]) -> str:
-    """Remarks under a heading of their own; nothing of none."""
-    return f"<h3>Remarks</h3>{listed(sentences)}" if sentences else ""
-
-
-def _solution(summary: Mapping[str, Any]) -> str:
-    solution, device = summary["solution"], summary["device"]
-    said = [f"{text(solution['kind'])}, {len(solution['history'])} recorded steps"]
-    if "time_s" in solution:
-        said.append(f"until {solution['time_s']:.4g} s")
-    if "relative_residual" in solution:
-        said.append(
-            f"relative out-of-balance force {solution['relative_residual']:.1e} (goal {solution['tolerance']:.0e})"
-        )
-    seconds = [[text(name), f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()]
-    return (
-        f"<p>{'; '.join(said)}. On {text(device['name'])} ({text(device['alias'])}) in {text(device['precision'])} "
-        f"precision.</p>{table(('phase', 'time [s]'), seconds, numbers=(1,))}"
-    )
-
-
-def versions(known: Mapping[str, str]) -> str:
-    """Versions of what computed it, and the files that hold the numbers."""
-    return f"<p>Versions: {text(', '.join(f'{key} {value}' for key, value in known.items()))}.</p>"

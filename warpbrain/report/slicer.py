@@ -6,16 +6,14 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.images.moving_points import PointFile
 from warpbrain.images.reading import Image
-from warpbrain.mesh.vtu import write_vtu
 from warpbrain.recordings.electrodes import is_electrodes
-from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.files import MILLIMETRES, write_body
 from warpbrain.report.state_files import LEFT, SEEN, TRUST, UNSEEN, SavedState
 
 #: Names of the transforms: what they do to an image.
@@ -120,62 +118,39 @@ def write_slicer_scene(
     points: Sequence[PointFile],
     files: Sequence[str],
 ) -> list[str]:
-    """Write the surfaces and the script beside files that are there already.
+    """Write the surfaces and the script beside files that are there already; returns the names of those added.
 
-    Parameters
-    ----------
-    folder : Path
-    state : SavedState
-    image : Image or None
-        Before.
-    image_after, labels_after : str or None
-        Names of the files of the warped image and labels.
-    points : sequence of PointFile
-        Before.
-    files : sequence of str
-        Names of all files.
-
-    Returns
-    -------
-    list of str
-        Names of the files that were added.
+    `image` and `points` are those before, `image_after` and `labels_after` names of files of what was warped, `files`
+    the names of all that were written.
     """
+    import meshio
+
     size = MILLIMETRES * np.linalg.norm(state.u, axis=1)
     faces = state.mesh.boundary
     nodes, numbers = np.unique(faces, return_inverse=True)
     for name, moved in zip(SURFACES, (0.0, 1.0), strict=True):
-        corners = MILLIMETRES * (state.mesh.points + moved * state.u)[nodes]
-        _write_surface(folder / name, corners, numbers.reshape(-1, 3), size[nodes])
+        corners, triangles = MILLIMETRES * (state.mesh.points + moved * state.u)[nodes], numbers.reshape(-1, 3)
+        sizes = {"displacement_size": size[nodes]}
+        write_body(folder / name, meshio.Mesh(corners, [("triangle", triangles)], point_data=sizes))
     volumes = [] if image is None else [image.path.resolve().as_posix()]
     volumes += [] if image_after is None else [image_after]
     markups = [file for file in points if not is_electrodes(file.path)]
+    meanings = [[value, meaning, *_COLOURS[value]] for value, meaning in TRUST.items()]
+    values = {
+        "folder": folder.resolve().as_posix(),
+        "volumes": [name for name in volumes if not name.lower().endswith((".mgz", ".mgh"))],
+        "labels": [] if labels_after is None else [labels_after],
+        "deviation": [name for name in files if name == DEVIATION],
+        "trust": [[name, meanings] for name in files if name == TRUST_MAP],
+        "surfaces": [[SURFACES[0], 0.3], [SURFACES[1], 1.0]],
+        "markups": [[file.path.resolve().as_posix(), file.moved_name] for file in markups],
+        "electrodes": [file.path.name for file in points if is_electrodes(file.path)],
+        "transform": FORTH,
+        "largest": max(float(size.max()), 1e-6),
+    }
     script = _TEXT.substitute(
-        path=(folder / SCRIPT).resolve().as_posix(),
-        folder=json.dumps(folder.resolve().as_posix()),
-        volumes=json.dumps([name for name in volumes if not name.lower().endswith((".mgz", ".mgh"))]),
-        labels=json.dumps([] if labels_after is None else [labels_after]),
-        deviation=json.dumps([name for name in files if name == DEVIATION]),
-        trust=json.dumps(
-            [
-                [name, [[value, meaning, *_COLOURS[value]] for value, meaning in TRUST.items()]]
-                for name in files
-                if name == TRUST_MAP
-            ]
-        ),
-        surfaces=json.dumps([[SURFACES[0], 0.3], [SURFACES[1], 1.0]]),
-        markups=json.dumps([[file.path.resolve().as_posix(), file.moved_name] for file in markups]),
-        electrodes=json.dumps([file.path.name for file in points if is_electrodes(file.path)]),
-        transform=json.dumps(FORTH),
-        largest=json.dumps(max(float(size.max()), 1e-6)),
+        path=(folder / SCRIPT).resolve().as_posix(), **{name: json.dumps(value) for name, value in values.items()}
     )
     with whole_file(folder / SCRIPT) as scratch:
         scratch.write_text(script, encoding="utf-8")
     return [*SURFACES, SCRIPT]
-
-
-def _write_surface(path: Path, points: Any, faces: Any, size: Any) -> None:
-    import meshio
-
-    mesh = meshio.Mesh(points, [("triangle", faces)], point_data={"displacement_size": size})
-    with whole_file(path) as scratch:
-        write_vtu(scratch, mesh)

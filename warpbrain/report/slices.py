@@ -15,38 +15,18 @@ _SIDES = np.array([(0, 1), (1, 2), (2, 0)])
 
 @dataclass(frozen=True)
 class Cut:
-    """A plane cut.
+    """A plane cut."""
 
-    Attributes
-    ----------
-    polygons : list of (3 or 4, 2) arrays
-        Corners in the plane, in the two axes that are not cut.
-    elements : (k,) int array
-        Element of each polygon.
-    values : (k,) array
-        Mean of the nodal values over the corners of each polygon.
-    corners : list of (3 or 4,) arrays
-        Values at the corners of each polygon.
-    """
-
+    #: Corners (3 or 4, 2) in the plane, in the two axes that are not cut; and the element (k,) of each polygon.
     polygons: list[Floats]
     elements: Ints
+    #: Mean (k,) of the nodal values over the corners of each polygon, and values (3 or 4,) at these.
     values: Floats
     corners: list[Floats]
 
 
 def cut(points: Floats, tetrahedra: NDArray[np.integer], values: Floats, axis: int, position: float) -> Cut:
-    """Cut tetrahedra by the plane ``x[axis] = position``.
-
-    Parameters
-    ----------
-    points : (n, 3) array
-    tetrahedra : (m, 4) int array
-    values : (n,) array
-        Interpolated along the cut edges.
-    axis : int
-    position : float
-    """
+    """Cut tetrahedra (m, 4) by the plane ``x[axis] = position``; values (n,) are interpolated along the cut edges."""
     # a node exactly in the plane counts as above it
     above = points[:, axis] >= position
     crossing = above[tetrahedra].any(axis=1) & ~above[tetrahedra].all(axis=1)

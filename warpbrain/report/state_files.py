@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,15 +10,14 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats, Ints
-from warpbrain.atomic import whole_file
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.patience import patience
-from warpbrain.mesh.vtu import read_vtu, write_vtu
-from warpbrain.report.files import MIDDLES, MILLIMETRES
+from warpbrain.mesh.vtu import read_vtu
+from warpbrain.report.files import MIDDLES, MILLIMETRES, body_file, write_body
 from warpbrain.worlds.body.displacement_spread import displacement_deviation
 
 #: Files that hold a deformed body, in the order in which they are looked for: of `run`, of `estimate` and `diagnose`,
@@ -36,38 +34,21 @@ TRUST = {
 
 @dataclass(frozen=True, eq=False)
 class SavedState:
-    """A deformed body.
-
-    Attributes
-    ----------
-    path : Path
-    mesh : TetMesh
-        At rest, without sets.
-    u : (n, 3) array
-        Displacement [m]; of an ensemble its mean.
-    middles : (m, 6, 3) array or None
-        Displacement of the midside nodes of quadratic elements [m].
-    deviation : (n,) array or None
-        Standard deviation of the displacement [m]: the root of the summed variances of its components.
-    trust : (n,) int array or None
-        `SEEN`, `UNSEEN` where recordings see no force, `LEFT` where they and the declared case disagree.
-    """
+    """A deformed body: its mesh at rest, without sets, and what its nodes carry."""
 
     path: Path
     mesh: TetMesh
+    #: Displacement (n, 3) [m], of an ensemble its mean; and (m, 6, 3) that of the midside nodes of quadratic elements.
     u: Floats
     middles: Floats | None
+    #: Standard deviation of the displacement (n,) [m]: the root of the summed variances of its components.
     deviation: Floats | None
+    #: (n,): `SEEN`, `UNSEEN` where recordings see no force, `LEFT` where they and the declared case disagree.
     trust: Ints | None
 
 
 def read_state(result: Path) -> SavedState:
-    """Open the deformed body of a result.
-
-    Parameters
-    ----------
-    result : Path
-        A folder that `warpbrain run`, `estimate`, `diagnose` or `ensemble` has written, or a file of `FILES`.
+    """Open the deformed body of a result: of a folder that a command has written, or a file of `FILES`.
 
     Raises
     ------
@@ -101,21 +82,12 @@ def read_state(result: Path) -> SavedState:
         if middles.shape != (len(cells), 18) or not np.isfinite(middles).all():
             raise InputError(f"{path}: {MIDDLES}: expected 18 finite numbers for each of {len(cells)} tetrahedra")
         middles = middles.reshape(-1, 6, 3) / MILLIMETRES
-    return SavedState(path, mesh, u / MILLIMETRES, middles, _deviation(at), _trust(at))
-
-
-def _deviation(at: Mapping[str, Floats]) -> Floats | None:
-    if "displacement_sd" not in at:
-        return None
-    values = at["displacement_sd"]
-    return np.asarray(np.linalg.norm(values.reshape(len(values), -1), axis=1) / MILLIMETRES)
-
-
-def _trust(at: Mapping[str, Floats]) -> Ints | None:
-    if not {"blind", "significant"} <= at.keys():
-        return None
-    seen = np.where(at["blind"] > 0.0, UNSEEN, SEEN)
-    return np.where(at["significant"] > 0.0, LEFT, seen)
+    deviation = trust = None
+    if (spread := at.get("displacement_sd")) is not None:
+        deviation = np.asarray(np.linalg.norm(spread.reshape(len(spread), -1), axis=1) / MILLIMETRES)
+    if {"blind", "significant"} <= at.keys():
+        trust = np.where(at["significant"] > 0.0, LEFT, np.where(at["blind"] > 0.0, UNSEEN, SEEN))
+    return SavedState(path, mesh, u / MILLIMETRES, middles, deviation, trust)
 
 
 def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | None = None) -> None:
@@ -126,21 +98,17 @@ def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | No
     """
     file = file_of_estimate(posterior)
     if where is not None:
-        file.point_data |= _seen(where, posterior.case.remaining[0])
-    _write(path, file)
+        file.point_data |= seen(where, posterior.case.remaining[0])
+    write_body(path, file)
 
 
 def file_of_estimate(posterior: Posterior) -> Any:
     """What `write_estimated_state` writes, as a `meshio.Mesh`."""
     du, covariance = posterior.best.linearised.du, posterior.covariance
     variance = np.einsum("pnk,pq,qnk->nk", du, covariance, du)
-    return _file(
-        posterior.case.remaining[0],
-        {
-            "displacement": MILLIMETRES * posterior.best.point.state.u,
-            "displacement_sd": MILLIMETRES * np.sqrt(np.maximum(variance, 0.0)),
-        },
-    )
+    deviation = MILLIMETRES * np.sqrt(np.maximum(variance, 0.0))
+    arrays = {"displacement": MILLIMETRES * posterior.best.point.state.u, "displacement_sd": deviation}
+    return body_file(posterior.case.remaining[0], arrays)
 
 
 def write_diagnosed_state(path: Path, diagnosis: Diagnosis) -> None:
@@ -152,32 +120,24 @@ def write_diagnosed_state(path: Path, diagnosis: Diagnosis) -> None:
     refit = diagnosis.best.refit
     state = diagnosis.base.at if refit is None else refit.state
     mesh = state.system.model.mesh
-    arrays = {"displacement": MILLIMETRES * state.u, **_seen(diagnosis.map, mesh)}
+    arrays = {"displacement": MILLIMETRES * state.u, **seen(diagnosis.map, mesh)}
     # a state at the edge of what is stable has an equilibrium, and none beside it
     with contextlib.suppress(SolveError):
         arrays["displacement_sd"] = MILLIMETRES * displacement_deviation(diagnosis.best, diagnosis.base)
-    _write(path, _file(mesh, arrays))
+    write_body(path, body_file(mesh, arrays))
 
 
-def _seen(where: ScoreMap, mesh: TetMesh) -> dict[str, Any]:
+def seen(where: ScoreMap, mesh: TetMesh) -> dict[str, Any]:
     """What the map says at each node: whether what is left is significant, and whether recordings see no force."""
-    from scipy.spatial import cKDTree
-
-    nearest = cKDTree(where.sites).query(mesh.points)[1]
+    nearest = nearest_site(where, mesh)
     return {
         "significant": (where.scores[nearest] > where.threshold).astype(np.uint8),
         "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
     }
 
 
-def _file(mesh: TetMesh, arrays: dict[str, Any]) -> Any:
-    import meshio
+def nearest_site(where: ScoreMap, mesh: TetMesh) -> Ints:
+    """Index (n,) of the place of the map that is nearest to each node."""
+    from scipy.spatial import cKDTree
 
-    return meshio.Mesh(
-        MILLIMETRES * mesh.points, [("tetra", mesh.tetrahedra)], point_data=arrays, cell_data={"tissue": [mesh.tissue]}
-    )
-
-
-def _write(path: Path, file: Any) -> None:
-    with whole_file(path) as scratch:
-        write_vtu(scratch, file)
+    return np.asarray(cKDTree(where.sites).query(mesh.points)[1])

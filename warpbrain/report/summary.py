@@ -1,20 +1,26 @@
-"""What a run prints and writes as JSON: one dictionary, from which the printed tables are made too."""
+"""What a run prints and writes as JSON: dictionaries, from which the printed tables are made too."""
 
 from __future__ import annotations
 
 import platform
 from collections.abc import Mapping
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from warpbrain import __version__
-from warpbrain.cases.case import Case
+from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.checking import NOTHING_ACTS
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.report.files import MILLIMETRES, picked
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
 
+if TYPE_CHECKING:
+    from warpbrain.cases.drawn import FromPrior
+
+#: Said wherever a stand-in is met.
+STAND_IN = "a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
 #: How the node sets are called where users read them.
 SET_TITLES = {
     "all nodes": "all nodes",
@@ -51,9 +57,7 @@ def machine() -> dict[str, str]:
 def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[str, Any]:
     """Anatomy and assumptions of a case, with units; `chosen` says why the elements were, if nobody asked for them."""
     return {
-        "name": case.name,
-        "title": case.title,
-        "origin": case.origin,
+        **picked(case, "name", "title", "origin"),
         "file": str(case.path),
         "nodes": len(model.mesh.points),
         "tetrahedra": len(model.mesh.tetrahedra),
@@ -70,8 +74,7 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
                 "name": tissue.name,
                 "law": tissue.known_law.name,
                 "formulation": tissue.formulation,
-                "parameters": vars(tissue.known_law),
-                "shear_modulus_Pa": tissue.known_law.shear_modulus,
+                **_law(tissue),
             }
             for label, tissue in sorted(case.tissues.items())
             if (model.mesh.tissue == label).any()
@@ -82,62 +85,64 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
     }
 
 
+def _law(tissue: Tissue) -> dict[str, Any]:
+    return {"parameters": vars(tissue.known_law), "shear_modulus_Pa": tissue.known_law.shear_modulus}
+
+
 def describe_result(result: Result) -> dict[str, Any]:
     """Displacements by node set and extremes of strain and stress, with units."""
     return {
         "displacement_mm": {
-            name: {
-                "nodes": s.nodes,
-                "mean": 1000.0 * s.mean,
-                "root_mean_square": 1000.0 * s.root_mean_square,
-                "percentile_95": 1000.0 * s.percentile_95,
-                "largest": 1000.0 * s.largest,
-            }
-            for name, s in result.displacement_statistics().items()
+            name: {"nodes": s.nodes, **sizes_mm(s)} for name, s in result.displacement_statistics().items()
         },
-        "volume_ratio_J": {"smallest": result.J.min(), "largest": result.J.max()},
-        "principal_stretch": {
-            "smallest": result.principal_stretches.min(),
-            "largest": result.principal_stretches.max(),
-        },
+        "volume_ratio_J": _ends(result.J),
+        "principal_stretch": _ends(result.principal_stretches),
         "von_mises_Pa": {"largest": result.von_mises.max()},
-        "pressure_Pa": {"smallest": result.pressure.min(), "largest": result.pressure.max()},
+        "pressure_Pa": _ends(result.pressure),
         "reaction_N": result.reactions.sum(axis=0),
-        "pressures_at_nodes_Pa": {
-            name: {"smallest": values.min(), "largest": values.max()} for name, values in result.nodal_pressures.items()
-        },
+        "pressures_at_nodes_Pa": {name: _ends(values) for name, values in result.nodal_pressures.items()},
     }
+
+
+def _ends(values: Any) -> dict[str, float]:
+    return {"smallest": values.min(), "largest": values.max()}
+
+
+def sizes_mm(statistics: Any) -> dict[str, float]:
+    """Statistics of displacements in mm."""
+    keys = ("mean", "root_mean_square", "percentile_95", "largest")
+    return {key: MILLIMETRES * getattr(statistics, key) for key in keys}
 
 
 def case_lines(summary: Mapping[str, Any]) -> list[str]:
     """The anatomy and its assumptions, as printed."""
     lines = [summary["title"]]
     if summary["origin"] == "stand-in":
-        lines.append(
-            "  a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
-        )
+        lines.append(f"  {STAND_IN}")
+    before, after = summary["volume_before_resection_cm3"], summary["volume_cm3"]
     lines.append(
         f"  mesh      {summary['nodes']} nodes, {summary['tetrahedra']} tetrahedra"
         + (f" of elements {summary['elements']}" if summary["elements"] != "tet4" else "")
         + (f" with {summary['midside_nodes']} midside nodes" if summary["midside_nodes"] else "")
-        + ", "
-        f"{summary['volume_cm3']:.1f} cm3, {summary['mass_kg']:.4f} kg"
-        + (
-            f" (before resection {summary['volume_before_resection_cm3']:.1f} cm3)"
-            if summary["volume_before_resection_cm3"] - summary["volume_cm3"] > 1e-6
-            else ""
-        )
+        + f", {after:.1f} cm3, {summary['mass_kg']:.4f} kg"
+        + (f" (before resection {before:.1f} cm3)" if before - after > 1e-6 else "")
     )
-    lines += elements_lines(summary)
-    for label, tissue in summary["tissues"].items():
-        lines.append(
-            f"  tissue {label}  {tissue['name']}: {tissue['law']} ({tissue['formulation']}), "
-            f"mu = {tissue['shear_modulus_Pa']:g} Pa, nu = {summary['poisson']:g}"
-        )
-    lines += [f"  assumed   {sentence}" for sentence in summary["assumptions"]]
-    lines += [f"  remark    {sentence}" for sentence in summary["remarks"]]
-    lines += [f"  left out  {sentence}" for sentence in summary["left_out"]]
-    return lines
+    return lines + elements_lines(summary) + tissue_lines(summary) + sentence_lines(summary)
+
+
+def tissue_lines(summary: Mapping[str, Any]) -> list[str]:
+    """The law of each tissue, as printed."""
+    return [
+        f"  tissue {label}  {tissue['name']}: {tissue['law']} ({tissue['formulation']}), "
+        f"mu = {tissue['shear_modulus_Pa']:g} Pa, nu = {summary['poisson']:g}"
+        for label, tissue in summary["tissues"].items()
+    ]
+
+
+def sentence_lines(summary: Mapping[str, Any]) -> list[str]:
+    """What is assumed, remarked and left out, as printed."""
+    kinds = (("assumed", "assumptions"), ("remark", "remarks"), ("left out", "left_out"))
+    return [f"  {kind:<9} {sentence}" for kind, key in kinds for sentence in summary[key]]
 
 
 def elements_lines(summary: Mapping[str, Any]) -> list[str]:
@@ -173,4 +178,43 @@ def timing_lines(phases: Mapping[str, float], counts: Mapping[str, int]) -> list
     for name, seconds in phases.items():
         calls = counts.get(name, 1)
         lines.append(f"  {name:<22} {calls:>6} {1000.0 * seconds / calls:>9.2f} {1000.0 * seconds:>9.1f}")
+    return lines
+
+
+def describe_prior(found: FromPrior) -> dict[str, Any]:
+    """Model, draw and laws, with units; the draw is None where the laws are those of middle curves."""
+    drawn, draw = found.drawn, None
+    tissues: dict[str, dict[str, Any]] = {}
+    for label in found.labels:
+        tissue = found.case.tissues[label]
+        known = {"name": tissue.name, "group": tissue.prior, "law": tissue.known_law.name}
+        tissues[str(label)] = known | _law(tissue)
+    if drawn is not None:
+        draw = {"sample": drawn.number, "seed": drawn.seed, "redrawn": len(drawn.rejected), "reasons": drawn.rejected}
+        for described, fitted in zip(tissues.values(), drawn.fits, strict=True):
+            described["rms_of_fit"] = fitted.rms
+    return {"model": found.model.name, "variant": found.model.variant, "draw": draw, "tissues": tissues}
+
+
+def prior_lines(described: Mapping[str, Any] | None) -> list[str]:
+    """What is printed; nothing for None, where no law is the generative model's."""
+    if described is None:
+        return []
+    draw = described["draw"]
+    by = f"the generative model {described['model']} ({described['variant']})"
+    lines, curve = [], f"the middle curve of {by}"
+    if draw is not None:
+        redrawn, curve = f"unstable and redrawn: {draw['redrawn']}", "drawn"
+        lines = [f"  prior     draw {draw['sample']} of seed {draw['seed']} by {by}; {redrawn}"]
+        lines += [f"  redrawn   {reason}" for reason in draw["reasons"]]
+    for label, tissue in described["tissues"].items():
+        parameters = []
+        for name, value in tissue["parameters"].items():
+            numbers = ", ".join(f"{v:.6g}" for v in (value if isinstance(value, tuple) else (value,)))
+            # exponents have no unit
+            parameters.append(f"{name} = {numbers}" + ("" if name == "alpha" else " Pa"))
+        lines.append(
+            f"  tissue {label}  {tissue['group']}, {curve}: {tissue['law']}, {', '.join(parameters)}, "
+            f"shear modulus {tissue['shear_modulus_Pa']:.6g} Pa"
+        )
     return lines

@@ -1,8 +1,11 @@
-"""Two results side by side: inputs, distance from the recordings, displacement, tissue, verdict."""
+"""Two results side by side: folders opened again, inputs, distance from recordings, displacement, tissue, verdict."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +14,121 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.recordings.location import locate
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.saved_result import Quantity, SavedResult
-from warpbrain.report.state_files import SavedState
+from warpbrain.report.state_files import FILES, SavedState, read_state
+
+#: Files that say what a result is, and the command that wrote them; an ensemble's has the same name as a run's.
+_KINDS = {"diagnosis.json": "diagnose", "estimate.json": "estimate", "summary.json": "run"}
+#: Keys of what is said of the case and of the solution that are outcomes, or are said elsewhere.
+_NO_INPUT = ("tissues", "left_out", "title", "file", "first_step", "history", "relative_residual", "stored_energy_J")
+_INPUTS = ("solution", "options", "prior", "method", "seed", "chosen", "course", "device", "workers")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of a result, with the interval (low, high) that holds it with 95 % if there is one."""
+
+    value: float
+    unit: str
+    interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SavedResult:
+    """A folder of results, the command that wrote it, its JSON, and the deformed body, if there is one."""
+
+    folder: Path
+    command: str
+    summary: Mapping[str, Any]
+    state: SavedState | None
+
+    def inputs(self) -> dict[str, str]:
+        """What it was made from and how, as text by name."""
+        summary = self.summary
+        found = {"command": self.command}
+        found |= {f"sha256 of {name}": digest[:16] for name, digest in (summary.get("inputs_sha256") or {}).items()}
+        for part in ("case", *_INPUTS):
+            value = summary.get(part)
+            if isinstance(value, dict):
+                value = {key: item for key, item in value.items() if key not in _NO_INPUT and "iterations" not in key}
+            found |= dict(_flat(part, value))
+        return found | dict(_flat("version of", summary.get("versions", {})))
+
+    def errors(self) -> dict[str, Quantity]:
+        """Root mean square differences from what was recorded, by what they are of."""
+        by_name: dict[str, Quantity] = {}
+
+        def add(name: str, unit: str, before: float, after: float, interval: tuple[float, float] | None = None) -> None:
+            by_name[f"{name}, nothing moved"] = Quantity(before, unit)
+            by_name[name] = Quantity(after, unit, interval)
+
+        for one in (self.summary.get("recordings") or {}).get("compared", []):
+            add(one["name"], one["unit"], one["before"]["root_mean_square"], one["after"]["root_mean_square"])
+        for one in self.summary.get("predictions", []):
+            add(one["name"], one["unit"], one["root_mean_square_before"], one["root_mean_square_of_run"])
+            by_name[f"{one['name']}, moved back"] = Quantity(one["root_mean_square_after"], one["unit"])
+        for name, one in ((self.summary.get("result") or {}).get("rmse_at_recordings") or {}).items():
+            after = one["after"]
+            add(name, one["unit"], one["before"], after["p50"], (after["p05"], after["p95"]))
+        for kind, where in (("rmse_m", "all fitted"), ("heldout_rmse_m", "held out"), ("check_rmse_m", "check")):
+            for stage, value in ((self.summary.get("fit") or {}).get(kind) or {}).items():
+                if value is not None:
+                    by_name[f"{where}, {stage}"] = Quantity(MILLIMETRES * value, "mm")
+        return by_name
+
+    def tissue(self) -> dict[str, Quantity]:
+        """Parameters of the tissues, by tissue and name."""
+        by_name: dict[str, Quantity] = {}
+        for one in ((self.summary.get("case") or {}).get("tissues") or {}).values():
+            by_name[f"{one['name']}, shear modulus"] = Quantity(one["shear_modulus_Pa"], "Pa")
+        estimated = [
+            *((one, "estimate", "") for one in self.summary.get("parameters") or [] if self.command == "estimate"),
+            *(
+                (one, "middle", ", over what may act")
+                for one in (self.summary.get("nothing_else") or {}).get("tissue") or []
+            ),
+        ]
+        for one, key, more in estimated:
+            low, high = one["interval_95"]
+            by_name[f"{one['tissue']}, {one['name']}{more}"] = Quantity(one[key], one["unit"], (low, high))
+        return by_name
+
+
+def read_result(folder: Path) -> SavedResult:
+    """Open a folder of results.
+
+    Raises
+    ------
+    InputError
+        If it holds none, or they cannot be read.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder")
+    name = next((name for name in _KINDS if (folder / name).is_file()), None)
+    if name is None:
+        raise InputError(f"{folder}: found none of {', '.join(_KINDS)}: it is no folder of results")
+    try:
+        summary = json.loads((folder / name).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{folder / name}: cannot be read: {' '.join(str(error).split())}") from None
+    if not isinstance(summary, dict) or not isinstance(summary.get("case"), dict):
+        raise InputError(f"{folder / name}: is no summary of a result")
+    command = "ensemble" if (folder / "ensemble.json").is_file() and name == "summary.json" else _KINDS[name]
+    with_body = any((folder / file).is_file() for file in FILES)
+    return SavedResult(folder, command, summary, read_state(folder) if with_body else None)
+
+
+def _flat(name: str, value: Any) -> Iterator[tuple[str, str]]:
+    """Leaves of nested dictionaries by their path; a list is one leaf."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _flat(f"{name} {key}", item)
+    elif isinstance(value, list):
+        yield name, "; ".join(map(str, value))
+    elif value is not None and value != "":
+        yield name, str(value)
+
+
+# side by side -----------------------------------------------------------------------------------------------------
 
 #: Of two meshes in the same place: how far apart nodes may be in parts of the mesh's size, by rounding in files.
 _SAME = 1e-6
@@ -20,26 +136,17 @@ _SAME = 1e-6
 
 @dataclass(frozen=True)
 class Difference:
-    """How far the displacement of the second result is from that of the first, in the first's body.
+    """How far the displacement of the second result is from that of the first, in the first's body."""
 
-    Attributes
-    ----------
-    root_mean_square_mm, largest_mm : float
-        Over the nodes that are in both bodies; the root mean square by the volume that belongs to each.
-    at_mm : tuple of float
-        Where it is largest, RAS.
-    first_mm, second_mm : float
-        Root mean square of either displacement there.
-    nodes, outside : int
-        How many are compared, and how many are not in the second body.
-    same_mesh : bool
-    """
-
+    #: Over the nodes that are in both bodies; the root mean square by the volume that belongs to each.
     root_mean_square_mm: float
     largest_mm: float
+    #: Where it is largest, RAS.
     at_mm: tuple[float, float, float]
+    #: Root mean square of either displacement there.
     first_mm: float
     second_mm: float
+    #: How many are compared, and how many are not in the second body.
     nodes: int
     outside: int
     same_mesh: bool
@@ -66,31 +173,30 @@ def difference(first: SavedState, second: SavedState) -> Difference:
         there = location.interpolate(second.u)
     if not inside.any():
         raise InputError(f"{first.path} and {second.path}: the bodies are nowhere in one place")
+    weights = mesh.node_volumes * inside
+
+    def root_mean_square(u: Floats) -> float:
+        return MILLIMETRES * float(np.sqrt((weights * np.linalg.norm(u, axis=1) ** 2).sum() / weights.sum()))
+
     apart = np.linalg.norm(there - first.u, axis=1)
     worst = int(np.flatnonzero(inside)[apart[inside].argmax()])
-    weights = mesh.node_volumes * inside
     x, y, z = (MILLIMETRES * mesh.points[worst]).tolist()
     return Difference(
-        _mean_square(apart, weights),
-        MILLIMETRES * float(apart[worst]),
-        (x, y, z),
-        _mean_square(np.linalg.norm(first.u, axis=1), weights),
-        _mean_square(np.linalg.norm(there, axis=1), weights),
-        int(np.count_nonzero(inside)),
-        int(np.count_nonzero(~inside)),
-        same,
+        root_mean_square_mm=root_mean_square(there - first.u),
+        largest_mm=MILLIMETRES * float(apart[worst]),
+        at_mm=(x, y, z),
+        first_mm=root_mean_square(first.u),
+        second_mm=root_mean_square(there),
+        nodes=int(np.count_nonzero(inside)),
+        outside=int(np.count_nonzero(~inside)),
+        same_mesh=same,
     )
-
-
-def _mean_square(lengths: Floats, weights: Floats) -> float:
-    """Root mean square [mm] of lengths [m]."""
-    return MILLIMETRES * float(np.sqrt((weights * lengths**2).sum() / weights.sum()))
 
 
 def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
     """Everything that is compared, as plain values; RMSE are of the simulation alone, but those "moved back"."""
     one, two = first.inputs(), second.inputs()
-    names = [*one, *(name for name in two if name not in one)]
+    names = dict.fromkeys([*one, *two])
     bodies = first.state is not None and second.state is not None
     return {
         "folders": [str(first.folder), str(second.folder)],
@@ -98,14 +204,14 @@ def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
         "rmse": _pairs(first.errors(), second.errors()),
         "displacement": asdict(difference(first.state, second.state)) if bodies else None,  # type: ignore[arg-type]
         "tissue": _pairs(first.tissue(), second.tissue()),
-        "verdict": [first.verdict()[0] or None, second.verdict()[0] or None],
-        "sentence": [first.verdict()[1] or None, second.verdict()[1] or None],
+        # of a diagnosis, in a word and in a sentence
+        **{key: [result.summary.get(key) or None for result in (first, second)] for key in ("verdict", "sentence")},
     }
 
 
 def _pairs(one: dict[str, Quantity], two: dict[str, Quantity]) -> dict[str, Any]:
     pairs = {}
-    for name in [*one, *(name for name in two if name not in one)]:
+    for name in dict.fromkeys([*one, *two]):
         both = [one.get(name), two.get(name)]
         pairs[name] = {
             "unit": next(each.unit for each in both if each is not None),
@@ -115,23 +221,20 @@ def _pairs(one: dict[str, Quantity], two: dict[str, Quantity]) -> dict[str, Any]
     return pairs
 
 
-def two_lines(said: dict[str, Any]) -> list[str]:
+def two_lines(summary: dict[str, Any]) -> list[str]:
     """What is printed."""
-    lines = [f"A  {said['folders'][0]}", f"B  {said['folders'][1]}", ""]
-    differ = said["inputs_that_differ"]
+    lines = [f"A  {summary['folders'][0]}", f"B  {summary['folders'][1]}", ""]
+    differ = summary["inputs_that_differ"]
     if differ:
         lines.append("inputs that differ")
-        for name, (a, b) in differ.items():
-            lines += [
-                f"  {name}",
-                f"    A  {a if a is not None else 'not said'}",
-                f"    B  {b if b is not None else 'not said'}",
-            ]
+        for name, both in differ.items():
+            values = ("not said" if value is None else value for value in both)
+            lines += [f"  {name}", *(f"    {letter}  {value}" for letter, value in zip("AB", values, strict=True))]
     else:
         lines.append("inputs that differ: none")
-    if said["rmse"]:
-        lines += ["", f"{'RMSE at recordings':<44}{'A':>22}{'B':>22}", *_table(said["rmse"])]
-    apart = said["displacement"]
+    if summary["rmse"]:
+        lines += ["", f"{'RMSE at recordings':<44}{'A':>22}{'B':>22}", *_table(summary["rmse"])]
+    apart = summary["displacement"]
     if apart is not None:
         at = ", ".join(f"{x:.0f}" for x in apart["at_mm"])
         body = "on the same mesh" if apart["same_mesh"] else f"at {apart['nodes']} nodes of A that are in B"
@@ -144,11 +247,11 @@ def two_lines(said: dict[str, Any]) -> list[str]:
         ]
         if apart["outside"]:
             lines.append(f"  {apart['outside']} nodes of A are outside of B and not compared")
-    if said["tissue"]:
-        lines += ["", f"{'tissue (95 % interval)':<44}{'A':>22}{'B':>22}", *_table(said["tissue"])]
-    if any(said["verdict"]):
+    if summary["tissue"]:
+        lines += ["", f"{'tissue (95 % interval)':<44}{'A':>22}{'B':>22}", *_table(summary["tissue"])]
+    if any(summary["verdict"]):
         lines += ["", "verdict"]
-        for letter, verdict, sentence in zip("AB", said["verdict"], said["sentence"], strict=True):
+        for letter, verdict, sentence in zip("AB", summary["verdict"], summary["sentence"], strict=True):
             lines.append(f"  {letter}  {'none: no diagnosis' if verdict is None else f'{verdict}: {sentence}'}")
     return lines
 

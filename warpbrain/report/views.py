@@ -1,4 +1,4 @@
-"""What the pictures share: where an anatomy is cut, how a cut is held and framed, colours, legend and file.
+"""What the pictures share: colours, figures and their files, where an anatomy is cut, how a cut is held and framed.
 
 Drawn with matplotlib alone: a cut needs no renderer, so a picture comes out the same on a laptop, a server without a
 display and a machine without graphics libraries. Cuts are shown as a radiologist holds them: the patient's left is on
@@ -13,19 +13,20 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.atomic import whole_file
-from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.slices import Cut, cut, outline
+from warpbrain.report.slices import Cut, cut, level_line, outline
 
-Ints = NDArray[np.int32]
-
+#: Colours of Okabe and Ito, whom everybody can tell apart; and greys.
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
+BLACK, QUIET = "#000000", "#555555"
 #: Of tissue in pictures: that of its name. A name that the presets of labels do not give has one of the remaining ones,
 #: the same wherever it stands; labels without a name have them in the order of their numbers.
 COLOUR_OF = {
@@ -41,6 +42,32 @@ COLOUR_OF = {
 TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8", "#bfd5d3", "#dcc3cb")
 RESECTED = "#d9483b"
 TISSUE_EDGE = "#4d4640"
+
+
+def panels(
+    rows: int, columns: int, size: tuple[float, float], layout: Any = "constrained", **options: Any
+) -> tuple[Any, list[Any]]:
+    """A figure of that size [inch] and its panels, row by row."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, layout=layout, facecolor="white")
+    return figure, list(figure.subplots(rows, columns, squeeze=False, **options).ravel())
+
+
+def save(figure: Any, path: Path, title: str = "", fontsize: float = 12.0, dpi: float = 110.0, **options: Any) -> None:
+    """Write a figure as PNG, whole, below a title that may be a user's free text."""
+    if title:
+        # a dollar sign in it begins no formula
+        figure.suptitle(title, parse_math=False, fontsize=fontsize, **options)
+    with whole_file(path) as temporary, temporary.open("wb") as stream:
+        write_png(figure, stream, dpi)
+
+
+def write_png(figure: Any, stream: BinaryIO, dpi: float) -> None:
+    """Write a figure; a name in a script that the font lacks is no reason to print anything."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        figure.savefig(stream, format="png", dpi=dpi)
 
 
 @dataclass(frozen=True)
@@ -69,8 +96,9 @@ def resected_elements(mesh: TetMesh, name: str = "resection") -> Bools:
     return mesh.element_sets.get(name, np.zeros(len(mesh.tetrahedra), dtype=bool))
 
 
-def places(mesh: TetMesh, resected: Bools) -> tuple[float, float, float]:
+def places(mesh: TetMesh, resected: Bools | None = None) -> tuple[float, float, float]:
     """Where to cut [m], in the order of `VIEWS`: through the resected tissue, else through a lateral ventricle."""
+    resected = resected_elements(mesh) if resected is None else resected
     ventricle = mesh.node_sets.get("ventricle", np.zeros(len(mesh.points), dtype=bool))
     centre = mesh.points[ventricle].mean(axis=0) if ventricle.any() else mesh.points.mean(axis=0)
     if resected.any():
@@ -86,19 +114,16 @@ def in_view(coordinates: Floats) -> Floats:
     return np.array(coordinates) * (-MILLIMETRES, MILLIMETRES)
 
 
-def path_of(polygons: Sequence[Floats]) -> Any:
-    """Polygons of a cut as one path of a picture."""
-    from matplotlib.path import Path
-
-    return Path.make_compound_path(*(Path(in_view(p), closed=False) for p in polygons))
+def round_below(value: float) -> float:
+    """1, 2 or 5 and zeros, no more than a value."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    # a logarithm rounded up is why a half is among them
+    return max(step * decade for step in (0.5, 1.0, 2.0, 5.0) if step * decade <= value)
 
 
 def scale_length(mesh: TetMesh) -> float:
     """Length of the scale bar [mm]: 1, 2 or 5 and zeros, 20 for a brain."""
-    sixth = MILLIMETRES * float(np.ptp(mesh.points, axis=0).max()) / 6.0
-    decade = 10.0 ** math.floor(math.log10(sixth))
-    # a logarithm rounded up is why a half is among them
-    return max(step * decade for step in (0.5, 1.0, 2.0, 5.0) if step * decade <= sixth)
+    return round_below(MILLIMETRES * float(np.ptp(mesh.points, axis=0).max()) / 6.0)
 
 
 def heading(mesh: TetMesh, view: View, place: float) -> str:
@@ -110,15 +135,14 @@ def heading(mesh: TetMesh, view: View, place: float) -> str:
 
 def tissue_colours(names: Mapping[int, str], mesh: TetMesh) -> dict[int, str]:
     """Colour of each label of a mesh, whatever the order of the labels."""
-    known = {label: COLOUR_OF[names[label]] for label in mesh.labels if names.get(label) in COLOUR_OF}
-    own = [colour for colour in TISSUE_COLOURS if colour not in COLOUR_OF.values()]
-    chosen = dict(known)
+    chosen = {label: COLOUR_OF[names[label]] for label in mesh.labels if names.get(label) in COLOUR_OF}
+    others = [colour for colour in TISSUE_COLOURS if colour not in COLOUR_OF.values()]
     # one that nobody named is called so (`cases new`)
-    named = {label: name for label, name in names.items() if name != f"tissue {label}"}
-    for name, label in sorted((named[label], label) for label in mesh.labels if label in named.keys() - known.keys()):
+    named = {label: name for label, name in names.items() if name != f"tissue {label}" and label not in chosen}
+    for name, label in sorted((named[label], label) for label in mesh.labels if label in named):
         # that of the name in every case, unless another tissue of this one has it already
-        wish = zlib.crc32(name.encode())
-        wishes = [own[(wish + k) % len(own)] for k in range(len(own))]
+        first = zlib.crc32(name.encode()) % len(others)
+        wishes = [*others[first:], *others[:first]]
         chosen[label] = next((colour for colour in wishes if colour not in chosen.values()), wishes[0])
     left = [colour for colour in TISSUE_COLOURS if colour not in chosen.values()]
     nameless = [label for label in mesh.labels if label not in chosen]
@@ -140,28 +164,48 @@ def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float =
     axes.add_collection(PolyCollection(polygons, facecolors=shown, edgecolors=shown, linewidths=rim))
 
 
-def draw_values(axes: Any, mesh: TetMesh, values: Floats, view: View, place: float, top: float) -> Any:
-    """Draw a framed cut coloured by nodal values (n,), from 0 to `top`; returns what a colour bar is made of."""
+def draw_scalars(axes: Any, section: Cut, top: float, cmap: Any = "viridis", **options: Any) -> Any:
+    """Colour a cut by what it carries, from 0 to `top`; returns what a colour bar is made of."""
     from matplotlib.collections import PolyCollection
 
-    section = cut(mesh.points, mesh.tetrahedra, values, view.axis, place)
-    polygons = [in_view(p) for p in section.polygons]
-    drawn = PolyCollection(polygons, array=section.values, cmap="viridis", edgecolors="face", linewidths=0.4)
+    style = {"edgecolors": "face", "linewidths": 0.4, **options}
+    drawn = PolyCollection([in_view(p) for p in section.polygons], array=section.values, cmap=cmap, **style)
     drawn.set_clim(0.0, top)
-    axes.add_collection(drawn)
-    draw_outline(axes, boundary_faces(mesh.tetrahedra), mesh.points, view, place)
+    return axes.add_collection(drawn)
+
+
+def draw_values(axes: Any, mesh: TetMesh, values: Floats, view: View, place: float, top: float) -> Any:
+    """Draw a framed cut coloured by nodal values (n,), from 0 to `top`; returns what a colour bar is made of."""
+    drawn = draw_scalars(axes, cut(mesh.points, mesh.tetrahedra, values, view.axis, place), top)
+    draw_outline(axes, mesh, view, place)
     frame(axes, mesh, view)
     return drawn
 
 
-def draw_outline(
-    axes: Any, faces: Ints, points: Floats, view: View, place: float, style: Any = "-", colour: str = TISSUE_EDGE
-) -> None:
-    """Draw where faces cross the plane of a cut."""
+def draw_level(axes: Any, section: Cut, level: float, colour: str, zorder: float = 2.0) -> None:
+    """A line where the values that a cut carries are at a level."""
     from matplotlib.collections import LineCollection
 
-    segments = in_view(outline(points, faces, view.axis, place))
-    axes.add_collection(LineCollection(list(segments), colors=colour, linestyles=[style], linewidths=0.9))
+    segments = in_view(level_line(section, level))
+    axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=2.2, zorder=zorder))
+
+
+def draw_part(axes: Any, section: Cut, part: Bools, **style: Any) -> None:
+    """Fill some polygons (k,) of a cut as one shape, so that a hatching goes on from one to the next."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Shape
+
+    if part.any():
+        chosen = [Shape(in_view(p), closed=False) for p, here in zip(section.polygons, part, strict=True) if here]
+        axes.add_artist(PathPatch(Shape.make_compound_path(*chosen), **style))
+
+
+def draw_outline(axes: Any, mesh: TetMesh, view: View, place: float, colour: str = TISSUE_EDGE) -> None:
+    """Draw where the surface of a body crosses the plane of a cut."""
+    from matplotlib.collections import LineCollection
+
+    segments = in_view(outline(mesh.points, mesh.boundary, view.axis, place))
+    axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=0.9))
 
 
 def frame(axes: Any, mesh: TetMesh, view: View, margin: float | None = None) -> None:
@@ -170,15 +214,13 @@ def frame(axes: Any, mesh: TetMesh, view: View, margin: float | None = None) -> 
     margin = 0.4 * length if margin is None else margin
     corners = in_view(np.array([mesh.points.min(axis=0)[view.plane], mesh.points.max(axis=0)[view.plane]]))
     low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     bare(axes)
-    left, right, bottom, top = view.letters
-    style = {"fontsize": 11, "color": "#7a7a7a", "transform": axes.transAxes}
-    axes.text(0.01, 0.5, left, va="center", ha="left", **style)
-    axes.text(0.99, 0.5, right, va="center", ha="right", **style)
-    axes.text(0.5, 0.0, bottom, va="bottom", ha="center", **style)
-    axes.text(0.5, 1.0, top, va="top", ha="center", **style)
+    sides = ((0.01, 0.5, "left", "center"), (0.99, 0.5, "right", "center"))
+    for letter, (x, y, ha, va) in zip(
+        view.letters, (*sides, (0.5, 0.0, "center", "bottom"), (0.5, 1.0, "center", "top")), strict=True
+    ):
+        axes.text(x, y, letter, ha=ha, va=va, fontsize=11, color="#7a7a7a", transform=axes.transAxes)
     start, height = low + 0.2 * length
     axes.plot([start, start + length], [height, height], color="#333333", linewidth=2.0)
     middle, above = start + 0.5 * length, height + 0.1 * length
@@ -187,28 +229,41 @@ def frame(axes: Any, mesh: TetMesh, view: View, margin: float | None = None) -> 
 
 def bare(axes: Any) -> None:
     """Equal scales, no ticks, no box."""
-    axes.set_aspect("equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
-    for side in axes.spines.values():
-        side.set_visible(False)
+    axes.set(aspect="equal", xticks=[], yticks=[])
+    axes.spines[:].set_visible(False)
 
 
 def tissue_entries(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> list[tuple[Any, str]]:
     """Legend entries of the tissues that something is left of, and of what was resected."""
+    return [
+        (patch(facecolor=colour) if colour == RESECTED else patch(facecolor=colour, edgecolor=TISSUE_EDGE), name)
+        for name, colour in tissue_legend(names, mesh, resected)
+    ]
+
+
+def tissue_legend(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> list[tuple[str, str]]:
+    """Names and colours of the tissues that something is left of, and of what was resected."""
+    left = set(np.unique(mesh.tissue[~resected]).tolist())
+    colours = sorted(tissue_colours(names, mesh).items())
+    entries = [(names.get(label, str(label)), colour) for label, colour in colours if label in left]
+    return entries + ([("resected", RESECTED)] if resected.any() else [])
+
+
+def line(**style: Any) -> Any:
+    """A line or a mark of a legend; nothing to be seen without a style."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **style)
+
+
+def patch(**style: Any) -> Any:
+    """A patch of a legend."""
     from matplotlib.patches import Patch
 
-    entries, left = [], set(np.unique(mesh.tissue[~resected]).tolist())
-    for label, colour in sorted(tissue_colours(names, mesh).items()):
-        if label not in left:
-            continue
-        entries.append((Patch(facecolor=colour, edgecolor=TISSUE_EDGE), names.get(label, str(label))))
-    if resected.any():
-        entries.append((Patch(facecolor=RESECTED), "resected"))
-    return entries
+    return Patch(**style)
 
 
-def legend(figure: Any, entries: list[tuple[Any, str]], **options: Any) -> list[Any]:
+def legend(figure: Any, entries: Sequence[tuple[Any, str]], **options: Any) -> list[Any]:
     """A legend of the whole figure; the texts, in the order of the entries."""
     # labels are set afterwards: names are the user's free text, in which a dollar sign begins no formula and a leading
     # underscore hides nothing
@@ -217,11 +272,3 @@ def legend(figure: Any, entries: list[tuple[Any, str]], **options: Any) -> list[
         text.set_parse_math(False)
         text.set_text(label)
     return list(made.get_texts())
-
-
-def save(figure: Any, path: Path) -> None:
-    """Write a figure as PNG, whole."""
-    with whole_file(path) as temporary, warnings.catch_warnings():
-        # a title in a script that the font lacks is no reason to print anything
-        warnings.filterwarnings("ignore", message="Glyph .* missing")
-        figure.savefig(temporary, dpi=110, format="png")

@@ -39,17 +39,16 @@ _APART = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What is to be warped, read and checked before anything is computed.
-
-    Attributes
-    ----------
-    image, labels : Image or None
-    points : tuple of PointFile
-    """
+    """What is to be warped, read and checked before anything is computed."""
 
     image: Image | None
     labels: Image | None
     points: tuple[PointFile, ...]
+
+    @property
+    def images(self) -> list[Image]:
+        """Those that there are."""
+        return [each for each in (self.image, self.labels) if each is not None]
 
     @property
     def grid_of(self) -> Image | None:
@@ -80,8 +79,7 @@ def read_asked(image: Path | None, labels: Path | None, points: Sequence[Path]) 
             f"{asked.grid_of.path}: affine: its axes are not at right angles, which no ITK transform can have: "
             "resample the image first"
         )
-    names = [_after(each.path) for each in (asked.image, asked.labels) if each is not None]
-    names += [file.moved_name for file in asked.points]
+    names = _names(asked)
     # one file on systems that take letters for the same in either case
     plain = [name.lower() for name in names]
     for name in names:
@@ -95,14 +93,7 @@ def read_asked(image: Path | None, labels: Path | None, points: Sequence[Path]) 
 def write_warped(
     folder: Path, state: SavedState, asked: Asked, progress: Callable[[float, str], None] = lambda share, stage: None
 ) -> tuple[list[str], list[str]]:
-    """Write everything that a state and what is asked for give.
-
-    Returns
-    -------
-    lines : list of str
-        What a user should read.
-    files : list of str
-        Names of the files.
+    """Write all that a state and what is asked for give; returns what a user should read, and names of the files.
 
     Raises
     ------
@@ -135,16 +126,18 @@ def write_warped(
         files += write_moved(folder, moved)
     image_after, labels_after = (None if each is None else _after(each.path) for each in (asked.image, asked.labels))
     files += write_slicer_scene(folder, state, asked.image, image_after, labels_after, asked.points, files)
-    said = [*_lines(asked, field, inside, back, moved), *_partly_outside(asked, state.mesh), *_trust_lines(state)]
-    return said, files
+    lines = [*_lines(asked, field, inside, back, moved), *_partly_outside(asked, state.mesh), *_trust_lines(state)]
+    return lines, files
 
 
 def in_the_way(folder: Path, asked: Asked) -> list[str]:
     """Names of files in a folder that what is asked for would be written over."""
-    names = ["displacement.nii.gz", FORTH, BACK]
-    names += [_after(image.path) for image in (asked.image, asked.labels) if image is not None]
-    names += [file.moved_name for file in asked.points]
+    names = ["displacement.nii.gz", FORTH, BACK, *_names(asked)]
     return [name for name in names if (folder / name).exists()]
+
+
+def _names(asked: Asked) -> list[str]:
+    return [*(_after(image.path) for image in asked.images), *(file.moved_name for file in asked.points)]
 
 
 def _after(path: Path) -> str:
@@ -158,14 +151,14 @@ def _after(path: Path) -> str:
 def check_place(asked: Asked, mesh: TetMesh, path: Path) -> None:
     """`InputError` if most of a body is outside of an image: in another place, unit or orientation."""
     points = MILLIMETRES * mesh.points
-    for image in (asked.image, asked.labels):
-        if image is None:
-            continue
+    for image in asked.images:
         share = float(np.mean(image.grid.contains(points)))
         if share < _INSIDE:
+            # all eight: of an oblique image two opposite ones span less than the image
+            corners = image.grid.positions(np.indices((2, 2, 2)).reshape(3, -1).T * (np.array(image.grid.shape) - 1))
             raise InputError(
                 f"{image.path}: affine: {100 * share:.0f} % of the body of {path} are in it: it spans "
-                f"{_span(_corners(image.grid))}, the body {_span(points)} "
+                f"{_span(corners)}, the body {_span(points)} "
                 "mm RAS: is it the image that the mesh was made from?"
             )
     if asked.labels is not None:
@@ -183,20 +176,14 @@ def check_place(asked: Asked, mesh: TetMesh, path: Path) -> None:
             )
 
 
-def _corners(grid: Grid) -> Floats:
-    """All eight: of an oblique image two opposite ones span less than the image."""
-    return grid.positions(np.indices((2, 2, 2)).reshape(3, -1).T * (np.array(grid.shape) - 1))
-
-
 def _partly_outside(asked: Asked, mesh: TetMesh) -> list[str]:
     """What to say of images that hold a part of the body only."""
     points, weights = MILLIMETRES * mesh.points, mesh.node_volumes
     lines = []
-    for image in (asked.image, asked.labels):
-        if image is not None:
-            share = float(weights[~image.grid.contains(points)].sum() / weights.sum())
-            if share > _CUT_OFF:
-                lines.append(f"note      {image.path.name}: {100 * share:.2g} % of the body are outside of it")
+    for image in asked.images:
+        share = float(weights[~image.grid.contains(points)].sum() / weights.sum())
+        if share > _CUT_OFF:
+            lines.append(f"note      {image.path.name}: {100 * share:.2g} % of the body are outside of it")
     return lines
 
 
@@ -253,16 +240,14 @@ def _lines(
     sizes = np.linalg.norm(field.vectors[inside.mask], axis=1)
     shape = " x ".join(str(n) for n in field.grid.shape)
     edges = " x ".join(f"{edge:.3g}" for edge in field.grid.voxel)
+    folds = (
+        f"; at {back.unsolved} voxels it did not converge, where the map folds or nearly so" if back.unsolved else ""
+    )
     lines = [
         f"warped    {shape} voxels of {edges} mm; displacement in the body up to {sizes.max(initial=0.0):.3g} mm, "
         f"continued outside, where it falls to 1/e in {LENGTH:g} mm",
         f"inverse   forward after inverse is off by {back.error_99:.2g} mm at the 99th percentile in tissue, at most "
-        f"{back.error_largest:.2g} mm"
-        + (
-            f"; at {back.unsolved} voxels it did not converge, where the map folds or nearly so"
-            if back.unsolved
-            else ""
-        ),
+        f"{back.error_largest:.2g} mm{folds}",
     ]
     for points in moved:
         count = len(points.points)
@@ -280,6 +265,4 @@ def _lines(
                 "linear between voxels: at a wall (moved.csv)"
             )
         lines += [line, *(f"note      {remark}" for remark in points.file.remarks)]
-    for image in (asked.image, asked.labels):
-        lines += [f"note      {note}" for note in (image.notes if image is not None else ())]
-    return lines
+    return lines + [f"note      {note}" for image in asked.images for note in image.notes]

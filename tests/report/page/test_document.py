@@ -2,20 +2,20 @@
 
 import re
 
-from warpbrain.report.page.document import document, header, listed, section
-from warpbrain.report.page.tables import table
+from warpbrain.report.page import Section, Top, document, part, table
 
+COLOURS = ("#000", "#fff")
 EVIL = '</title><script>alert("1")</script>'
 
 
 def test_words_are_no_markup():
-    page = document(EVIL, header(EVIL, EVIL, [EVIL], []), [section(EVIL, listed([EVIL]))], ("#000", "#fff"))
+    page = document(EVIL, Top(EVIL, EVIL, COLOURS, [EVIL], []), [Section(EVIL, part("listed", [EVIL]))])
     assert "<script>" not in page and page.count("&lt;script&gt;") == 7
 
 
 def test_contents_lead_to_sections_that_have_something():
-    sections = [section("Before & after", "<p>a</p>"), section("Empty"), section("What was assumed", "<p>b</p>")]
-    page = document("title", header("title", "badge", [], [("x", "1 mm")]), sections, ("#000", "#fff"))
+    sections = [Section("Before & after", "<p>a</p>"), Section("Empty", ""), Section("What was assumed", "<p>b</p>")]
+    page = document("title", Top("title", "badge", COLOURS, [], [("x", "1 mm")]), sections)
     links = re.findall(r'<a href="#([^"]*)">', page)
     assert links == ["before-after", "what-was-assumed"] == re.findall(r'<section id="([^"]*)">', page)
     assert "Empty" not in page

@@ -5,9 +5,8 @@ import stat
 import numpy as np
 import pytest
 
-from warpbrain.report.rendering import offscreen
-from warpbrain.report.rendering.offscreen import RenderingError, render
-from warpbrain.report.rendering.scene import Camera, Scene, read_scene, write_scene
+from warpbrain.report import rendering
+from warpbrain.report.rendering import Camera, RenderingError, Scene, read_scene, render, write_scene
 
 SCENE = Scene(
     points=np.eye(4, 3), tetrahedra=np.array([[0, 1, 2, 3]]), removed=np.array([False]),
@@ -31,8 +30,8 @@ def test_why_nothing_is_rendered(tmp_path, monkeypatch, script, why):
     program = tmp_path / "python"
     program.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
-    monkeypatch.setattr(offscreen.sys, "executable", str(program))
-    monkeypatch.setattr(offscreen, "_LONGEST", 0.5)
+    monkeypatch.setattr(rendering.sys, "executable", str(program))
+    monkeypatch.setattr(rendering, "_LONGEST", 0.5)
     with pytest.raises(RenderingError, match=why):
         render(SCENE, {}, (10, 10))
 

@@ -15,8 +15,7 @@ from warpbrain.inference.decide import Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
 from warpbrain.physics.words import Smallest, Value
-from warpbrain.report.files import plain
-from warpbrain.report.fingerprints import fingerprints
+from warpbrain.report.files import fingerprints, picked, plain
 from warpbrain.report.summary import machine
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen import result as of_specimen
@@ -50,7 +49,7 @@ def describe(diagnosis: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions
             "next_measurement": [asdict(one) for one in diagnosis.next_measurement],
             "assumptions": diagnosis.assumptions,
             "remarks": diagnosis.remarks,
-            "case": {"name": diagnosis.case.name, "title": diagnosis.case.title, "origin": diagnosis.case.origin},
+            "case": picked(diagnosis.case, "name", "title", "origin"),
             "inputs_sha256": fingerprints(diagnosis.case),
             "options": asked | {"candidates": "all" if options.candidates is None else options.candidates},
             "seconds": diagnosis.seconds,
@@ -61,9 +60,8 @@ def describe(diagnosis: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions
 
 
 def _picked(one: Any, *names: str, **renamed: str) -> Any:
-    """Attributes of an object as a dictionary, some by other names than their own; None of none."""
-    keys = {name: name for name in names} | renamed
-    return None if one is None else {key: getattr(one, name) for key, name in keys.items()}
+    """Attributes as of `picked`; None of none."""
+    return None if one is None else picked(one, *names, **renamed)
 
 
 def _decision(decision: Decision) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,16 +15,15 @@ from warpbrain.atomic import UNFINISHED, whole_file
 from warpbrain.cases.case import Case
 from warpbrain.cases.writing import write_case
 from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Diagnosis
-from warpbrain.mesh.vtu import write_vtu
 from warpbrain.report.diagnosis.description import STATES
-from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.files import MILLIMETRES, body_file, write_body, write_csv
+from warpbrain.report.state_files import nearest_site, seen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 
 def write_map(path: Path, diagnosis: Diagnosis) -> None:
     """Write `file_of_map`."""
-    with whole_file(path) as temporary:
-        write_vtu(temporary, file_of_map(diagnosis))
+    write_body(path, file_of_map(diagnosis))
 
 
 def file_of_map(diagnosis: Diagnosis) -> Any:
@@ -35,43 +33,29 @@ def file_of_map(diagnosis: Diagnosis) -> Any:
     threshold of all places), ``region`` (cannot be told from the best place), ``detectable_force`` [mN] and
     ``blind`` (no force of the size that is seen elsewhere would be), ``displacement`` of the base state [mm].
     """
-    import meshio
-    from scipy.spatial import cKDTree
-
     mesh, where = diagnosis.base.at.system.model.mesh, diagnosis.map
-    nearest = cKDTree(where.sites).query(mesh.points)[1]
-    scores = where.scores[nearest]
-    return meshio.Mesh(
-        mesh.points * MILLIMETRES,
-        [("tetra", mesh.tetrahedra)],
-        point_data={
-            "score": scores,
-            "significant": (scores > where.threshold).astype(np.uint8),
+    nearest, known = nearest_site(where, mesh), seen(where, mesh)
+    return body_file(
+        mesh,
+        {
+            "score": where.scores[nearest],
+            "significant": known["significant"],
             "region": (where.region[nearest] & where.significant).astype(np.uint8),
             "detectable_force": 1000.0 * where.detectable[nearest],
-            "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
+            "blind": known["blind"],
             "displacement": diagnosis.base.at.u * MILLIMETRES,
         },
-        cell_data={"tissue": [mesh.tissue]},
     )
 
 
 @dataclass(frozen=True, eq=False)
 class Vectors:
-    """Points that were recorded at the last time.
-
-    Attributes
-    ----------
-    where : (k, 3) array
-        [m]
-    left : dict of str to (k, 3) array
-        What was observed less what was computed [m], by state: of a surface the part along its normal.
-    aside : (k,) bool array
-        Set aside as gross errors.
-    """
+    """Points (k, 3) [m] that were recorded at the last time."""
 
     where: Floats
+    #: What was observed less what was computed (k, 3) [m], by state: of a surface the part along its normal.
     left: dict[str, Floats]
+    #: Set aside as gross errors (k,).
     aside: Bools
 
 
@@ -79,10 +63,7 @@ class Vectors:
 class Recorded:
     """Numbers that were recorded: components of points, distances to surfaces, components of forces.
 
-    Attributes
-    ----------
-    columns : dict of str to (n,) array
-        As `points.csv` has them; NaN where it has nothing.
+    They are columns (n,) as `points.csv` has them; NaN where it has nothing.
     """
 
     columns: Mapping[str, Any]
@@ -165,7 +146,7 @@ class Recorded:
 
 def write_points(path: Path, diagnosis: Diagnosis) -> None:
     """Write `Recorded`, one row for each number; what does not apply is empty."""
-    _write_csv(path, Recorded.of(diagnosis).columns, "{:.6g}")
+    _write_columns(path, Recorded.of(diagnosis).columns, "{:.6g}")
 
 
 def write_curves(path: Path, diagnosis: SpecimenDiagnosis) -> None:
@@ -181,16 +162,15 @@ def write_curves(path: Path, diagnosis: SpecimenDiagnosis) -> None:
         "recorded_pa": diagnosis.protocol.observed,
     }
     columns |= {f"{name.replace(' ', '_')}_pa": values for name, values in diagnosis.stresses.items()}
-    _write_csv(path, columns, "{:.9g}")
+    _write_columns(path, columns, "{:.9g}")
 
 
-def _write_csv(path: Path, columns: Mapping[str, Any], digits: str) -> None:
+def _write_columns(path: Path, columns: Mapping[str, Any], digits: str) -> None:
     texts = [
         ["" if np.isnan(x) else digits.format(x) for x in values] if values.dtype.kind == "f" else values.tolist()
         for values in columns.values()
     ]
-    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
-        csv.writer(stream, lineterminator="\n").writerows([list(columns), *zip(*texts, strict=True)])
+    write_csv(path, [list(columns), *zip(*texts, strict=True)], lineterminator="\n")
 
 
 def write_covariance(path: Path, diagnosis: Diagnosis) -> None:

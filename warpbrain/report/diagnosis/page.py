@@ -1,28 +1,21 @@
-"""`report.html`: one file that says what a diagnosis found; it needs no network. Its words are in `page.html`."""
+"""`report.html`: one file that says what a diagnosis found. Its words are in `page/diagnosis.html`."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
-
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.inference.probability import percent
-from warpbrain.report.diagnosis import text
-from warpbrain.report.diagnosis.anatomy import Anatomy, map_figure, residuals_figure, view_of
-from warpbrain.report.diagnosis.figures import agreement_figure, confusion_figure, curves_figure
+from warpbrain.report.body_sections import known_displacement
+from warpbrain.report.diagnosis import pictures, text
 from warpbrain.report.diagnosis.files import Recorded
-from warpbrain.report.generative.page import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY
-from warpbrain.report.known_displacement import known_displacement
-from warpbrain.report.page import document
-from warpbrain.report.page.tables import table
-from warpbrain.report.page.viewer import viewer
+from warpbrain.report.page import Top, document, sections_of, write_document
+from warpbrain.report.page.scene import viewer
 from warpbrain.report.state_files import SavedState
-from warpbrain.report.views import VIEWS
+from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY, VIEWS
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: Ground and text of each verdict's badge; the word says it too.
@@ -47,34 +40,14 @@ def write_page(
     path: Path, diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None
 ) -> None:
     """Write the page of a diagnosis; arguments as of `page_of`."""
-    document.write_document(path, page_of(diagnosis, summary, state))
+    write_document(path, page_of(diagnosis, summary, state))
 
 
 def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None) -> str:
-    """The page.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis or SpecimenDiagnosis
-    summary : dict
-        Its `diagnosis.json`.
-    state : SavedState, optional
-        Its `state.vtu`: how well the displacement is known.
-    """
-    sections: list[document.Section] = []
-
-    def section(title: str, caller: Callable[[], str]) -> str:
-        sections.append(document.Section(title, str(caller()).strip()))
-        return ""
-
-    environment = Environment(
-        loader=PackageLoader("warpbrain.report.diagnosis", "."), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    environment.filters |= {"percent": percent, "table": _table}
+    """The page; `summary` is its `diagnosis.json`, `state` its `state.vtu`: how well the displacement is known."""
     recorded = Recorded.of(diagnosis) if isinstance(diagnosis, Diagnosis) else None
-    environment.get_template("page.html").render(
-        section=section,
+    sections = sections_of(
+        "diagnosis.html",
         summary=summary,
         pictures=defaultdict(str, _pictures(diagnosis, summary, recorded, state)),
         text=text,
@@ -82,16 +55,9 @@ def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], s
         aside=[] if recorded is None else recorded.aside,
         chances={one["mechanism"]: one["probability"] for one in summary["ranking"]},
     )
-    top = document.header(summary["case"]["title"], summary["verdict"], [summary["sentence"]], _facts(summary))
-    return document.document(
-        f"{summary['verdict']}: {summary['case']['title']}", top, sections, _BADGES[summary["verdict"]]
-    )
-
-
-def _table(rows: Iterable[Sequence[Any]], head: Sequence[str], numbers: Sequence[int] = (), caption: str = "") -> str:
-    """A table as HTML, in whose cells nothing is markup; nothing of none."""
-    cells = [[document.text(cell) for cell in row] for row in rows]
-    return table(head, cells, numbers, caption) if cells else ""
+    title, verdict = summary["case"]["title"], summary["verdict"]
+    top = Top(title, verdict, _BADGES[verdict], [summary["sentence"]], _facts(summary))
+    return document(f"{verdict}: {title}", top, sections)
 
 
 def _pictures(
@@ -102,27 +68,27 @@ def _pictures(
 ) -> dict[str, str]:
     """Figures and the 3-D view by name; of what was not recorded there are none."""
     if recorded is None or not isinstance(diagnosis, Diagnosis):
-        return {"curves": curves_figure(diagnosis)} if isinstance(diagnosis, SpecimenDiagnosis) else {}
-    anatomy = Anatomy(diagnosis, summary)
-    pictures, points = {"map": map_figure(anatomy)}, recorded.lengths.any() and not recorded.vectors.aside.all()
+        return {"curves": pictures.curves_figure(diagnosis)} if isinstance(diagnosis, SpecimenDiagnosis) else {}
+    anatomy = pictures.Anatomy(diagnosis, summary)
+    drawn, points = {"map": pictures.map_figure(anatomy)}, recorded.lengths.any() and not recorded.vectors.aside.all()
     if points:
-        pictures["residuals"] = residuals_figure(anatomy, recorded)
+        drawn["residuals"] = pictures.residuals_figure(anatomy, recorded)
     if recorded.counted.any():
-        pictures["agreement"] = agreement_figure(summary, recorded)
+        drawn["agreement"] = pictures.agreement_figure(summary, recorded)
     if state is not None:
         places = [float(anatomy.centre[view.axis]) for view in VIEWS]
-        pictures["known"] = known_displacement(state, anatomy.mesh, places, _KNOWN).body
-    view = view_of(anatomy, recorded if points else None)
-    pictures["view"] = viewer(view, "what is left", "Arrows go from the computed to the observed place.")
+        drawn["known"] = known_displacement(state, anatomy.mesh, places, _KNOWN)
+    view = pictures.view_of(anatomy, recorded if points else None)
+    drawn["view"] = viewer(view, "what is left", "Arrows go from the computed to the observed place.")
     if summary["confusion"]["rows"]:
-        pictures["confusion"] = confusion_figure(summary["confusion"]["rows"])
-    return pictures
+        drawn["confusion"] = pictures.confusion_figure(summary["confusion"]["rows"])
+    return drawn
 
 
 def _facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     facts = [("p, nothing missing", f"{summary['p_value']:.2g}")]
     if named := summary["mechanisms"]:
-        facts.insert(0, ("mechanism", document.text(" and ".join(one["mechanism"] for one in named))))
+        facts.insert(0, ("mechanism", " and ".join(one["mechanism"] for one in named)))
         facts.append(("probability", " and ".join(percent(one["probability"]) for one in named)))
     suffix, factor, unit = text.unit_of(summary)
     held = summary["fit"][f"heldout_rmse_{suffix}"]

@@ -1,1 +1,111 @@
-"""How a report becomes one page that needs no network: frame, contents, tables, figures, a view in 3-D."""
+"""How a report becomes one page that needs no network.
+
+A template (`run.html` of runs and tests of specimens, `estimate.html`, `diagnosis.html`) makes sections of a result;
+`document` puts them below a verdict and a table of contents into the frame, with `page.css`. Macros of `parts.html`
+make what pages share; `figures` makes still figures, `scene` with `scene.js` the view in three dimensions.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from warpbrain.atomic import whole_file
+from warpbrain.inference.probability import percent
+
+#: Characters of a cell that is never broken.
+_SHORT = 8
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page: its title in words, and its HTML."""
+
+    title: str
+    body: str
+
+    @property
+    def anchor(self) -> str:
+        """What a link of the contents goes to."""
+        return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
+
+
+@dataclass(frozen=True)
+class Top:
+    """What stands on top: whose page it is, a badge with colours of its ground and letters, sentences, and numbers."""
+
+    title: str
+    badge: str
+    colours: tuple[str, str]
+    sentences: Sequence[str]
+    facts: Sequence[tuple[str, str]]
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("warpbrain.report.page", "."), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters |= {"percent": percent}
+    environment.globals |= {"table": table, "asset": asset}
+    return environment
+
+
+def part(name: str, *values: Any) -> Markup:
+    """A macro of `parts.html` with its values."""
+    return Markup(getattr(_environment().get_template("parts.html").module, name)(*values))
+
+
+def sections_of(template: str, **values: Any) -> list[Section]:
+    """The sections that a template makes of values: words of these are no markup."""
+    sections: list[Section] = []
+
+    def section(title: str, caller: Callable[[], str]) -> str:
+        sections.append(Section(title, str(caller()).strip()))
+        return ""
+
+    _environment().get_template(template).render(section=section, **values)
+    return sections
+
+
+def document(title: str, top: Top, sections: Sequence[Section]) -> str:
+    """A page as one HTML file; `title` is of the window, sections without a body are left out."""
+    return str(part("frame", title, top, [one for one in sections if one.body])) + "\n"
+
+
+def write_document(path: Path, page: str) -> None:
+    """Write a page, whole."""
+    with whole_file(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[Any]], numbers: Sequence[int] = (), caption: str = "") -> Markup:
+    """A table as HTML, in whose cells only `Markup` is markup; nothing of no rows.
+
+    Columns of numbers are set to the right, columns in which nothing stands are left out.
+    """
+    lines = [[escape(cell) for cell in row] for row in rows]
+    if not lines:
+        return Markup()
+    kinds = {
+        # units need no room for lines, prose does
+        k: "number" if k in numbers else "short" if all(len(line[k]) <= _SHORT for line in lines) else ""
+        for k in range(len(head))
+        if any(line[k] for line in lines)
+    }
+    cells = [[(kind, line[k]) for k, kind in kinds.items()] for line in lines]
+    return part("table", [(kind, head[k]) for k, kind in kinds.items()], cells, caption)
+
+
+def asset(name: str) -> Markup:
+    """A file that lies beside this one."""
+    return Markup((files("warpbrain.report.page") / name).read_text(encoding="utf-8"))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import base64
-import html
 import io
-import warnings
 from collections.abc import Callable
 from typing import Any
+
+from markupsafe import Markup
+
+from warpbrain.report import views
+from warpbrain.report.page import part
 
 #: Of a page for one inch of a figure, so that texts of all are alike.
 _PIXELS = 112
@@ -18,47 +21,37 @@ _NARROW_WINDOW = 640
 
 
 def panels(narrow: bool, height: float, count: int = 1, width: float = WIDTH, **options: Any) -> tuple[Any, list[Any]]:
-    """A figure with panels side by side, or on a narrow window one below the other, each of that height [inch].
-
-    What matplotlib draws is white, whatever the page is.
-    """
-    from matplotlib.figure import Figure
-
-    size, shape = ((NARROW, height * count), (count, 1)) if narrow else ((width, height), (1, count))
-    figure = Figure(figsize=size, layout="constrained", facecolor="white")
-    axes = list(figure.subplots(*shape, squeeze=False, **options).ravel())
+    """A figure with panels side by side, or on a narrow window one below the other, each of that height [inch]."""
+    figure, axes = (
+        views.panels(count, 1, (NARROW, height * count), **options)
+        if narrow
+        else views.panels(1, count, (width, height), **options)
+    )
     for one in axes:
         one.tick_params(labelsize=TEXT - 1)
-        for side in ("top", "right"):
-            one.spines[side].set_visible(False)
+        one.spines[["top", "right"]].set_visible(False)
     return figure, axes
 
 
-def inlined(draw: Callable[[bool], Any], alternative: str, caption: str) -> str:
+def inlined(draw: Callable[[bool], Any], alternative: str, caption: str) -> Markup:
     """A figure as HTML that needs no other file; pixels, since a drawing may have thousands of pieces.
 
-    Parameters
-    ----------
-    draw : callable
-        Draws it: on a narrow window if it is told so.
-    alternative, caption : str
-        In words; the first is for those who do not see it.
+    `draw` draws it, on a narrow window if it is told so; `alternative` is for those who do not see it.
     """
-    wide, narrow = draw(False), draw(True)
-    return (
-        f'<figure><picture><source media="(max-width: {_NARROW_WINDOW}px)" srcset="{_data(narrow)}">'
-        f'<img src="{_data(wide)}" width="{_PIXELS * wide.get_figwidth():.0f}" alt="{html.escape(alternative)}">'
-        f"</picture><figcaption>{html.escape(caption)}</figcaption></figure>"
-    )
+    wide = draw(False)
+    width = f"{_PIXELS * wide.get_figwidth():.0f}"
+    return part("figure", _png(wide), _png(draw(True)), _NARROW_WINDOW, width, alternative, caption)
 
 
-def _data(figure: Any) -> str:
+def _png(figure: Any) -> str:
     stream = io.BytesIO()
-    with warnings.catch_warnings():
-        # a name in a script that the font lacks is no reason to print anything
-        warnings.filterwarnings("ignore", message="Glyph .* missing")
-        figure.savefig(stream, format="png", dpi=170)
-    return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
+    views.write_png(figure, stream, 170.0)
+    return data("png", stream)
+
+
+def data(kind: str, stream: io.BytesIO) -> str:
+    """An image as the address of a page that needs no other file."""
+    return f"data:image/{kind};base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 
 def shades() -> Any:

@@ -12,52 +12,34 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.page import part
 from warpbrain.report.page.figures import shades
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Numbers at the nodes of a body, and how they become colours.
+    """Numbers at the nodes of a body, and how they become colours."""
 
-    Attributes
-    ----------
-    name, label : str
-        Of the switch, and of the bar of colours, with its unit.
-    values : (n,) array
-    low, high : float
-        Values of the first and the last colour.
-    mark : float or None
-        A value that is marked in the bar.
-    note : str
-        What is said below the bar: of the mark, if there is one.
-    """
-
+    #: Of the switch, and of the bar of colours, with its unit.
     name: str
     label: str
     values: Floats
+    #: Values of the first and the last colour, and one that is marked in the bar.
     low: float
     high: float
     mark: float | None = None
+    #: What is said below the bar: of the mark, if there is one.
     note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Arrows:
-    """Arrows at the recorded points.
-
-    Attributes
-    ----------
-    name, colour : str
-        The colour as ``#rrggbb``.
-    vectors : (k, 3) array
-        [m]
-    shown : bool
-        At first.
-    """
+    """Arrows (k, 3) [m] at the recorded points, of a colour as ``#rrggbb``, shown at first or not."""
 
     name: str
     colour: str
@@ -67,33 +49,30 @@ class Arrows:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What is in a view.
-
-    Attributes
-    ----------
-    mesh : TetMesh
-    fields : sequence of Field
-    recorded : (k, 3) array
-        Points [m].
-    arrows : sequence of Arrows
-    ball : tuple of (3,) array and float, or None
-        Centre and radius [m].
-    u : (n, 3) array or None
-        Displacement of the nodes [m]: the view then shows the body before and after.
-    exaggeration : float
-        How many times as far as it moves the body is shown after, at first.
-    cuts : mapping of str to tuple of int and float
-        Planes that can be shown: name, axis and place [m].
-    """
+    """What is in a view: a mesh with fields, recorded points (k, 3) [m] with arrows, and perhaps more."""
 
     mesh: TetMesh
     fields: Sequence[Field]
     recorded: Floats
     arrows: Sequence[Arrows] = ()
+    #: Centre (3,) and radius [m].
     ball: tuple[Floats, float] | None = None
+    #: Displacement (n, 3) of the nodes [m], with which the view shows the body before and after; and how many times as
+    #: far as it moves the body is shown after, at first.
     u: Floats | None = None
     exaggeration: float = 1.0
+    #: Planes that can be shown, by name: axis and place [m].
     cuts: Mapping[str, tuple[int, float]] | None = None
+
+
+def viewer(view: View, legend: str, note: str) -> Markup:
+    """The view as HTML: a canvas, what switches it, a bar of colours, and its script, all in the page.
+
+    Where a browser has no WebGL it says so, and the pictures above and below remain. `legend` is what the arrows are,
+    in a word or two, `note` in a sentence.
+    """
+    scene = describe_scene(view)
+    return part("view", scene, Markup(scene_json(scene)), legend, note)
 
 
 def describe_scene(view: View) -> dict[str, Any]:

@@ -1,15 +1,20 @@
-"""A scene in windows of PyVista: this file alone draws with it, on a screen or off it."""
+"""A scene in windows of PyVista, on a screen or off it.
+
+`python -m warpbrain.report.rendering.drawing FOLDER` renders the scene that lies in a folder.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista
 
 from warpbrain.arrays import Bools, Floats
-from warpbrain.report.rendering.scene import AFTER, BEFORE, COMPUTED, CUTS, MOTION, NAMES, RECORDED, Camera, Scene
+from warpbrain.report.rendering import AFTER, BEFORE, COMPUTED, CUTS, MOTION, NAMES, RECORDED, Camera, Scene, read_scene
 
 #: Colours of where surfaces were, and of arrows over colours.
 GHOST, ARROW = "#c0392b", "#1d1d1d"
@@ -28,21 +33,17 @@ def screenshot(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int
     )
     for column, name in enumerate(names):
         plotter.subplot(0, column)
-        draw(plotter, scene, name, cameras[name])
-        look(plotter, cameras[name])
+        camera = cameras[name]
+        draw(plotter, scene, name, camera)
+        plotter.camera.parallel_projection = True
+        plotter.camera.focal_point = tuple(camera.centre)
+        plotter.camera.position = tuple(camera.centre + 4.0 * camera.half_height * camera.towards)
+        plotter.camera.up = tuple(camera.up)
+        plotter.camera.parallel_scale = camera.half_height
+        plotter.renderer.reset_camera_clipping_range()
     image = plotter.screenshot(return_img=True)
     plotter.close()
     return image
-
-
-def look(plotter: Any, camera: Camera) -> None:
-    """Set where the present picture is seen from."""
-    plotter.camera.parallel_projection = True
-    plotter.camera.focal_point = tuple(camera.centre)
-    plotter.camera.position = tuple(camera.centre + 4.0 * camera.half_height * camera.towards)
-    plotter.camera.up = tuple(camera.up)
-    plotter.camera.parallel_scale = camera.half_height
-    plotter.renderer.reset_camera_clipping_range()
 
 
 def draw(plotter: Any, scene: Scene, name: str, camera: Camera) -> None:
@@ -50,28 +51,28 @@ def draw(plotter: Any, scene: Scene, name: str, camera: Camera) -> None:
     plotter.set_background("white")
     if name == BEFORE:
         # what was removed is there whole, even where the corner is cut out
-        gone = [_surface(body_of(scene, scene.removed))] if scene.removed.any() else []
-        for part in [*cut_open(body_of(scene, ~scene.removed), scene), *gone]:
+        gone = [_surface(_body_of(scene, scene.removed))] if scene.removed.any() else []
+        for part in [*_cut_open(_body_of(scene, ~scene.removed), scene), *gone]:
             plotter.add_mesh(part, scalars=_TISSUE, rgb=True, preference="cell", **_matt(part))
     elif name == AFTER:
-        draw_after(plotter, scene, scene.exaggeration)
+        _draw_after(plotter, scene, scene.exaggeration)
     elif name == MOTION:
         _draw_motion(plotter, scene)
     else:
         _draw_cut(plotter, scene, CUTS[name], camera)
 
 
-def draw_after(plotter: Any, scene: Scene, exaggeration: float) -> None:
+def _draw_after(plotter: Any, scene: Scene, exaggeration: float) -> None:
     """The body after, a corner cut out, and, where it has gone away, a ghost of it before."""
-    body = body_of(scene, ~scene.removed)
-    for part in cut_open(body, scene):
+    body = _body_of(scene, ~scene.removed)
+    for part in _cut_open(body, scene):
         _coloured(plotter, part.warp_by_vector(_U, factor=exaggeration), scene, **_matt(part))
     # the far side of its surface, which the body hides but where it has left
-    ghost = cut_open(body, scene)[0]
+    ghost = _cut_open(body, scene)[0]
     plotter.add_mesh(ghost, color=GHOST, opacity=0.35, culling="front", lighting=False)
 
 
-def body_of(scene: Scene, kept: Bools) -> Any:
+def _body_of(scene: Scene, kept: Bools) -> Any:
     """Some of the tetrahedra (m,), with what they carry."""
     cells = scene.tetrahedra[kept]
     grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: cells}, np.asarray(scene.points, dtype=np.float64))
@@ -81,12 +82,10 @@ def body_of(scene: Scene, kept: Bools) -> Any:
     return grid
 
 
-def cut_open(grid: Any, scene: Scene) -> list[Any]:
+def _cut_open(grid: Any, scene: Scene) -> list[Any]:
     """The surface of a body without the corner on the side of the viewer, and the three faces of that corner."""
-    towards = scene.side
-    middle = np.asarray(scene.corner)
-    centres = grid.points
-    inside = np.all((centres - middle) * towards > 0.0, axis=1)
+    towards, middle = scene.side, np.asarray(scene.corner)
+    inside = np.all((grid.points - middle) * towards > 0.0, axis=1)
     surface = _surface(grid)
     if not inside.any():
         return [surface]
@@ -95,8 +94,7 @@ def cut_open(grid: Any, scene: Scene) -> list[Any]:
     bounds = np.column_stack([low, high]).ravel()
     parts = [surface.clip_box(bounds, invert=True).extract_surface(algorithm="dataset_surface")]
     for axis in range(3):
-        normal = np.eye(3)[axis]
-        face = grid.slice(normal=normal, origin=middle)
+        face = grid.slice(normal=np.eye(3)[axis], origin=middle)
         for other in (k for k in range(3) if k != axis):
             if face.n_points:
                 face = face.clip(normal=towards[other] * np.eye(3)[other], origin=middle, invert=False)
@@ -126,7 +124,7 @@ def _coloured(plotter: Any, part: Any, scene: Scene, **options: Any) -> None:
 def _draw_motion(plotter: Any, scene: Scene) -> None:
     """What was recorded beside what was computed; where nothing was, how the surface moves."""
     plotter.add_mesh(
-        _surface(body_of(scene, ~scene.removed)), color="#a89c92", opacity=0.22, smooth_shading=True, ambient=0.4
+        _surface(_body_of(scene, ~scene.removed)), color="#a89c92", opacity=0.22, smooth_shading=True, ambient=0.4
     )
     size = float(np.ptp(scene.points, axis=0).max())
     if len(scene.where):
@@ -135,7 +133,7 @@ def _draw_motion(plotter: Any, scene: Scene) -> None:
         for vectors, colour in ((scene.recorded, RECORDED), (scene.computed, COMPUTED)):
             _arrows(plotter, scene.where, scene.arrows * vectors, colour, size)
         return
-    used = np.unique(_surface(body_of(scene, ~scene.removed)).point_data["vtkOriginalPointIds"])
+    used = np.unique(_surface(_body_of(scene, ~scene.removed)).point_data["vtkOriginalPointIds"])
     chosen = used[_thinned(scene.points[used], _GRID * size)]
     _arrows(plotter, scene.points[chosen], scene.exaggeration * scene.u[chosen], COMPUTED, size)
 
@@ -144,17 +142,15 @@ def _draw_cut(plotter: Any, scene: Scene, axis: int, camera: Camera) -> None:
     """A plane of the body where it went, coloured by how far, over the outline of where it was."""
     origin = np.zeros(3)
     origin[axis] = scene.places[axis]
-    section = body_of(scene, ~scene.removed).slice(normal=np.eye(3)[axis], origin=origin)
+    section = _body_of(scene, ~scene.removed).slice(normal=np.eye(3)[axis], origin=origin)
     if not section.n_points:
         return
     size = float(np.ptp(scene.points, axis=0).max())
     # lines and arrows lie in front of the plane
     lift = camera.half_height * camera.towards
-    _coloured(plotter, section.warp_by_vector(_U, factor=scene.exaggeration), scene, lighting=False)
-    for body, colour, width in (
-        (section, GHOST, 2.0),
-        (section.warp_by_vector(_U, factor=scene.exaggeration), ARROW, 1.5),
-    ):
+    moved = section.warp_by_vector(_U, factor=scene.exaggeration)
+    _coloured(plotter, moved, scene, lighting=False)
+    for body, colour, width in ((section, GHOST, 2.0), (moved, ARROW, 1.5)):
         rim = body.extract_feature_edges(
             boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
         )
@@ -167,16 +163,15 @@ def _draw_cut(plotter: Any, scene: Scene, axis: int, camera: Camera) -> None:
 
 
 def _arrows(plotter: Any, where: Floats, vectors: Floats, colour: str, size: float) -> None:
-    """Arrows from places; what is too short to be seen is not drawn."""
+    """Arrows from places, as one surface; what is too short to be seen is not drawn.
+
+    Shafts and heads have one width, whatever the length.
+    """
     lengths = np.linalg.norm(vectors, axis=1)
     seen = lengths > 0.006 * size
     if not seen.any():
         return
-    plotter.add_mesh(_solid_arrows(where[seen], vectors[seen], lengths[seen], size), color=colour, ambient=0.45)
-
-
-def _solid_arrows(where: Floats, vectors: Floats, lengths: Floats, size: float) -> Any:
-    """Arrows as one surface; shafts and heads have one width, whatever the length."""
+    where, vectors, lengths = where[seen], vectors[seen], lengths[seen]
     shaft, wide, head = 0.0035 * size, 0.010 * size, np.minimum(0.5 * lengths, 0.028 * size)
     along = vectors / lengths[:, None]
     across = np.cross(along, np.where(np.abs(along[:, :1]) < 0.8, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
@@ -195,7 +190,8 @@ def _solid_arrows(where: Floats, vectors: Floats, lengths: Floats, size: float) 
     quads = [
         np.stack([number[k], following[k], following[k + 1], number[k + 1]], axis=-1).reshape(-1, 4) for k in (0, 1, 2)
     ]
-    return pyvista.PolyData.from_regular_faces(rings.reshape(-1, 3), np.concatenate(quads))
+    arrows = pyvista.PolyData.from_regular_faces(rings.reshape(-1, 3), np.concatenate(quads))
+    plotter.add_mesh(arrows, color=colour, ambient=0.45)
 
 
 def _thinned(points: Floats, width: float) -> Any:
@@ -218,7 +214,7 @@ def interactive(scene: Scene, exaggeration: float | None, off_screen: bool) -> A
         for actor in shown:
             plotter.remove_actor(actor, render=False)
         before = set(plotter.renderer.actors)
-        draw_after(plotter, scene, factor)
+        _draw_after(plotter, scene, factor)
         shown[:] = [actor for name, actor in plotter.renderer.actors.items() if name not in before]
 
     plotter.set_background("white")
@@ -233,3 +229,13 @@ def interactive(scene: Scene, exaggeration: float | None, off_screen: bool) -> A
     plotter.add_axes(xlabel="R", ylabel="A", zlabel="S", color="#333333")
     plotter.view_vector(tuple(scene.side * (0.8, 0.85, 0.62)), viewup=(0.0, 0.0, 1.0))
     return plotter
+
+
+def _main(folder: Path) -> None:
+    """Render; what the graphics library says of displays that are not there is nobody's business."""
+    with pyvista.vtk_verbosity("off"):
+        np.save(folder / "pictures.npy", screenshot(*read_scene(folder)))
+
+
+if __name__ == "__main__":
+    _main(Path(sys.argv[1]))

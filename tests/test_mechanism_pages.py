@@ -7,18 +7,29 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 import pytest
+from mechanism_pages import (
+    Effect,
+    digest_of,
+    index,
+    made_from,
+    page,
+    pairs_page,
+    pairs_table,
+    read_costs,
+    read_effects,
+    reasons,
+    row_of,
+    table,
+    write_effects,
+)
+from mechanism_picture import write_picture
 
+from warpbrain.bench.mechanisms import BASE, PLAIN
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.shipped import find_case
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.mechanisms.cost import PLAIN, read_costs, reasons, row_of, table
-from warpbrain.report.mechanisms.effect import BASE, Effect, digest_of, made_from, read_effects, write_effects
-from warpbrain.report.mechanisms.index import index
-from warpbrain.report.mechanisms.page import page
-from warpbrain.report.mechanisms.pairs import pairs_page, pairs_table
-from warpbrain.report.mechanisms.picture import write_picture
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[1] / "docs"
 PAGES, FIGURES = DOCS / "mechanisms", DOCS / "figures"
 EFFECTS = read_effects(PAGES / "effects.json")
 COSTS = read_costs(sorted((DOCS.parent / "bench" / "results").glob("mechanisms_*.json")))

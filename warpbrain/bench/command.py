@@ -1,0 +1,80 @@
+"""What the commands of the bench share: options, checks, the machine that a recorded time must name, and its file."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+from collections.abc import Callable, Mapping, Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from warpbrain.errors import InputError
+from warpbrain.terminal.command import OneLineParser, exit_status
+
+Options = Mapping[str, Any]
+#: Options of several commands.
+DEVICE: Options = {"metavar": "NAME", "help": "cpu, cuda:0, ... (default: the GPU if there is one)"}
+PRECISION: Options = {"choices": ("double", "single"), "default": "double", "help": "default: double"}
+JSON: Options = {"type": Path, "metavar": "FILE", "help": "write every sample"}
+
+
+def run(
+    command: str,
+    description: str,
+    options: Mapping[str, Options],
+    bench: Callable[[argparse.Namespace], None],
+    arguments: Sequence[str],
+) -> int:
+    """Parse the arguments of a command and measure; returns the exit status."""
+    parser = OneLineParser(prog=f"python -m warpbrain.bench {command}".rstrip(), description=description)
+    for name, settings in options.items():
+        parser.add_argument(name, **settings)
+    asked = parser.parse_args(arguments)
+
+    def measure() -> None:
+        for name, settings in options.items():
+            value = getattr(asked, name.strip("-"))
+            if settings.get("type") is int and value < 1:
+                raise InputError(f"{name} {value}: expected a whole number of at least 1")
+        bench(asked)
+
+    return exit_status(parser.prog, measure)
+
+
+def chosen(option: str, text: str | None, known: Sequence[str]) -> list[str]:
+    """Names of a list with commas; all that are known if there is none."""
+    names = list(known) if text is None else text.split(",")
+    for name in names:
+        if name not in known:
+            raise InputError(f"{option} {name}: expected some of {', '.join(known)}")
+    return names
+
+
+def write(path: Path, told: Any) -> None:
+    """Write what was measured as JSON, whole, and say so."""
+    from warpbrain.atomic import whole_file
+
+    with whole_file(path) as scratch:
+        scratch.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    print(f"written to {path}")
+
+
+def host() -> dict[str, Any]:
+    """Processor, its hardware threads, processes that ran or waited in the last minute (-1: not known), and the day."""
+    return {
+        "processor": processor(),
+        "hardware_threads": os.cpu_count() or 1,
+        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else -1.0,
+        "date": date.today().isoformat(),
+    }
+
+
+def processor() -> str:
+    """Name of the processor, as far as the system tells it."""
+    told = Path("/proc/cpuinfo")
+    lines = told.read_text(encoding="utf-8").splitlines() if told.exists() else []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return next(iter(names), platform.processor() or "CPU")

@@ -1,0 +1,234 @@
+"""Tests on a specimen beside their simulation: what is printed, its JSON, every row as CSV, and the picture.
+
+The picture has one panel a test: over what was imposed, or over time, if the states of a test depend on its history.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpbrain.arrays import Floats
+from warpbrain.cases.case import Case
+from warpbrain.cases.specimen import Specimen
+from warpbrain.report import views
+from warpbrain.report.files import MILLIMETRES, picked, write_csv
+from warpbrain.report.summary import describe_case, elements_lines, sentence_lines, tissue_lines
+from warpbrain.report.views import BLACK, BLUE, VERMILLION
+from warpbrain.simulation.locking import largest_poisson, locking_sentences
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.specimen import SHOWN, interpolated
+from warpbrain.simulation.specimen_run import Tested
+
+#: Colour and shape of recorded points by role; told apart by the colour-blind and without any colour.
+_STYLES = {"fit": (BLUE, "o"), "check": (VERMILLION, "x")}
+COLUMNS = 3
+#: How the grips hold a specimen, in words.
+_GRIPS = {
+    "glued": (
+        "both ends are glued to rigid platens and cannot widen; the upper one moves as imposed: along the axis, or "
+        "sideways or about the axis at constant height"
+    ),
+    "lubricated": (
+        "both ends slide without friction on rigid platens: the state is homogeneous, nothing barrels or buckles"
+    ),
+}
+_ELASTIC = (
+    "the tissue is elastic and the test quasi-static: loading, unloading and every cycle run on one curve, and the "
+    "specimen is free of stress at rest, where nothing is imposed"
+)
+_IN_TIME = (
+    "the test is quasi-static and follows its recorded times, straight between the corners of its record; each begins "
+    "with a rested specimen"
+)
+_RATE = "rate and history: relaxation, hysteresis, conditioning by earlier cycles"
+_EARLIER = "conditioning by earlier cycles and tests"
+_LEFT_OUT = (
+    "flow of fluid through the tissue; weight and inertia of the specimen; prestrain from mounting it; slip and "
+    "peeling at the grips"
+)
+#: Against meshes twice as fine and their extrapolation: neo-Hookean, 8 mm by 4.5 mm, and a cube.
+_LOCKING = (
+    "the linear tetrahedra make a glued specimen stiffer than it is: a cylinder of 8 mm by 4.5 mm at nu = 0.45 by 10 % "
+    "axially, 9 % in torsion and 4 % in shear, at nu = 0.49 by 30 %, 28 % and 6 %; a cube by 6 % and by 8 % to 17 %"
+)
+
+
+def describe_specimen(
+    case: Case, specimen: Specimen, model: Model, in_time: bool = False, chosen: str | None = None
+) -> dict[str, Any]:
+    """Specimen and assumptions, with units; the keys of `describe_case` and those of the specimen.
+
+    `in_time`: tests are followed through their times, since what acts has a memory or a ramp.
+    """
+    if specimen.grips != "glued":
+        locking = []
+    elif model.elements == "tet4":
+        locking = [_LOCKING]
+    else:
+        locking = locking_sentences(model.elements, largest_poisson(model), "a specimen has none that lock less")
+    left_out = f"{_EARLIER if in_time else _RATE}; {_LEFT_OUT}"
+    return {
+        **describe_case(case, model, chosen),
+        "specimen": {
+            "shape": specimen.shape,
+            "size_mm": [MILLIMETRES * length for length in specimen.size],
+            "grips": specimen.grips,
+        },
+        "assumptions": [_GRIPS[specimen.grips], _IN_TIME if in_time else _ELASTIC, *case.assumptions],
+        "left_out": [left_out, *locking],
+    }
+
+
+def specimen_lines(summary: Mapping[str, Any]) -> list[str]:
+    """The specimen and its assumptions, as printed."""
+    specimen = summary["specimen"]
+    lines = [
+        summary["title"],
+        f"  specimen  {_size(specimen)}, {summary['volume_cm3']:.3g} cm3; ends {specimen['grips']}",
+        f"  mesh      {summary['nodes']} nodes, {summary['tetrahedra']} tetrahedra"
+        if specimen["grips"] == "glued"
+        else "  mesh      one element: the state is homogeneous",
+        *(elements_lines(summary) if specimen["grips"] == "glued" else []),
+    ]
+    return lines + tissue_lines(summary) + sentence_lines(summary)
+
+
+def _size(specimen: Mapping[str, Any]) -> str:
+    x, y, z = specimen["size_mm"]
+    if specimen["shape"] == "cylinder":
+        return f"cylinder, radius {x / 2.0:.4g} mm, height {z:.4g} mm"
+    return f"block, {x:.4g} x {y:.4g} x {z:.4g} mm"
+
+
+def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
+    """The computed curve of each test, with units."""
+    described = []
+    for recording, result in ((test.recording, test.result) for test in tests):
+        what, answer = recording.quantities
+        (factor, unit), (scale, answer_unit) = SHOWN[what], SHOWN[answer]
+        described.append(
+            {
+                **picked(recording, "name", "mode", "role"),
+                "rows": len(recording.imposed),
+                **({} if result.time is None else {"time_s": result.time}),
+                "imposed": {"quantity": what, "unit": unit, "values": factor * result.imposed},
+                "response": {"quantity": answer, "unit": answer_unit, "values": scale * result.response},
+                "newton_iterations": result.newton,
+                "smallest_volume_ratio_J": result.min_J,
+                "iterations_with_indefinite_tangent": result.unstable_iterations,
+                "r_squared": result.r_squared,
+            }
+        )
+    return described
+
+
+def tested_lines(tests: Sequence[Tested]) -> list[str]:
+    """The table of tests, as printed."""
+    lines = [
+        "test                  mode       rows  role   RMSE before      after  unit       R2  states  Newton   min J"
+    ]
+    for test in tests:
+        recording, result, compared = test.recording, test.result, test.comparison
+        scale, unit = SHOWN[recording.answer[0]]
+        before, after = (scale * error.root_mean_square for error in (compared.before, compared.after))
+        lines.append(
+            f"  {recording.name:<19} {recording.mode:<8} {compared.count:>6}  {recording.role:<5} "
+            f"{before:>12.4g} {after:>10.4g}  {unit:<5} "
+            f"{result.r_squared:>7.3f} {len(result.imposed):>7} {result.newton.sum():>7} {result.min_J.min():>7.3f}"
+        )
+        if result.unstable_iterations:
+            lines.append(
+                f"    note: the tangent was indefinite in {result.unstable_iterations} iterations: the specimen "
+                "buckles or its law softens, and the real one may reach another state"
+            )
+    return [*lines, "  before: a specimen that resists nothing; after: this simulation; R2: 1 is perfect"]
+
+
+def write_tests(path: Path, tests: Sequence[Tested]) -> None:
+    """Write every row of every test: what was imposed, recorded and computed, and the difference."""
+    rows: list[list[Any]] = [
+        [
+            *("recording", "mode", "role", "row", "t_s", "quantity", "imposed", "imposed_unit"),
+            *("recorded", "computed", "difference", "unit"),
+        ]
+    ]
+    for test in tests:
+        recording, result = test.recording, test.result
+        quantity, controlled = recording.controlled
+        factor, unit = SHOWN[quantity]
+        # what answered is in the unit of its errors
+        scale, answer_unit = SHOWN[recording.answer[0]]
+        for row in test.comparison.rows.tolist():
+            time = "" if recording.time is None else f"{recording.time[row]:.9g}"
+            values = scale * np.array([recording.answer[1][row], result.predicted[row], result.residuals[row]])
+            imposed = [quantity, f"{factor * controlled[row]:z.6g}", unit]
+            head = [recording.name, recording.mode, recording.role, row, time]
+            rows.append([*head, *imposed, *(f"{v:z.6g}" for v in values), answer_unit])
+    write_csv(path, rows)
+
+
+def write_tests_picture(path: Path, tests: Sequence[Tested], title: str, subtitle: str) -> None:
+    """Draw tests as PNG."""
+    views.save(tests_figure(tests, COLUMNS), path, f"{title}\n{subtitle}")
+
+
+def tests_figure(tests: Sequence[Tested], most: int) -> Any:
+    """Tests in up to so many columns."""
+    columns = min(len(tests), most)
+    rows = math.ceil(len(tests) / columns)
+    width = 4.8 if most == 1 else 4.8 * max(columns, 2)
+    figure, panels = views.panels(rows, columns, (width, 3.9 * rows + 1.1))
+    for axes, test in zip(panels, tests, strict=False):
+        _draw(axes, test)
+    for axes in panels[len(tests) :]:
+        axes.set_axis_off()
+    roles = {test.recording.role for test in tests}
+    entries = [
+        (views.line(color=colour, marker=marker, linestyle=""), f"recorded, {role}")
+        for role, (colour, marker) in _STYLES.items()
+        if role in roles
+    ]
+    entries.append((views.line(color=BLACK, marker=".", linewidth=1.5), "simulated (dots: computed states)"))
+    views.legend(figure, entries, loc="outside lower center", ncols=1 if most == 1 else 3, fontsize=9)
+    return figure
+
+
+def _draw(axes: Any, test: Tested) -> None:
+    recording, result = test.recording, test.result
+    (what, answer), (factor, unit) = recording.quantities, SHOWN[recording.quantities[0]]
+    scale, answer_unit = _readable(recording.response, SHOWN[answer][1])
+    colour, shape = _STYLES[recording.role]
+    through_time = result.time is not None and recording.time is not None
+    recorded_at = recording.time if through_time else factor * recording.imposed
+    axes.plot(recorded_at, scale * recording.response, shape, color=colour, markersize=3.0, alpha=0.6)
+    if result.time is not None:
+        axes.plot(result.time, scale * result.response, ".-", color=BLACK, linewidth=1.5, markersize=6.0)
+    else:
+        line = np.linspace(result.imposed[0], result.imposed[-1], 200)
+        curve = interpolated(result.imposed, result.response, line)
+        axes.plot(factor * line, scale * curve, "-", color=BLACK, linewidth=1.5)
+        axes.plot(factor * result.imposed, scale * result.response, ".", color=BLACK, markersize=6.0)
+    axes.axhline(0.0, color="#bbbbbb", linewidth=0.7, zorder=0)
+    axes.locator_params(axis="x", nbins=6)
+    axes.set_xlabel("time [s]" if through_time else f"{what} [{unit}]" if unit else what)
+    axes.set_ylabel(f"{'nominal ' if answer == 'stress' else ''}{answer} [{answer_unit}]")
+    error = f"{scale * test.comparison.after.root_mean_square:.3g} {answer_unit}"
+    if recording.force_controlled:
+        error = f"{factor * test.comparison.after.root_mean_square:.3g} {unit}".rstrip()
+    heading = f"{recording.name}: {recording.mode}, {recording.role}; RMSE {error}"
+    axes.set_title(heading, fontsize=10, parse_math=False)
+
+
+def _readable(response: Floats, unit: str) -> tuple[float, str]:
+    """Factor and unit in which a response has few zeros: thousandths, thousands, or as it is."""
+    largest = float(np.abs(response).max())
+    if unit == "Pa":
+        return (1e-3, "kPa") if largest >= 1000.0 else (1.0, unit)
+    if largest == 0.0 or largest >= 1.0:
+        return 1.0, unit
+    return (1e3, f"m{unit}") if largest >= 1e-3 else (1e6, f"µ{unit}")
