@@ -260,7 +260,7 @@ class Proposal:
         What the case's own boundaries no longer hold.
     elsewhere : callable, or None
         Of what acts in one place: from another centre (3,) [m] and radius [m] to the same there; a patch that would
-        have no face there stays as it is.
+        have no face there stays as it is, and a ball that would hold no element is about the nearest one.
     on_surface : bool
         Whether that place is one of the surface.
     history : callable, or None
@@ -338,7 +338,9 @@ class Proposal:
         situation: Situation,
         varying: tuple[int, ...] = (),
     ) -> list[Proposal]:
-        """Smooth ones of one coefficient, nothing at zero, in balls of some radii [m] throughout the tissue.
+        """Smooth ones of one coefficient, nothing at zero, in balls of some radii throughout the tissue.
+
+        A ball that would hold no element is about the middle of the nearest one.
 
         Parameters
         ----------
@@ -346,16 +348,25 @@ class Proposal:
             From the coefficient, the centre [m] and the radius [m] to the mechanism.
         sd : float
         radii : sequence of float
+            Over the radius of the body.
         situation : Situation
         varying : tuple of int
         """
 
+        from scipy.spatial import cKDTree
+
+        middles = cKDTree(situation.mesh.centres)
+
         def ball(centre: Floats, radius: float) -> Proposal:
+            away, nearest = middles.query(centre)
+            if away >= 2.0 * radius:
+                # beside the body, or in a mesh that is too coarse for it: it would hold no element
+                centre = situation.mesh.centres[nearest]
             x, y, z = centre.tolist()
             one = partial(_placed, make, (x, y, z), radius)
             return cls.of_one(one, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius, varying=varying)
 
-        return [ball(site, radius) for site in situation.volume_sites for radius in radii]
+        return [ball(site, part * situation.mesh.radius) for site in situation.volume_sites for part in radii]
 
     @classmethod
     def along_axes(

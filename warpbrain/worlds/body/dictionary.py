@@ -27,8 +27,9 @@ from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, named
 
 #: About how many sites a scan has in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 480
-#: Radii [m] of parts of a held set that may let go, and the distance [m] between their centres.
-RADII, BETWEEN = (0.010, 0.015, 0.023, 0.035, 0.053), 0.014
+#: Radii of parts of a held set that may let go, and the distance between their centres, over the radius of the body:
+#: 10 to 53 mm, and 14 mm, of a brain.
+RADII, BETWEEN = (0.154, 0.231, 0.354, 0.538, 0.815), 0.215
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,8 @@ def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
     held = mesh.node_sets[nodes] & on_surface
     where = mesh.points[held]
     size = extent(where) / 2.0
-    parts = [Patch.disc(mesh, nodes, held, centre, r) for centre in where[spread_points(where, BETWEEN)] for r in RADII]
+    centres = where[spread_points(where, BETWEEN * mesh.radius)]
+    parts = [Patch.disc(mesh, nodes, held, centre, r * mesh.radius) for centre in centres for r in RADII]
     return [Patch(nodes, nodes, held, held, where.mean(axis=0), size), *(part for part in parts if part is not None)]
 
 
