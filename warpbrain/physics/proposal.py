@@ -92,6 +92,8 @@ class Situation:
         Points [m] a spacing apart in the tissue, and on its free surface.
     spacing : float
         [m]
+    stiffness : float
+        How many times stiffer than brain the body is, 1 at least: by that stresses that may act on it are larger.
     axes : (str, str, str)
         How x, y and z run, for people.
     named : tuple of (str, (k, 3) int array)
@@ -110,6 +112,7 @@ class Situation:
     volume_sites: Floats
     surface_sites: Floats
     spacing: float
+    stiffness: float = 1.0
     axes: tuple[str, str, str] = ("from left to right", "from posterior to anterior", "from inferior to superior")
     named: tuple[tuple[str, NDArray[np.int32]], ...] = ()
 

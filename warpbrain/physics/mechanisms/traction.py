@@ -27,7 +27,7 @@ from warpbrain.physics.regions import elements_with
 from warpbrain.physics.words import HARDLY, Values, measured, radius_in_words, towards, unsure, vector_in
 
 #: Where it is looked for: radii of patches over that of the body, 9 and 14 mm of a brain, and standard deviation of
-#: each component [Pa].
+#: each component on brain [Pa].
 _RADII, _USUAL = (0.138, 0.215), 1000.0
 #: Patches whose nodes are kept, the latest ones.
 _KEPT = 1024
@@ -110,7 +110,7 @@ class Traction(Load, Mechanism):
         return Proposal(
             make,
             np.zeros(3),
-            np.full(3, _USUAL),
+            np.full(3, _USUAL * situation.stiffness),
             elsewhere=partial(cls._pulling, situation),
             on_surface=True,
             centre=site,

@@ -11,6 +11,7 @@ from warpbrain.arrays import Ints
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
+from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh, face_vectors, nodes_of
 from warpbrain.mesh.extent import extent
 from warpbrain.physics.composition import CompositionError, require_composable
@@ -79,8 +80,15 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
         mesh.centres[spread_points(mesh.centres, spacing)],
         np.concatenate(sites),
         spacing,
+        _stiffness(case),
         named=named_triangles(case, free),
     )
+
+
+def _stiffness(case: Case) -> float:
+    """How many times stiffer than brain a body is by what is declared of its stiffest tissue, 1 at least."""
+    moduli = [tissue.law.shear_modulus for tissue in case.tissues.values() if tissue.law is not None]
+    return max([1.0, *(modulus / belief("loads.brain") for modulus in moduli)])
 
 
 def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
