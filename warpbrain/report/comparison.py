@@ -11,6 +11,7 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.cases.case import Case
+from warpbrain.physics.words import tabled
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report.explained import Explained, explained
@@ -87,8 +88,8 @@ def comparison_lines(said: Mapping[str, Any], legacy: bool) -> list[str]:
         for number, (name, before, after) in enumerate(ways):
             noise = entry["noise_root_mean_square"] if number == 0 else None
             line = (
-                f"  {name:<20} {entry['count'] if number == 0 else '':>7} {before['root_mean_square']:>8.3f} "
-                f"{after['root_mean_square']:>8.3f} {'' if noise is None else f'{noise:.3f}':>8} {entry['unit']}"
+                f"  {name:<20} {entry['count'] if number == 0 else '':>7} {tabled(before['root_mean_square']):>8} "
+                f"{tabled(after['root_mean_square']):>8} {'' if noise is None else tabled(noise):>8} {entry['unit']}"
             )
             if legacy and "legacy_sqrt_mm" in before:
                 line += f" {before['legacy_sqrt_mm']:>13.3f} {after['legacy_sqrt_mm']:>8.3f}"

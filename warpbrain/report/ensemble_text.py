@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from warpbrain.ensemble.results import EnsembleResult, Spread
+from warpbrain.physics.words import tabled
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.summary import SET_TITLES
@@ -68,7 +69,7 @@ def ensemble_lines(described: Mapping[str, Any]) -> list[str]:
         ]
     for name, errors in described["rmse_at_recordings"].items():
         lines.append(
-            f"  {name:<22}{_columns(errors['after'])}{errors['before']:>9.3f} {errors['unit']:<3}"
+            f"  {name:<22}{_columns(errors['after'])}{tabled(errors['before']):>9} {errors['unit']:<3}"
             f"{errors['nearest_sample']:>8}"
         )
     lines += [f"  not compared: {reason}" for reason in described["not_compared"]]
@@ -76,4 +77,4 @@ def ensemble_lines(described: Mapping[str, Any]) -> list[str]:
 
 
 def _columns(s: Mapping[str, float]) -> str:
-    return "".join(f"{s[key]:>9.3f}" for key in ("mean", "sd", "p05", "p50", "p95")).rjust(50)
+    return "".join(f"{tabled(s[key]):>9}" for key in ("mean", "sd", "p05", "p50", "p95")).rjust(50)

@@ -10,6 +10,7 @@ import numpy as np
 
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.inference.probability import percent
+from warpbrain.physics.words import tabled
 from warpbrain.recordings.recording import PointsRecording
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, fields_of, in_three_dimensions
@@ -209,7 +210,7 @@ def _doubts(said: Mapping[str, Any]) -> Section:
     if mesh is not None:
         sentences.append(
             f"The error of the mesh is {mesh['amount']:.2f} ± {mesh['standard_deviation']:.2f} times what elements of "
-            f"half the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square."
+            f"half the size change, {tabled(mesh['difference_root_mean_square_mm'])} mm root mean square."
         )
     if registration is not None:
         shift = ", ".join(f"{value:.2f}" for value in registration["shift_mm"])

@@ -10,6 +10,7 @@ from warpbrain.estimation.parameters import Parameter
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.prediction import Prediction
 from warpbrain.inference.probability import percent
+from warpbrain.physics.words import tabled
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.estimate import describe_discretisation, describe_registration, noise_of, remarks_of
 from warpbrain.report.files import MILLIMETRES
@@ -39,8 +40,8 @@ def estimate_lines(posterior: Posterior, averaged: AveragedTissue | None = None)
         name = "all that was fitted" if one.role == "fit" else "all to check"
         before, after, of_run = (MILLIMETRES * value for value in (one.before, one.after, one.of_run))
         lines.append(
-            f"  {name:<19} {one.count:>7} {before:>8.3f} {after:>8.3f}   mm; "
-            f"by `warpbrain run` of this tissue {of_run:.3f}"
+            f"  {name:<19} {one.count:>7} {tabled(before):>8} {tabled(after):>8}   mm; "
+            f"by `warpbrain run` of this tissue {tabled(of_run)}"
         )
     lines += [f"  remark    {remark}" for remark in remarks_of(posterior)]
     lines += ["", "time [s]   " + ", ".join(f"{stage} {spent:.1f}" for stage, spent in posterior.seconds.items())]
@@ -85,8 +86,8 @@ def _prediction_line(one: Prediction) -> str:
     within = ["", ""] if one.coverage is None else [f"{100 * part:.0f} %" for part in one.coverage]
     before, after = factor * one.error_before, factor * one.error_after
     return (
-        f"  {one.name:<18.18} {one.fitted.count:>8} {before:>8.3f} {after:>8.3f} "
-        f"{'' if noise is None else f'{noise:.3f}':>8} {within[0]:>9} {within[1]:>9} {int(one.gross.sum()):>9}"
+        f"  {one.name:<18.18} {one.fitted.count:>8} {tabled(before):>8} {tabled(after):>8} "
+        f"{'' if noise is None else tabled(noise):>8} {within[0]:>9} {within[1]:>9} {int(one.gross.sum()):>9}"
         f"      {unit}" + (", check" if one.role == "check" else "")
     )
 
@@ -116,7 +117,7 @@ def _check_lines(posterior: Posterior) -> list[str]:
     if mesh is not None:
         lines.append(
             f"  error of the mesh: {mesh['amount']:.2f} +- {mesh['standard_deviation']:.2f} times what elements of "
-            f"half the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square"
+            f"half the size change, {tabled(mesh['difference_root_mean_square_mm'])} mm root mean square"
         )
     if registration is not None:
         shift = ", ".join(f"{value:.2f}" for value in registration["shift_mm"])

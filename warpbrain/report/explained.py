@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from warpbrain.physics.words import tabled
+
 #: What "before" is, by the unit of an error: nothing moves, or nothing pushes.
 _NOTHING = {"mm": "no motion", "N": "no force", "Pa": "no stress"}
 WORSE, IN_PART, NO_NEARER, NEARER, UNKNOWN = (
@@ -71,7 +73,7 @@ def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation
 
 def number(value: float, unit: str) -> str:
     """An error as people read it: micrometres of lengths, three digits of what has any size."""
-    return f"{value:.3f}" if unit == "mm" else f"{value:.3g}"
+    return tabled(value) if unit == "mm" else f"{value:.3g}"
 
 
 def _together(entries: Sequence[Mapping[str, Any]], key: str) -> float | None:
@@ -83,17 +85,18 @@ def _overall(before: float, after: float, what: str) -> str:
     name = what[0].upper() + what[1:]
     if after > before:
         return (
-            f"{name} explains the recordings worse than no motion at all: RMSE {after:.3f} mm with it, {before:.3f} mm "
-            "if nothing had moved."
+            f"{name} explains the recordings worse than no motion at all: RMSE {tabled(after)} mm with it, "
+            f"{tabled(before)} mm if nothing had moved."
         )
     gone = _percent_gone(before, after)
     if not gone:
         return (
-            f"{name} explains the recordings no better than no motion at all: RMSE {after:.3f} mm with it and without."
+            f"{name} explains the recordings no better than no motion at all: RMSE {tabled(after)} mm with it and "
+            "without."
         )
     return (
-        f"{name} takes {gone} % off the error of no motion at all: RMSE {before:.3f} mm if nothing had moved, "
-        f"{after:.3f} mm with it."
+        f"{name} takes {gone} % off the error of no motion at all: RMSE {tabled(before)} mm if nothing had moved, "
+        f"{tabled(after)} mm with it."
     )
 
 

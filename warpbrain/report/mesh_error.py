@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.physics.words import tabled
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.simulation.mesh_error import MeshError
@@ -76,8 +77,8 @@ def mesh_error_lines(said: Mapping[str, Any]) -> list[str]:
             lines.append(f"  {title:<24} {_row(said[key])} mm")
     for entry in said["recordings"]:
         lines.append(
-            f"  {entry['name']:<24} {_row(entry)} {entry['unit']}; RMSE {entry['root_mean_square_after']:.3f}, "
-            f"without it {entry['root_mean_square_without_it']:.3f}"
+            f"  {entry['name']:<24} {_row(entry)} {entry['unit']}; RMSE {tabled(entry['root_mean_square_after'])}, "
+            f"without it {tabled(entry['root_mean_square_without_it'])}"
         )
     share = said["locking_share"]
     if share is not None and share > 1.0:
@@ -90,4 +91,4 @@ def mesh_error_lines(said: Mapping[str, Any]) -> list[str]:
 
 
 def _row(sizes: Mapping[str, float]) -> str:
-    return f"{sizes['median']:>8.3f} {sizes['percentile_95']:>8.3f} {sizes['largest']:>8.3f}"
+    return f"{tabled(sizes['median']):>8} {tabled(sizes['percentile_95']):>8} {tabled(sizes['largest']):>8}"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.words import tabled
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, in_three_dimensions
 from warpbrain.report.comparison import explained_of
@@ -107,7 +108,7 @@ def _not_compared(summary: Mapping[str, Any]) -> str:
 def _displacements(said: Mapping[str, Any]) -> str:
     rows = [
         [text(SET_TITLES.get(name, name)), f"{s['nodes']}"]
-        + [f"{s[key]:.3f}" for key in ("mean", "root_mean_square", "percentile_95", "largest")]
+        + [tabled(s[key]) for key in ("mean", "root_mean_square", "percentile_95", "largest")]
         for name, s in said["displacement_mm"].items()
     ]
     head = ("nodes of", "nodes", "mean [mm]", "RMS [mm]", "95 % [mm]", "largest [mm]")
