@@ -169,11 +169,11 @@ def ranks(setting: Setting, count: int, seed: int = 0) -> Floats:
     return found
 
 
-def noise_of(points: Floats, sigma: float, rng: np.random.Generator) -> Floats:
+def noise_of(points: Floats, sigma: float, radius: float, rng: np.random.Generator) -> Floats:
     """Noise (n, 3) as it is believed to be where `sigma` is declared: its size, what neighbours share, gross errors."""
     count, (values, log_probability) = len(points), scales()
     along, times = np.tile(np.eye(3), (count, 1)), np.full(3 * count, np.inf)
-    factor = noise_factor(np.repeat(points, 3, axis=0), along, times, np.full(3 * count, sigma))
+    factor = noise_factor(np.repeat(points, 3, axis=0), along, times, np.full(3 * count, sigma), radius)
     believed = outliers()
     inflation = rng.choice(believed.inflations, count, p=np.exp(believed.log_probabilities))
     found = factor @ rng.normal(size=3 * count)
@@ -196,7 +196,7 @@ def record(
     chosen = mesh.tetrahedra[rng.choice(len(mesh.tetrahedra), count, p=mesh.volumes / mesh.volumes.sum())]
     points = np.einsum("ni,nij->nj", rng.dirichlet(np.ones(4), count), mesh.points[chosen])
     moved = locate(truths.mesh.points, truths.mesh.tetrahedra, points).interpolate(truth.u)
-    moved = moved + noise_of(points, sigma, rng)
+    moved = moved + noise_of(points, sigma, mesh.radius, rng)
     if registration is not None:
         shift, turn = registration.shift * rng.normal(size=3), registration.turn * rng.normal(size=3)
         # about the mean of what is recorded then

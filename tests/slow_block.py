@@ -72,7 +72,7 @@ sigma = 0.02
 
 
 def write_slow(folder: Path, cause: Mechanism) -> Case:
-    """Write the case with recordings of what the cause makes of it, in steps of a thirtieth of an order of time."""
+    """Write the case with recordings of what the cause makes of it, in 25 steps for each order of time."""
     mesh = box((5, 5, 5), (_SIDE, _SIDE, _SIDE))
     z = mesh.points[:, 2]
     one = np.ones(len(mesh.tetrahedra), dtype=np.int32)
@@ -81,7 +81,7 @@ def write_slow(folder: Path, cause: Mechanism) -> Case:
     write_mesh(folder / "mesh.vtu", mesh, unit="mm")
     (folder / "case.toml").write_text(_CASE, encoding="utf-8")
     model = model_of(replace(find_case(str(folder)), mechanisms=(cause,)))
-    steps = sorted({*TIMES, *np.geomspace(1e-3 * TIMES[0], TIMES[-1], 30).tolist()[:-1]})
+    steps = sorted({*TIMES, *np.geomspace(1e-3 * TIMES[0], TIMES[-1], 120).tolist()[:-1]})
     moments = follow_slowly(System(model, "cpu"), steps, EquilibriumOptions(tolerance=1e-6))
     found = {moment.time: moment.state.u for moment in moments}
     rng = np.random.default_rng(3)

@@ -94,7 +94,7 @@ def rows_of(where: np.ndarray, sigma: float) -> Sensors:
     along, where_of = np.tile(np.eye(3), (n // 3, 1)), {"groups": np.arange(n) // 3, "recordings": zero}
     of_points = {"rigid": np.zeros((n, 6)), "positions": where, "directions": along, "over_element": np.zeros((n, 3))}
     when = {"times": np.full(n, np.inf), "after": zero, "before": zero - 1, "references": np.zeros(n)}
-    return Sensors(**each, **of_points, **where_of, **when, sigma=np.full(n, sigma), names=("points",))
+    return Sensors(**each, **of_points, **where_of, **when, sigma=np.full(n, sigma), names=("points",), radius=0.065)
 
 
 def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:

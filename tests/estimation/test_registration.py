@@ -92,9 +92,13 @@ def test_an_exact_rigid_motion_is_recovered(seed: int, surface: bool, verify) ->
 
 @pytest.mark.parametrize("declared", [None, Registration(0.003, 0.02)])
 def test_an_estimate_takes_the_registration_that_a_diagnosis_takes(declared, small_diagnosis, monkeypatch) -> None:
+    def accuracy(case: Case) -> np.ndarray:
+        # 1 mm and 1 degree of a brain, whose radius is 65 mm
+        return np.repeat([0.0154 * case.mesh.radius, np.radians(1.0)] if declared is None else [0.003, 0.02], 3)
+
     base = small_diagnosis.base
     case = replace(small_diagnosis.case, registration=declared)
-    expected = np.repeat([0.001, np.radians(1.0)] if declared is None else [0.003, 0.02], 3)
+    expected = accuracy(case)
 
     # in a diagnosis: columns over the sensors, and the motion by which recordings were moved
     states = States(case, "cpu")
@@ -108,8 +112,8 @@ def test_an_estimate_takes_the_registration_that_a_diagnosis_takes(declared, sma
     fitted = []
     monkeypatch.setattr(Estimation, "fit", lambda self, nuisances: fitted.append(nuisances) or 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        Estimation(replace(recorded(np.zeros(6), False), registration=declared), prior(1)).run()
-    np.testing.assert_allclose(np.sqrt(np.diag(fitted[0].prior.covariance)), expected)
+        Estimation(seen := replace(recorded(np.zeros(6), False), registration=declared), prior(1)).run()
+    np.testing.assert_allclose(np.sqrt(np.diag(fitted[0].prior.covariance)), accuracy(seen))
 
 
 @pytest.mark.parametrize("values", [(0.0, 0.1), (0.001, -1.0), (np.nan, 0.1)])

@@ -41,7 +41,7 @@ def test_it_is_noise_of_each_point_by_itself() -> None:
     changes = change_over_element(CLOUD, 0.1 * CLOUD @ GRADIENT.T, EDGES)
     positions, directions = np.repeat(CLOUD, 3, axis=0), np.tile(np.eye(3), (40, 1))
     about = positions, directions, np.full(120, np.inf), np.full(120, 3e-4)
-    added = noise_covariance(*about, 0.3 * changes.reshape(-1, 3)) - noise_covariance(*about)
+    added = noise_covariance(*about, 0.065, 0.3 * changes.reshape(-1, 3)) - noise_covariance(*about, 0.065)
     expected = np.zeros((120, 120))
     for number, change in enumerate(changes):
         own = slice(3 * number, 3 * number + 3)

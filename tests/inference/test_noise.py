@@ -9,6 +9,9 @@ from scipy import integrate, stats
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.noise import log_scale_density, noise_covariance, noise_factor, outliers, scales
 
+#: Of the body [m].
+RADIUS = 0.065
+
 
 def rows(random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Three components of four points at the end, one of two points of a surface before, and a force."""
@@ -31,11 +34,13 @@ def test_covariance_is_its_definition() -> None:
                 expected[i, i] += sigma[i] ** 2
             if times[i] == times[j] and i < 14 and j < 14:
                 apart = math.dist(positions[i], positions[j])
-                alike = 0.45**2 * math.exp(-0.5 * (apart / 0.018) ** 2) * float(directions[i] @ directions[j])
+                alike = (
+                    0.45**2 * math.exp(-0.5 * (apart / (0.277 * RADIUS)) ** 2) * float(directions[i] @ directions[j])
+                )
                 expected[i, j] += sigma[i] * sigma[j] * alike
-    found = noise_covariance(positions, directions, times, sigma)
+    found = noise_covariance(positions, directions, times, sigma, RADIUS)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-20)
-    factor = noise_factor(positions, directions, times, sigma)
+    factor = noise_factor(positions, directions, times, sigma, RADIUS)
     np.testing.assert_allclose(factor @ factor.T, expected, rtol=1e-12, atol=1e-20)
     np.testing.assert_array_equal(factor, np.tril(factor))
 
@@ -44,8 +49,10 @@ def test_covariance_turns_with_the_body() -> None:
     """Rotated and shifted recordings have the same covariance: it knows no axes."""
     positions, directions, times, sigma = rows(np.random.default_rng(1))
     rotation = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
-    turned = noise_covariance(positions @ rotation.T + 0.1, directions @ rotation.T, times, sigma)
-    np.testing.assert_allclose(turned, noise_covariance(positions, directions, times, sigma), rtol=1e-9, atol=1e-20)
+    turned = noise_covariance(positions @ rotation.T + 0.1, directions @ rotation.T, times, sigma, RADIUS)
+    np.testing.assert_allclose(
+        turned, noise_covariance(positions, directions, times, sigma, RADIUS), rtol=1e-9, atol=1e-20
+    )
 
 
 def test_scale_is_a_distribution() -> None:

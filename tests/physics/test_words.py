@@ -7,7 +7,7 @@ import pytest
 
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import size_in_words, smallest_in_words
-from warpbrain.physics.words import Smallest, Value, along, length, measured, number, place, towards
+from warpbrain.physics.words import Smallest, Value, along, length, measured, number, place, tabled, towards
 
 
 @pytest.mark.parametrize(
@@ -40,6 +40,11 @@ def test_number():
 )  # fmt: skip
 def test_a_length_that_is_not_zero_is_not_said_to_be(metres, said):
     assert length(metres) == said
+
+
+def test_a_number_in_a_table_is_not_said_to_be_zero():
+    assert [tabled(v) for v in (0.0, 1.4378, -0.0523, 0.01)] == ["0.000", "1.438", "-0.052", "0.010"]
+    assert [tabled(v) for v in (0.007342, -4.26e-4, 3.1e-5)] == ["0.00734", "-0.000426", "3.10e-05"]
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from warpbrain.physics.words import tabled
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[
         if number % max(1, moments // 10) == 0 or number == moments:
             row(
                 f"{noted['time_s']:>12.4g} {noted['newton_iterations']:>8} {noted['cg_iterations']:>5}"
-                f"   {noted['min_J']:>5.3f}   {noted['largest_displacement_mm']:>9.3f}"
+                f"   {noted['min_J']:>5.3f}   {tabled(noted['largest_displacement_mm']):>9}"
             )
         progress.show(number / moments, f"{noted['time_s']:.3g} s")
 

@@ -65,7 +65,7 @@ class Noise:
         """Of the noise at a scale of 1 (n, n), without gross errors."""
         rows = self.rows
         beyond = self.unresolved * rows.over_element
-        return noise_covariance(rows.positions, rows.directions, rows.times, self.sigma, beyond)
+        return noise_covariance(rows.positions, rows.directions, rows.times, self.sigma, rows.radius, beyond)
 
     @cached_property
     def factor(self) -> Floats:

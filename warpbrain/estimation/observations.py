@@ -56,6 +56,7 @@ class Sensors:
     after: Ints  # number of the time of the state that each is compared with
     before: Ints  # the same, counted from; -1: from rest
     references: Floats  # when that state was [s]; 0: rest
+    radius: float  # of the sphere of the body's volume [m]
     #: How many times what changes the last state alike at all times changes a row: less where a state is smaller.
     share: Floats | float = 1.0
     #: Of rows whose noise is to be estimated: its variance is the recording's over this.
@@ -145,6 +146,7 @@ class Observations:
     recordings: tuple[Observation, ...]  # those of one name follow each other
     remarks: tuple[str, ...]  # recordings that say nothing of tissue, and why
     nodes: int  # of the simulated mesh
+    radius: float  # of the sphere of the body's volume [m]
 
     @classmethod
     def to_fit(cls, case: Case, moments: Moments | None = None) -> Observations:
@@ -187,7 +189,7 @@ class Observations:
                 )
             else:
                 each += [(recording, one) for one in _observations(case, recording, moments)]
-        return cls(_with_changes(each), tuple(remarks), len(case.remaining[0].points))
+        return cls(_with_changes(each), tuple(remarks), len(case.remaining[0].points), case.mesh.radius)
 
     @cached_property
     def centre(self) -> Floats:
@@ -241,6 +243,7 @@ class Observations:
             "before": each([np.full(len(one.rows), one.before) for one in recordings]),
             "references": each([np.full(len(one.rows), one.reference) for one in recordings]),
             "weights": each([one.weights for one in recordings]),
+            "radius": self.radius,
         }
 
 

@@ -24,7 +24,8 @@ NAMES = (*(f"shift {axis} [m]" for axis in "xyz"), *(f"turn about {axis} [rad]" 
 
 def registration_of(case: Case) -> Registration:
     """The accuracy that a case declares, or else the one that is believed (`registration.shift` and `.turn`)."""
-    return case.registration or Registration(belief("registration.shift"), belief("registration.turn"))
+    believed = Registration(belief("registration.shift") * case.mesh.radius, belief("registration.turn"))
+    return case.registration or believed
 
 
 def moved_back(positions: Floats, motion: Floats, centre: Floats) -> Floats:

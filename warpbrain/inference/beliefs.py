@@ -12,8 +12,19 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 
-#: Factors to SI of the units that the file uses.
-UNITS = {"1": 1.0, "mm": 1e-3, "deg": math.radians(1.0), "nats": 1.0, "kg/m3": 1.0, "Pa": 1.0, "kPa": 1e3, "s": 1.0}
+#: Factors to SI of the units that the file uses; what is relative to the size of the body, `R`, is multiplied by
+#: `warpbrain.mesh.TetMesh.radius` where it is used.
+UNITS = {
+    "1": 1.0,
+    "R": 1.0,
+    "mm": 1e-3,
+    "deg": math.radians(1.0),
+    "nats": 1.0,
+    "kg/m3": 1.0,
+    "Pa": 1.0,
+    "kPa": 1e3,
+    "s": 1.0,
+}
 
 
 @cache

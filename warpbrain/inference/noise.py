@@ -5,8 +5,8 @@
 
 for rows i, j that were recorded at one time, at the places `x` in the directions `d`, with errors `m` of what the mesh
 does not resolve (`warpbrain.estimation.within_element`); rows without a direction, such as forces, are independent. `s`
-and `l` are `noise.shared` and `noise.reach` of `priors.toml`. The logarithm of `kappa` is a Student t. Of a few points
-the noise is many times larger, see `gross_errors`.
+is `noise.shared` of `priors.toml`, and `l` is `noise.reach` of the radius of the body. The logarithm of `kappa` is a
+Student t. Of a few points the noise is many times larger, see `gross_errors`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from warpbrain.inference.gross_errors import Outliers
 
 
 def noise_covariance(
-    positions: Floats, directions: Floats, times: Floats, sigma: Floats, unresolved: Floats | None = None
+    positions: Floats, directions: Floats, times: Floats, sigma: Floats, radius: float, unresolved: Floats | None = None
 ) -> Floats:
     """Covariance `R` (n, n) of the noise of rows at a scale of 1.
 
@@ -35,6 +35,8 @@ def noise_covariance(
         When [s]; infinite of the end.
     sigma : (n,) array
         Standard deviation of the independent part, in the unit of the row.
+    radius : float
+        Of the sphere of the body's volume [m].
     unresolved : (n, 3) array, optional
         Error of a row if its place is off by one standard deviation along each axis, in the unit of the row; a place is
         off alike for all rows of a point.
@@ -45,7 +47,7 @@ def noise_covariance(
     rows = np.flatnonzero(directions.any(axis=1))
     places, axes = positions[rows], directions[rows]
     distances = cdist(places, places)
-    shared = np.exp(-0.5 * (distances / belief("noise.reach")) ** 2) * (axes @ axes.T)
+    shared = np.exp(-0.5 * (distances / (belief("noise.reach") * radius)) ** 2) * (axes @ axes.T)
     shared *= belief("noise.shared") ** 2 * np.outer(sigma[rows], sigma[rows])
     if unresolved is not None and unresolved.any():
         shared += np.where(distances == 0.0, unresolved[rows] @ unresolved[rows].T, 0.0)
@@ -55,10 +57,10 @@ def noise_covariance(
 
 
 def noise_factor(
-    positions: Floats, directions: Floats, times: Floats, sigma: Floats, unresolved: Floats | None = None
+    positions: Floats, directions: Floats, times: Floats, sigma: Floats, radius: float, unresolved: Floats | None = None
 ) -> Floats:
     """Lower triangular factor (n, n) of `noise_covariance`, with its parameters."""
-    covariance = noise_covariance(positions, directions, times, sigma, unresolved)
+    covariance = noise_covariance(positions, directions, times, sigma, radius, unresolved)
     # rows in metres and in newtons: scaled to a unit diagonal before they are factorised
     return np.asarray(sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma)))
 

@@ -245,6 +245,11 @@ class TetMesh:
         """Volume of the body [m3]."""
         return float(self.volumes.sum())
 
+    @property
+    def radius(self) -> float:
+        """Of the sphere of that volume [m]: how large the body is, 65 mm of a brain of 1150 cm3."""
+        return float(np.cbrt(0.75 * self.volume / np.pi))
+
     @cached_property
     def node_volumes(self) -> Floats:
         """Volume lumped to each node [m3], a quarter of each of its tetrahedra, shape (n,)."""

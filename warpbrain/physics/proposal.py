@@ -71,6 +71,8 @@ class Situation:
     volume_sites: Floats  # (k, 3), points a spacing apart in the tissue [m]
     surface_sites: Floats  # (k, 3), and on its free surface [m]
     spacing: float  # [m]
+    #: How many times stiffer than brain the body is, 1 at least: by that stresses that may act on it are larger
+    stiffness: float = 1.0
     #: How x, y and z run, for people
     axes: tuple[str, str, str] = ("from left to right", "from posterior to anterior", "from inferior to superior")
     #: Every part of the surface that can move, with what people call it: what something acts on already, too
@@ -200,7 +202,7 @@ class Proposal:
     nothing: Floats = field(default_factory=lambda: np.zeros(0))  # (k,), where it does nothing, `start` if not said
     patch: Patch | None = None  # what the case's own boundaries no longer hold
     #: Of what acts in one place: from another centre (3,) [m] and radius [m] to the same there; a patch that would
-    #: have no face there stays as it is
+    #: have no face there stays as it is, and a ball that would hold no element is about the nearest one
     elsewhere: Callable[[Floats, float], Proposal] | None = None
     on_surface: bool = False  # whether that place is one of the surface
     #: Of a fading one: from coefficients (k,) and the time since the load came [s] to how many times what it does at
@@ -261,12 +263,22 @@ class Proposal:
         situation: Situation,
         varying: tuple[int, ...] = (),
     ) -> list[Proposal]:
-        """Smooth ones of one coefficient, nothing at zero, in balls of some radii [m] throughout the tissue.
+        """Smooth ones of one coefficient, nothing at zero, in balls of some radii throughout the tissue.
 
-        `make` is from the coefficient, the centre [m] and the radius [m] to the mechanism.
+        A ball that would hold no element is about the middle of the nearest one.
+
+        `make` is from the coefficient, the centre [m] and the radius [m] to the mechanism; `radii` are over that of the
+        body.
         """
+        from scipy.spatial import cKDTree
+
+        middles = cKDTree(situation.mesh.centres)
 
         def ball(centre: Floats, radius: float) -> Proposal:
+            away, nearest = middles.query(centre)
+            if away >= 2.0 * radius:
+                # beside the body, or in a mesh that is too coarse for it: it would hold no element
+                centre = situation.mesh.centres[nearest]
             x, y, z = centre.tolist()
 
             def made(coefficient: float) -> Mechanism:
@@ -274,7 +286,7 @@ class Proposal:
 
             return cls.of_one(made, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius, varying=varying)
 
-        return [ball(site, radius) for site in situation.volume_sites for radius in radii]
+        return [ball(site, part * situation.mesh.radius) for site in situation.volume_sites for part in radii]
 
     @classmethod
     def along_axes(

@@ -77,6 +77,11 @@ def number(value: float, digits: int = 2) -> str:
     return f"{value:z.{decimals}f}"
 
 
+def tabled(value: float) -> str:
+    """A number in a table, three decimals; three digits of what is smaller than 0.01, as lengths of specimens in mm."""
+    return number(value, 3) if 0.0 < abs(value) < 0.01 else f"{value:.3f}"
+
+
 def length(metres: float) -> str:
     """A length for people: hundredths of a millimetre, two digits of what is smaller, micrometres below 0.01 mm."""
     size = 1e3 * metres

@@ -13,6 +13,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
+from warpbrain.physics.words import tabled
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report.files import MILLIMETRES, picked, write_csv
@@ -31,7 +32,7 @@ WORSE, IN_PART, NO_NEARER, NEARER, UNKNOWN = (
 
 def error_text(value: float, unit: str) -> str:
     """An error as people read it: micrometres of lengths, three digits of what has any size."""
-    return f"{value:.3f}" if unit == "mm" else f"{value:.3g}"
+    return tabled(value) if unit == "mm" else f"{value:.3g}"
 
 
 # errors at recordings -------------------------------------------------------------------------------------------------
@@ -78,7 +79,7 @@ def comparison_lines(summary: Mapping[str, Any], legacy: bool) -> list[str]:
         lines.append(f"RMSE at recordings       count   before    after    noise{more}")
     for entry in summary["compared"]:
         noise, role = entry["noise_root_mean_square"], "   check" if entry["role"] == "check" else ""
-        ways = [(entry["name"], entry["count"], "before", "after", "" if noise is None else f"{noise:.3f}")]
+        ways = [(entry["name"], entry["count"], "before", "after", "" if noise is None else tabled(noise))]
         if "mesh_to_recording_before" in entry:
             ways = [
                 (f"{entry['name']} to mesh", *ways[0][1:]),
@@ -86,7 +87,7 @@ def comparison_lines(summary: Mapping[str, Any], legacy: bool) -> list[str]:
             ]
         for name, count, before, after, left in ways:
             errors = (entry[before]["root_mean_square"], entry[after]["root_mean_square"])
-            line = f"  {name:<20} {count:>7} {errors[0]:>8.3f} {errors[1]:>8.3f} {left:>8} {entry['unit']}"
+            line = f"  {name:<20} {count:>7} {tabled(errors[0]):>8} {tabled(errors[1]):>8} {left:>8} {entry['unit']}"
             if legacy and "legacy_sqrt_mm" in entry[before]:
                 line += f" {entry[before]['legacy_sqrt_mm']:>13.3f} {entry[after]['legacy_sqrt_mm']:>8.3f}"
             lines.append(line + role)
@@ -177,17 +178,18 @@ def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation
     name = what[0].upper() + what[1:]
     if after > before:
         verdict, first = WORSE, (
-            f"{name} explains the recordings worse than no motion at all: RMSE {after:.3f} mm with it, {before:.3f} mm "
-            "if nothing had moved."
+            f"{name} explains the recordings worse than no motion at all: RMSE {tabled(after)} mm with it, "
+            f"{tabled(before)} mm if nothing had moved."
         )  # fmt: skip
     elif not gone:
         verdict, first = IN_PART if worse else NO_NEARER, (
-            f"{name} explains the recordings no better than no motion at all: RMSE {after:.3f} mm with it and without."
+            f"{name} explains the recordings no better than no motion at all: RMSE {tabled(after)} mm with it and "
+            "without."
         )  # fmt: skip
     else:
         verdict, first = IN_PART if worse else NEARER, (
-            f"{name} takes {gone} % off the error of no motion at all: RMSE {before:.3f} mm if nothing had moved, "
-            f"{after:.3f} mm with it."
+            f"{name} takes {gone} % off the error of no motion at all: RMSE {tabled(before)} mm if nothing had moved, "
+            f"{tabled(after)} mm with it."
         )  # fmt: skip
     return Explained(verdict, before, after, (first, *sentences))
 
@@ -239,15 +241,16 @@ def mesh_error_lines(summary: Mapping[str, Any]) -> list[str]:
         return [f"error of the mesh: not known: {summary['unknown']}"]
 
     def row(name: str, sizes: Mapping[str, float]) -> str:
-        return f"  {name:<24} {sizes['median']:>8.3f} {sizes['percentile_95']:>8.3f} {sizes['largest']:>8.3f}"
+        columns = (tabled(sizes[key]) for key in ("median", "percentile_95", "largest"))
+        return f"  {name:<24} {' '.join(f'{column:>8}' for column in columns)}"
 
     titles = {"all nodes": "displacement_mm", "locking": "locking_mm", "element size": "element_size_mm"}
     lines = ["error of the mesh, estimated  median     95 %      max"]
     lines += [f"{row(title, summary[key])} mm" for title, key in titles.items() if summary[key] is not None]
     for entry in summary["recordings"]:
         lines.append(
-            f"{row(entry['name'], entry)} {entry['unit']}; RMSE {entry['root_mean_square_after']:.3f}, "
-            f"without it {entry['root_mean_square_without_it']:.3f}"
+            f"{row(entry['name'], entry)} {entry['unit']}; RMSE {tabled(entry['root_mean_square_after'])}, "
+            f"without it {tabled(entry['root_mean_square_without_it'])}"
         )
     share = summary["locking_share"]
     if share is not None and share > 1.0:

@@ -11,6 +11,7 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.ensemble.results import EnsembleResult, Fields, Row, Spread
+from warpbrain.physics.words import tabled
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES, body_file, sets_of, write_body, write_csv
@@ -70,14 +71,14 @@ def ensemble_lines(described: Mapping[str, Any]) -> list[str]:
         lines += ["", f"{'RMSE at recordings':<26}{head}before   nearest sample, over {done} samples"]
     for name, errors in described["rmse_at_recordings"].items():
         lines.append(
-            f"  {name:<22}{_columns(errors['after'])}{errors['before']:>9.3f} {errors['unit']:<3}"
+            f"  {name:<22}{_columns(errors['after'])}{tabled(errors['before']):>9} {errors['unit']:<3}"
             f"{errors['nearest_sample']:>8}"
         )
     return lines + [f"  not compared: {reason}" for reason in described["not_compared"]]
 
 
 def _columns(s: Mapping[str, float]) -> str:
-    return "".join(f"{s[key]:>9.3f}" for key in ("mean", "sd", "p05", "p50", "p95")).rjust(50)
+    return "".join(f"{tabled(s[key]):>9}" for key in ("mean", "sd", "p05", "p50", "p95")).rjust(50)
 
 
 def table_of(result: EnsembleResult) -> list[dict[str, Any]]:

@@ -14,6 +14,7 @@ from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
 from warpbrain.estimation.registration import registration_of
 from warpbrain.inference.probability import percent
+from warpbrain.physics.words import tabled
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES, fingerprints, picked, write_csv
@@ -271,8 +272,8 @@ def estimate_lines(posterior: Posterior, averaged: AveragedTissue | None = None)
         name = "all that was fitted" if one.role == "fit" else "all to check"
         before, after, of_run = (MILLIMETRES * value for value in (one.before, one.after, one.of_run))
         lines.append(
-            f"  {name:<19} {one.count:>7} {before:>8.3f} {after:>8.3f}   mm; "
-            f"by `warpbrain run` of this tissue {of_run:.3f}"
+            f"  {name:<19} {one.count:>7} {tabled(before):>8} {tabled(after):>8}   mm; "
+            f"by `warpbrain run` of this tissue {tabled(of_run)}"
         )
     lines += [f"  remark    {remark}" for remark in remarks_of(posterior)]
     lines += ["", "time [s]   " + ", ".join(f"{stage} {spent:.1f}" for stage, spent in posterior.seconds.items())]
@@ -315,8 +316,8 @@ def _prediction_line(one: Prediction) -> str:
     within = ["", ""] if one.coverage is None else [f"{100 * part:.0f} %" for part in one.coverage]
     before, after = factor * one.error_before, factor * one.error_after
     return (
-        f"  {one.name:<18.18} {one.fitted.count:>8} {before:>8.3f} {after:>8.3f} "
-        f"{'' if noise is None else f'{noise:.3f}':>8} {within[0]:>9} {within[1]:>9} {int(one.gross.sum()):>9}"
+        f"  {one.name:<18.18} {one.fitted.count:>8} {tabled(before):>8} {tabled(after):>8} "
+        f"{'' if noise is None else tabled(noise):>8} {within[0]:>9} {within[1]:>9} {int(one.gross.sum()):>9}"
         f"      {unit}" + (", check" if one.role == "check" else "")
     )
 
@@ -340,7 +341,7 @@ def checks(posterior: Posterior) -> list[str]:
     if mesh is not None:
         lines.append(
             f"error of the mesh: {mesh['amount']:.2f} ± {mesh['standard_deviation']:.2f} times what elements of half "
-            f"the size change, {mesh['difference_root_mean_square_mm']:.3f} mm root mean square"
+            f"the size change, {tabled(mesh['difference_root_mean_square_mm'])} mm root mean square"
         )
     if registration is not None:
         shift, turn = (", ".join(f"{x:.2f}" for x in registration[key]) for key in ("shift_mm", "turn_degrees"))

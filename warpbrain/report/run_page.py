@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.words import tabled
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view
 from warpbrain.report.comparison import (
@@ -76,7 +77,7 @@ def write_run_page(
         view=body_view(result.mesh, result.u, fields, moved, places),
         displacements=[
             [SET_TITLES.get(name, name), s["nodes"]]
-            + [f"{s[key]:.3f}" for key in ("mean", "root_mean_square", "percentile_95", "largest")]
+            + [tabled(s[key]) for key in ("mean", "root_mean_square", "percentile_95", "largest")]
             for name, s in described["displacement_mm"].items()
         ],
         mesh_error=mesh_error_lines(summary["mesh_error"]) if "mesh_error" in summary else [],

@@ -11,6 +11,7 @@ from warpbrain import __version__
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.checking import NOTHING_ACTS
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.words import tabled
 from warpbrain.report.files import MILLIMETRES, picked
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model, unaware_of_midsides
@@ -157,8 +158,8 @@ def displacement_lines(summary: Mapping[str, Any]) -> list[str]:
     lines = ["displacement [mm]        nodes     mean      RMS      95 %      max"]
     for name, s in summary["displacement_mm"].items():
         lines.append(
-            f"  {SET_TITLES.get(name, name):<20} {s['nodes']:>7} {s['mean']:>8.3f} {s['root_mean_square']:>8.3f} "
-            f"{s['percentile_95']:>9.3f} {s['largest']:>8.3f}"
+            f"  {SET_TITLES.get(name, name):<20} {s['nodes']:>7} {tabled(s['mean']):>8} "
+            f"{tabled(s['root_mean_square']):>8} {tabled(s['percentile_95']):>9} {tabled(s['largest']):>8}"
         )
     J = summary["volume_ratio_J"]
     lines.append(

@@ -20,6 +20,7 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.sweep import Steps, Sweep, SweepPoint
+from warpbrain.physics.words import tabled
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import write_csv
@@ -82,7 +83,7 @@ def sweep_lines(sweep: Sweep) -> list[str]:
     factor, unit = SHOWN[sweep.unit]
     failed = sum(point.error is None for point in sweep.points)
     laws = zip(sweep.parameters.tissues, best.k, sweep.parameters.laws(best.theta), strict=True)
-    lines = [f"least error of {len(sweep.points)} equilibria: RMSE {factor * (best.error or 0.0):.3f} {unit}"]
+    lines = [f"least error of {len(sweep.points)} equilibria: RMSE {tabled(factor * (best.error or 0.0))} {unit}"]
     lines += [
         f"  {tissue:<18} k = {k:+.2f}: shear modulus {law.shear_modulus:.5g} Pa  {law!r}" for tissue, k, law in laws
     ]

@@ -13,6 +13,7 @@ from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanism import Facts, ParameterError
 from warpbrain.physics.mechanisms.drainage import Drainage, DrainageTerm
+from warpbrain.physics.proposal import Situation
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
@@ -185,6 +186,19 @@ def test_a_step_that_is_too_long_is_halved_and_what_no_step_reaches_is_said():
     mad = replace(mad, loads=(NodalForce(nodes="pressed", total=(0.0, 0.0, 1e6)),))
     with pytest.raises(SolveError, match="no equilibrium found"):
         next(follow_slowly(System(mad, "cpu"), [1.0]))
+
+
+def test_what_was_measured_in_brain_is_expected_and_looked_for():
+    expected = Drainage.parameters()["permeability"].expectation
+    assert expected.quantile(0.025) < 1e-14 and expected.quantile(0.975) > 1e-11
+    mesh = cube(2)
+    sites = mesh.centres[:1]
+    situation = Situation(
+        mesh, None, 1000.0, 0.4, frozenset(), frozenset(("neo-hookean",)), (), (), 3, sites, sites, 0.05
+    )
+    places = [(float(one.mean[0]), float(one.sd[0])) for one in Drainage.proposals(situation)]
+    for permeability in np.geomspace(1e-14, 1e-11, 7):
+        assert min(abs(np.log(permeability) - mean) / sd for mean, sd in places) < 1.0
 
 
 def test_fluid_that_could_never_leave_is_refused():

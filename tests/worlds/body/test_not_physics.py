@@ -8,6 +8,8 @@ from warpbrain.worlds.body.not_physics import _off_surfaces, _wrong_forces
 from warpbrain.worlds.body.sensors import Sensors
 
 POINTS, WALL = 4, 30
+#: Of a brain [m].
+RADIUS = 0.065
 
 
 @pytest.fixture
@@ -25,7 +27,7 @@ def sensors() -> Sensors:
     computed = np.concatenate([np.zeros(n - 3), [0.0, 0.0, -4.0]])
     residual = np.concatenate([np.zeros(n - 3), [0.0, 3.0, 4.0 - 4.0]])
     rest = (nothing, nothing, np.zeros((n, 6)), np.ones(n), positions, directions, np.zeros((n, 3)), groups)
-    from_rest = (np.zeros(n, dtype=int), np.full(n, -1), np.zeros(n))
+    from_rest = (np.zeros(n, dtype=int), np.full(n, -1), np.zeros(n), RADIUS)
     return Sensors(residual, computed, *rest, np.zeros(n, dtype=int), np.zeros(n), ("all",), *from_rest)
 
 
@@ -33,13 +35,15 @@ def test_a_surface_may_be_off_as_much_everywhere(sensors: Sensors) -> None:
     columns = _off_surfaces(sensors)
     wall = sensors.of_surfaces
     assert wall.sum() == WALL
-    np.testing.assert_allclose(np.sum(columns[wall] ** 2, axis=1), belief("mesh.surface_off") ** 2, rtol=1e-12)
+    np.testing.assert_allclose(
+        np.sum(columns[wall] ** 2, axis=1), (belief("mesh.surface_off") * RADIUS) ** 2, rtol=1e-12
+    )
     assert not columns[~wall].any()
 
 
 def test_a_surface_is_off_alike_where_it_is_near_and_turned_alike(sensors: Sensors) -> None:
     wall = np.flatnonzero(sensors.of_surfaces)
-    covariance = _off_surfaces(sensors) @ _off_surfaces(sensors).T / belief("mesh.surface_off") ** 2
+    covariance = _off_surfaces(sensors) @ _off_surfaces(sensors).T / (belief("mesh.surface_off") * RADIUS) ** 2
     apart = np.linalg.norm(sensors.positions[wall][:, None] - sensors.positions[wall][None], axis=2)
     turned = 0.5 + 0.5 * sensors.directions[wall] @ sensors.directions[wall].T
     near = apart < 0.005

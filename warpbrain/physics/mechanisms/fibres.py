@@ -160,7 +160,10 @@ class Fibres(Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy."""
         return Proposal.along_axes(
-            lambda axis, k1: cls(direction=axis, stiffness=max(k1, 1e-9)), 500.0, "fibres", situation
+            lambda axis, k1: cls(direction=axis, stiffness=max(k1, 1e-9)),
+            500.0 * situation.stiffness,
+            "fibres",
+            situation,
         )
 
     @classmethod

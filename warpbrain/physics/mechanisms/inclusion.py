@@ -22,8 +22,9 @@ from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
 from warpbrain.physics.words import Smallest, Values, measured, number, radius_in_words
 
-#: Where it is looked for: standard deviation of the logarithm of the ratio, and radii of balls [m].
-_USUAL, _RADII = 1.2, (0.012, 0.018, 0.027)
+#: Where it is looked for: standard deviation of the logarithm of the ratio, and radii of balls over
+#: that of the body, 12 to 27 mm of a brain.
+_USUAL, _RADII = 1.2, (0.185, 0.277, 0.415)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -107,8 +107,9 @@ class Pressure(Mechanism):
         """On every free surface."""
         if not situation.free:
             raise NotTestableError("needs a part of the surface that nothing holds")
+        usual = 400.0 * situation.stiffness
         return [
-            Proposal.of_one(partial(cls._of_value, surface.name), 0.0, 400.0, region=surface.words, varying=(0,))
+            Proposal.of_one(partial(cls._of_value, surface.name), 0.0, usual, region=surface.words, varying=(0,))
             for surface in situation.free
         ]
 

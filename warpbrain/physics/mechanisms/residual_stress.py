@@ -99,7 +99,10 @@ class ResidualStress(Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy, in all tissue."""
         return Proposal.along_axes(
-            lambda axis, tension: cls(tension=tension, direction=axis), 300.0, "tension", situation
+            lambda axis, tension: cls(tension=tension, direction=axis),
+            300.0 * situation.stiffness,
+            "tension",
+            situation,
         )
 
     @classmethod

@@ -26,8 +26,9 @@ from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_with
 from warpbrain.physics.words import HARDLY, Values, measured, radius_in_words, towards, unsure, vector_in
 
-#: Where it is looked for: radii [m] of patches, and standard deviation of each component [Pa].
-_RADII, _USUAL = (0.009, 0.014), 1000.0
+#: Where it is looked for: radii of patches over that of the body, 9 and 14 mm of a brain, and standard deviation of
+#: each component on brain [Pa].
+_RADII, _USUAL = (0.138, 0.215), 1000.0
 #: Patches whose nodes are kept, the latest ones.
 _KEPT = 1024
 
@@ -77,7 +78,8 @@ class Traction(Load, Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Patches of two sizes all over the free surface."""
         pulling = partial(cls._pulling, situation)
-        return [pulling(site, radius) for site in situation.surface_sites for radius in _RADII]
+        radii = [part * situation.mesh.radius for part in _RADII]
+        return [pulling(site, radius) for site in situation.surface_sites for radius in radii]
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
@@ -97,7 +99,7 @@ class Traction(Load, Mechanism):
         return Proposal(
             make,
             np.zeros(3),
-            np.full(3, _USUAL),
+            np.full(3, _USUAL * situation.stiffness),
             elsewhere=partial(cls._pulling, situation),
             on_surface=True,
             centre=site,

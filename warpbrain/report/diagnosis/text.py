@@ -8,7 +8,7 @@ from typing import Any
 
 from warpbrain.inference.decide import NOTHING
 from warpbrain.inference.probability import percent
-from warpbrain.physics.words import measured
+from warpbrain.physics.words import measured, number, place
 from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.files import MILLIMETRES
 
@@ -106,9 +106,10 @@ def where_in_words(where: Summary) -> str:
         low, high = where["strain"]
         part = f"{where['test']} ({where['mode']}), {where['segment']}"
         return f"in {part}, at stretches or shears from {low:.3g} to {high:.3g}"
-    x, y, z = (MILLIMETRES * value for value in where["centre_m"])
-    within = f"within {MILLIMETRES * where['radius_m']:.1f} mm"
-    return f"about ({x:z.1f}, {y:z.1f}, {z:z.1f}) mm in RAS, {within}; p = {where['global_p']:.2g} looking everywhere"
+    # to tenths of a millimetre, or finer in small bodies
+    centre = place(where["centre_m"], min(where["radius_m"], 5e-3))
+    within = f"within {number(MILLIMETRES * where['radius_m'], 3)} mm"
+    return f"about {centre} in RAS, {within}; p = {where['global_p']:.2g} looking everywhere"
 
 
 def when_in_words(when: Summary) -> str:

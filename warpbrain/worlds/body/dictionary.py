@@ -11,6 +11,7 @@ from warpbrain.arrays import Ints
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
+from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh, face_vectors, nodes_of
 from warpbrain.mesh.quality import extent
 from warpbrain.physics.composition import CompositionError, require_composable
@@ -27,8 +28,9 @@ from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, named
 
 #: About how many sites a scan has in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 480
-#: Radii [m] of parts of a held set that may let go, and the distance [m] between their centres.
-RADII, BETWEEN = (0.010, 0.015, 0.023, 0.035, 0.053), 0.014
+#: Radii of parts of a held set that may let go, and the distance between their centres, over the radius of the body:
+#: 10 to 53 mm, and 14 mm, of a brain.
+RADII, BETWEEN = (0.154, 0.231, 0.354, 0.538, 0.815), 0.215
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +80,15 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
         mesh.centres[spread_points(mesh.centres, spacing)],
         np.concatenate(sites),
         spacing,
+        _stiffness(case),
         named=named_triangles(case, free),
     )
+
+
+def _stiffness(case: Case) -> float:
+    """How many times stiffer than brain a body is by what is declared of its stiffest tissue, 1 at least."""
+    moduli = [tissue.law.shear_modulus for tissue in case.tissues.values() if tissue.law is not None]
+    return max([1.0, *(modulus / belief("loads.brain") for modulus in moduli)])
 
 
 def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
@@ -88,7 +97,8 @@ def _patches(mesh: TetMesh, nodes: str) -> list[Patch]:
     held = mesh.node_sets[nodes] & on_surface
     where = mesh.points[held]
     size = extent(where) / 2.0
-    parts = [Patch.disc(mesh, nodes, held, centre, r) for centre in where[spread_points(where, BETWEEN)] for r in RADII]
+    centres = where[spread_points(where, BETWEEN * mesh.radius)]
+    parts = [Patch.disc(mesh, nodes, held, centre, r * mesh.radius) for centre in centres for r in RADII]
     return [Patch(nodes, nodes, held, held, where.mean(axis=0), size), *(part for part in parts if part is not None)]
 
 

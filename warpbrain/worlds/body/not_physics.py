@@ -28,7 +28,7 @@ def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]
     by_name = {family.name: family.columns for family in nuisances.families}
     columns_by_name = {
         "registration": sensors.rigid
-        * np.repeat([belief("registration.wrong_shift"), belief("registration.wrong_turn")], 3),
+        * np.repeat([belief("registration.wrong_shift") * sensors.radius, belief("registration.wrong_turn")], 3),
         "stiffness": belief("tissue.larger") * by_name["stiffness field"],
         "loads": belief("tissue.larger") * by_name["known loads"],
     }
@@ -55,13 +55,13 @@ def _off_surfaces(sensors: Sensors) -> Floats:
     """Columns (n, k) of recorded surfaces that are off: shifted from place to place, or too far out or in."""
     rows = np.flatnonzero(sensors.of_surfaces)
     places = sensors.positions[rows]
-    weights = kernel_columns(
-        places, places[spread_points(places, belief("mesh.surface_alike"), 60)], belief("mesh.surface_alike")
-    )
+    reach = belief("mesh.surface_alike") * sensors.radius
+    weights = kernel_columns(places, places[spread_points(places, reach, 60)], reach)
     coordinates = np.column_stack([sensors.directions[rows], np.ones(len(rows))])
     columns = np.zeros((len(sensors), 4 * weights.shape[1]))
     columns[rows] = (
         belief("mesh.surface_off")
+        * sensors.radius
         / np.sqrt(2.0)
         * (weights[:, :, None] * coordinates[:, None, :]).reshape(len(rows), 4 * weights.shape[1])
     )

@@ -154,7 +154,7 @@ def nuisances_at(
     sensors = at.sensors
     if anchors is None:
         places = sensors.positions[sensors.is_displacement]
-        anchors = places[spread_points(places, belief("mesh.alike"), 60)]
+        anchors = places[spread_points(places, belief("mesh.alike") * sensors.radius, 60)]
     families = [
         Family("tissue", tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors)),
         Family("stiffness field", field_columns(at, states)),
@@ -307,6 +307,6 @@ def _alike(sensors: Sensors, anchors: Floats) -> Floats:
     rows = np.flatnonzero(sensors.is_displacement)
     columns = np.zeros((len(sensors), 3 * len(anchors)))
     if len(rows):
-        weights = kernel_columns(sensors.positions[rows], anchors, belief("mesh.alike"))
+        weights = kernel_columns(sensors.positions[rows], anchors, belief("mesh.alike") * sensors.radius)
         columns[rows] = (weights[:, :, None] * sensors.directions[rows][:, None, :]).reshape(len(rows), -1)
     return columns

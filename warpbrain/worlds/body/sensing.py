@@ -8,6 +8,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.estimation.likelihood import Likelihood
+from warpbrain.inference.noise import noise_factor
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.body.sensors import Sensors
 
@@ -39,3 +40,9 @@ def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Float
     found = Likelihood().noise(resolved, left, residual, columns)
     # a factor on noise of which none is declared is its size
     return found.scale * found.sigma if undeclared.all() else found.sigma
+
+
+def factor_of_noise(sensors: Sensors, sigma: Floats, unresolved: Floats | None = None) -> Floats:
+    """Lower factor (n, n) of the covariance of noise; arguments as of `warpbrain.inference.noise.noise_factor`."""
+    rows = sensors
+    return noise_factor(rows.positions, rows.directions, rows.times, sigma, rows.radius, unresolved)

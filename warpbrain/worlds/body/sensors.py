@@ -54,6 +54,7 @@ def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
         np.full(count, -1),
         np.full(count, -1),
         np.zeros(count),
+        mesh.radius,
     )
 
 

@@ -27,18 +27,17 @@ def stiffness_modes(mesh: TetMesh) -> Floats:
     As few as hold all of its variance but `tissue.field_cut`: what fewer modes leave out is largest at the surfaces,
     and a cause that is soft or stiff would do its work.
     """
-    sites = mesh.centres[spread_points(mesh.centres, 0.5 * belief("tissue.field_reach"), _SITES)]
-    values, vectors = np.linalg.eigh(_covariance(sites, sites))
+    reach = belief("tissue.field_reach") * mesh.radius
+    sites = mesh.centres[spread_points(mesh.centres, 0.5 * reach, _SITES)]
+    values, vectors = np.linalg.eigh(_covariance(sites, sites, reach))
     values, vectors = values[::-1], vectors[:, ::-1]
     count = 1 + int(np.searchsorted(np.cumsum(values), (1.0 - belief("tissue.field_cut")) * values.sum()))
-    return np.asarray(_covariance(mesh.centres, sites) @ vectors[:, :count] / np.sqrt(values[:count]))
+    return np.asarray(_covariance(mesh.centres, sites, reach) @ vectors[:, :count] / np.sqrt(values[:count]))
 
 
-def _covariance(a: Floats, b: Floats) -> Floats:
+def _covariance(a: Floats, b: Floats, reach: float) -> Floats:
     squares = np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1)[None] - 2.0 * a @ b.T
-    return np.asarray(
-        belief("tissue.field") ** 2 * np.exp(-0.5 * np.maximum(squares, 0.0) / belief("tissue.field_reach") ** 2)
-    )
+    return np.asarray(belief("tissue.field") ** 2 * np.exp(-0.5 * np.maximum(squares, 0.0) / reach**2))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

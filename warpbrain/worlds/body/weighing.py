@@ -118,7 +118,7 @@ def with_refined_places(
         residual = candidate.residual + effect.mean
         # what lets go has its columns at the base; centres are as far apart as those of a scan's patches
         at_base = effect.proposed.is_there_or_not
-        apart, about = (BETWEEN, base.effects) if at_base else (spacing, source)
+        apart, about = (BETWEEN * base.at.sensors.radius, base.effects) if at_base else (spacing, source)
         best = best_in_cell(base, about, effect, size, apart, without, residual)
         columns = candidate.columns.copy()
         columns[:, part] = best.effect.columns

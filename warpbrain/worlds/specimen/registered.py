@@ -103,7 +103,19 @@ def _situation(case: Case, instants: int) -> Situation:
     assumed = frozenset(mechanism.kind for mechanism in case.mechanisms)
     laws = frozenset(tissue.model for tissue in case.tissues.values())
     return Situation(
-        case.mesh, case.gravity_axis, case.density, case.poisson, assumed, laws, (), (), instants, none, none, 0.0, axes
+        case.mesh,
+        case.gravity_axis,
+        case.density,
+        case.poisson,
+        assumed,
+        laws,
+        (),
+        (),
+        instants,
+        none,
+        none,
+        0.0,
+        axes=axes,
     )
 
 
