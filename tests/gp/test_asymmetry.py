@@ -12,15 +12,23 @@ from warpbrain.gp.asymmetry import (
     asymmetry_of,
     drawn_asymmetries,
 )
-from warpbrain.gp.conditional import Conditional
-from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import CENTRE, EFFECTS, MEAN_ASYMMETRY, REST, Hierarchy, mean_asymmetry_of, prior
+from warpbrain.gp.hierarchical import Conditional, Hierarchical
+from warpbrain.gp.hierarchy import (
+    CENTRE,
+    EFFECTS,
+    MEAN_ASYMMETRY,
+    REST,
+    Hierarchy,
+    Observations,
+    Places,
+    mean_asymmetry_of,
+    observations,
+    prior,
+)
 from warpbrain.gp.hierarchy_fit import fit_hierarchy, sample_hierarchies
 from warpbrain.gp.literature.forms import FORMS
-from warpbrain.gp.literature.groups import GROUPS
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.literature.study import Study
-from warpbrain.gp.observations import Observations, Places, observations
+from warpbrain.gp.literature.study import GROUPS, Study
 from warpbrain.gp.secant import equivalent_strain, invariant, stretch_of
 from warpbrain.gp.trained import trained
 

@@ -9,11 +9,9 @@ from scipy.stats import multivariate_normal
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.kernels import KERNELS
-from warpbrain.gp.likelihood import Likelihood
-from warpbrain.gp.literature.dataset import dataset
+from warpbrain.gp.likelihood import TASKS, Likelihood, Parameters, Replicates
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.parameters import TASKS, Parameters
-from warpbrain.gp.replicates import Replicates
+from warpbrain.gp.literature.study import dataset
 
 
 def some(seed=0):

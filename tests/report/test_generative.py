@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.literature.groups import GROUPS
-from warpbrain.gp.literature.study import Study
+from warpbrain.gp.literature.study import GROUPS, Study
 from warpbrain.gp.trained import trained
 from warpbrain.report.generative import page
 from warpbrain.report.generative.draws_picture import draw_draws

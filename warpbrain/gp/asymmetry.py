@@ -12,17 +12,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.gp.hierarchical import Hierarchical
 from warpbrain.gp.hierarchy import REACH
-from warpbrain.gp.literature.dataset import OFFSET
-from warpbrain.gp.literature.groups import STRETCHES
-from warpbrain.gp.literature.study import Study
+from warpbrain.gp.literature.study import OFFSET, STRETCHES, Study
 from warpbrain.gp.process import Process
 from warpbrain.gp.secant import equivalent_strain, invariant, stretch_of
-
-Floats = NDArray[np.float64]
 
 #: Parts of the largest strain at which both sides are compared: the middles of five equal ones.
 STRAINS = (np.arange(5) + 0.5) / 5.0

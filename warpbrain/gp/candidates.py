@@ -13,22 +13,17 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp, ndtr
 
+from warpbrain.arrays import Floats
 from warpbrain.gp.coregionalised import Coregionalised, training_points
 from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import CENTRE, MEAN_ASYMMETRY
+from warpbrain.gp.hierarchy import CENTRE, MEAN_ASYMMETRY, observations
 from warpbrain.gp.hierarchy_fit import SAMPLE, fit_hierarchy, sample_hierarchies
-from warpbrain.gp.likelihood import Likelihood
-from warpbrain.gp.literature.dataset import OFFSET
-from warpbrain.gp.literature.study import Study
-from warpbrain.gp.observations import observations
-from warpbrain.gp.parameters import TASKS
+from warpbrain.gp.likelihood import TASKS, Likelihood
+from warpbrain.gp.literature.study import OFFSET, Study
 from warpbrain.gp.secant import invariant, log_secant_modulus
 from warpbrain.gp.training import JITTER, climb, start, train
-
-Floats = NDArray[np.float64]
 
 #: Name of the model that ships as the default.
 DEFAULT = "hierarchical (the default)"

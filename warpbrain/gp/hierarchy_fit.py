@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
-from warpbrain.gp.hierarchy import CENTRE, EFFECTS, MEAN_ASYMMETRY, REST, Hierarchy, Structure, prior
-from warpbrain.gp.observations import Observations
-
-Floats = NDArray[np.float64]
+from warpbrain.gp.hierarchy import CENTRE, EFFECTS, MEAN_ASYMMETRY, REST, Hierarchy, Observations, Structure, prior
 
 #: Hierarchies of a sample, unless said otherwise.
 SAMPLE = 24

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
-from warpbrain.gp.calibration import INTERVALS, Calibration, Comparison
-from warpbrain.gp.leaving_out import Score
+from warpbrain.gp.leaving_out import INTERVALS, Calibration, Comparison, Score
 
 #: Columns before the log density of each study or paper.
 COLUMNS = ("model", "log density [nats a point]", "standard error", "median", "rms error", "within 50 %", "within 95 %")

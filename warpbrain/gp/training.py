@@ -13,14 +13,10 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
-from warpbrain.gp.likelihood import Likelihood
-from warpbrain.gp.parameters import TASKS, Parameters
-from warpbrain.gp.replicates import Replicates
-
-Floats = NDArray[np.float64]
+from warpbrain.gp.likelihood import TASKS, Likelihood, Parameters, Replicates
 
 #: Variance added to the diagonal of the covariance, as in the paper's training.
 JITTER = 1e-8
@@ -228,7 +224,7 @@ def climb(
     )
 
 
-def _free(x: Floats, gradient: Floats) -> NDArray[np.bool_]:
+def _free(x: Floats, gradient: Floats) -> Bools:
     """Which parameters are not held at the end of their range."""
     return ~(((x <= _LOWEST) & (gradient > 0.0)) | ((x >= _HIGHEST) & (gradient < 0.0)))
 

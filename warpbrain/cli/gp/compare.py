@@ -33,9 +33,8 @@ def add_parser(actions: argparse._SubParsersAction[Any]) -> None:
 def _compare(options: argparse.Namespace) -> None:
     from warpbrain.atomic import check_writable
     from warpbrain.errors import InputError
-    from warpbrain.gp.calibration import calibration, compared, methods_of
     from warpbrain.gp.candidates import DEFAULT, candidates
-    from warpbrain.gp.leaving_out import folds, leave_out
+    from warpbrain.gp.leaving_out import calibration, compared, folds, leave_out, methods_of
     from warpbrain.gp.literature.studies import read_studies
     from warpbrain.gp.score_table import (
         calibration_lines,

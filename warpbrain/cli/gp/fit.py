@@ -42,8 +42,7 @@ def _fit(options: argparse.Namespace) -> None:
             raise InputError(f"--climbs {options.climbs}: means nothing with the {KINDS[0]} model")
 
     from warpbrain.atomic import check_new_folder, whole_folder
-    from warpbrain.gp.fitting import fit_model
-    from warpbrain.gp.trained import write_model
+    from warpbrain.gp.trained import fit_model, write_model
     from warpbrain.report.generative.fit_text import fit_lines
     from warpbrain.terminal.progress import Progress
 
@@ -67,7 +66,7 @@ def _fit(options: argparse.Namespace) -> None:
 def _print_change(options: argparse.Namespace, model: Process) -> None:
     """What a user's studies changed: the moduli of their groups before and after."""
     from warpbrain.gp.literature.studies import read_studies
-    from warpbrain.gp.moduli import moduli
+    from warpbrain.gp.sampling import moduli
     from warpbrain.gp.trained import trained
     from warpbrain.report.generative.moduli_text import moduli_lines
 

@@ -92,7 +92,7 @@ def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
 
 
 def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
-    from warpbrain.gp.metamodels.stability import unstable
+    from warpbrain.gp.metamodels import unstable
     from warpbrain.gp.sampling import law_of_curve
     from warpbrain.report.generative.laws_table import LawRow
 

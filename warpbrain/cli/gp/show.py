@@ -42,7 +42,7 @@ def _show(options: argparse.Namespace) -> None:
     from warpbrain.atomic import output_folder
     from warpbrain.gp.asymmetry import asymmetries_of_papers, asymmetry
     from warpbrain.gp.hierarchical import Hierarchical
-    from warpbrain.gp.moduli import moduli
+    from warpbrain.gp.sampling import moduli
     from warpbrain.gp.trained import trained
     from warpbrain.report.generative.asymmetry_text import asymmetry_lines
     from warpbrain.report.generative.draws_picture import draw_draws

@@ -15,7 +15,7 @@ def fit_lines(model: Process, record: Mapping[str, Any]) -> list[str]:
     ----------
     model : Process
     record : mapping
-        Of `warpbrain.gp.fitting.fit_model`.
+        Of `warpbrain.gp.trained.fit_model`.
     """
     lines = [f"{model.name} model of the literature as {model.variant}, {record['studies']} studies"]
     if "climbs" not in record:

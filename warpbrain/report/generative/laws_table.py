@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from warpbrain.atomic import whole_file
-from warpbrain.gp.metamodels.fit import Fit
+from warpbrain.gp.metamodels import Fit
 from warpbrain.gp.sampling import DrawnLaws, rejection_rate
 
 

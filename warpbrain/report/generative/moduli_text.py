@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from warpbrain.atomic import whole_file
-from warpbrain.gp.metamodels.fit import Fit
-from warpbrain.gp.moduli import CURVES, Moduli
+from warpbrain.gp.metamodels import Fit
+from warpbrain.gp.sampling import CURVES, Moduli
 
 
 def moduli_lines(found: Sequence[Moduli]) -> list[str]:

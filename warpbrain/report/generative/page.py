@@ -15,8 +15,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.atomic import whole_file
-from warpbrain.gp.literature.groups import ANATOMIES, METHODS
-from warpbrain.gp.literature.study import Study
+from warpbrain.gp.literature.study import ANATOMIES, METHODS, Study
 from warpbrain.gp.process import Process
 
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
