@@ -16,16 +16,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One number of a law.
+    """One number of a law: its name with the unit, where it ends, and whether its signs are kinds of their own.
 
-    Attributes
-    ----------
-    name : str
-        With the unit.
-    low, high : float
-        Where it ends.
-    signed : bool
-        Whether positive and negative values are kinds of their own, with none between them.
+    Between positive and negative values of a `signed` one there are none.
     """
 
     name: str

@@ -26,20 +26,9 @@ ANCHORS = np.linspace(0.4, 1.8, 141)
 class Coregionalised:
     """The coregionalised process of a set of studies (a `warpbrain.gp.process.Process`).
 
-    Attributes
-    ----------
-    studies : tuple of Study
-    parameters : Parameters
-    variant : str
-        Of the literature.
-    kernel : str
-        One of `warpbrain.gp.kernels.KERNELS`.
-    jitter : float
-        Variance added to the diagonal of the covariance.
-    mean_modulus : float
-        Shear modulus [Pa] of the neo-Hookean energy that is its mean; 0 for the paper's mean of zero.
-    points : int
-        How many points of each study it learns from.
+    `jitter` is a variance added to the diagonal of the covariance, `mean_modulus` the shear modulus [Pa] of the
+    neo-Hookean energy that is its mean (0 for the paper's mean of zero), `points` how many it learns from of each
+    study.
     """
 
     studies: tuple[Study, ...]

@@ -27,6 +27,7 @@ from warpbrain.gp.hierarchy import (
     mean_asymmetry_of,
     observations,
     papers,
+    places_of,
 )
 from warpbrain.gp.literature.study import GROUPS, Study, groups_of
 from warpbrain.gp.process import Draws, standard_normal
@@ -83,16 +84,8 @@ class Conditional:
 class Hierarchical:
     """The hierarchical model of a set of studies (a `warpbrain.gp.process.Process`).
 
-    Attributes
-    ----------
-    studies : tuple of Study
-    hierarchy : Hierarchy
-        Of largest posterior density.
-    variant : str
-        Of the literature.
-    sample : tuple of Hierarchy
-        Drawn from the posterior; predictions are averaged over them, and a draw is of one of them. Empty: `hierarchy`
-        stands for all.
+    `hierarchy` is that of largest posterior density, `sample` was drawn from the posterior: predictions are averaged
+    over it, and a draw is of one of it. Where it is empty, `hierarchy` stands for all.
     """
 
     studies: tuple[Study, ...]
@@ -131,7 +124,7 @@ class Hierarchical:
             for index, (study, own) in enumerate(zip(studies, stretches, strict=True))
             for l in own
         ]
-        return self.moments(_places(rows))
+        return self.moments(places_of(rows))
 
     def moments(self, at: Places) -> list[tuple[Floats, Floats]]:
         """Mean (n,) and covariance (n, n) of the log secant modulus at places, under each hierarchy."""
@@ -150,7 +143,7 @@ class Hierarchical:
         """Places (groups * n) of one new paper, with one new study a group, free to be asymmetric."""
         l = np.asarray(stretches, dtype=np.float64)
         numbered = enumerate(map(GROUPS.index, groups))
-        return _places([(-1 - index, -1, task, stretch, False) for index, task in numbered for stretch in l])
+        return places_of([(-1 - index, -1, task, stretch, False) for index, task in numbered for stretch in l])
 
     def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
         """The curve `k` standard deviations from the mean, see `Process`."""
@@ -199,8 +192,3 @@ class Hierarchical:
     def conditionals(self) -> tuple[Conditional, ...]:
         """What is known of moduli under each hierarchy of the sample."""
         return tuple(Conditional(hierarchy, self._seen) for hierarchy in self.sample or (self.hierarchy,))
-
-
-def _places(rows: Sequence[tuple[int, int, int, float, bool]]) -> Places:
-    study, source, task, stretch, symmetric = (np.array(column) for column in zip(*rows, strict=True))
-    return Places(study, source, task, stretch, symmetric)

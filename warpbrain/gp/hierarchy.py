@@ -73,15 +73,10 @@ LENGTH, LENGTH_SPREAD = 0.5, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where a secant modulus is looked at.
+    """Where secant moduli are looked at, (n,) each.
 
-    Attributes
-    ----------
-    study, source, task : (n,) int array
-        Numbers that tell studies and the papers they come from apart (negative: new ones), and the group.
-    stretch : (n,) array
-    symmetric : (n,) bool array
-        The study's form takes tension and compression alike (`Study.symmetric`): of asymmetry it says nothing.
+    `study` and `source`, its paper, are numbers that tell them apart (negative: new ones), `task` is the group. Where
+    the form of a study takes tension and compression alike (`Study.symmetric`) it says nothing of asymmetry.
     """
 
     study: Ints
@@ -103,14 +98,7 @@ class Places:
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Secant moduli of studies.
-
-    Attributes
-    ----------
-    places : Places
-    log_modulus : (n,) array
-        `z = ln(Psi / I)`, moduli in Pa.
-    """
+    """Secant moduli of studies, `z = ln(Psi / I)` (n,) with moduli in Pa, and where they are."""
 
     places: Places
     log_modulus: Floats
@@ -119,19 +107,23 @@ class Observations:
 def observations(studies: Sequence[Study]) -> Observations:
     """Secant moduli: `STRETCHES` for a hyperelastic study, one for another."""
     names = papers(studies)
-    places, moduli = [], []
+    rows: list[tuple[int, int, int, float, bool]] = []
+    moduli = [np.empty(0)]
     for index, study in enumerate(studies):
         grid = _stretches(study)
         values = log_secant_modulus(grid, study.energy(grid))
-        if not study.group.startswith("hyperelastic/"):
+        if not study.hyperelastic:
             grid, values = np.ones(1), values.mean(keepdims=True)
-        source = names.index(study.paper)
-        places += [(index, source, study.task, l, study.symmetric) for l in grid]
+        rows += [(index, names.index(study.paper), study.task, l, study.symmetric) for l in grid]
         moduli.append(values)
-    table = np.array(places, dtype=np.float64).reshape(-1, 5)
-    whole = table[:, :3].astype(np.int64)
-    at = Places(whole[:, 0], whole[:, 1], whole[:, 2], table[:, 3], table[:, 4] == 1.0)
-    return Observations(at, np.concatenate([*moduli, np.empty(0)]))
+    return Observations(places_of(rows), np.concatenate(moduli))
+
+
+def places_of(rows: Sequence[tuple[int, int, int, float, bool]]) -> Places:
+    """Places of rows of their numbers."""
+    table = np.array(rows, dtype=np.float64).reshape(-1, 5)
+    study, source, task = table[:, :3].T.astype(np.int64)
+    return Places(study, source, task, table[:, 3], table[:, 4] == 1.0)
 
 
 def papers(studies: Sequence[Study]) -> list[str]:
@@ -142,7 +134,7 @@ def papers(studies: Sequence[Study]) -> list[str]:
 def _stretches(study: Study) -> Floats:
     """The middles of equal parts of its range, so that neither 1 nor an end is among them."""
     low, high = study.stretch
-    if not study.group.startswith("hyperelastic/"):
+    if not study.hyperelastic:
         return np.array([low, high])
     half = STRETCHES // 2
     middle = (np.arange(half) + 0.5) / half
@@ -151,17 +143,9 @@ def _stretches(study: Study) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Hierarchy:
-    """Standard deviations of the effects, and the length scale of the curves.
+    """Standard deviations of `EFFECTS`, the length scale of the curves and their kernel, a key of `KERNELS`.
 
-    Attributes
-    ----------
-    spread : mapping of str to float
-        Keys of `EFFECTS`.
-    length_scale : float
-    kernel : str
-        Of the curves, a key of `warpbrain.gp.kernels.KERNELS`.
-    mean_asymmetry : tuple of two floats
-        Standard deviations of `a` and `b` before the data are seen; zero for a model without.
+    `mean_asymmetry` has the standard deviations of `a` and `b` before the data are seen; zero for a model without.
     """
 
     spread: dict[str, float]
@@ -226,17 +210,10 @@ class Hierarchy:
 class Structure:
     """What of the covariance between two sets of places does not depend on the hierarchy.
 
-    Attributes
-    ----------
-    constant, even, odd : mapping of str to (n, m) array
-        Matrix of each effect for unit variance; those of curves and asymmetries are still to be multiplied by the even
-        and the odd part of the kernel.
-    near, mirrored : (n, m) array
-        Between the strains, and between those of one and the mirrored ones of the other.
-    from_rest_x, from_rest_y : (n,) and (m,) array
-        Sizes of the strains.
-    a, b : (n, 2) and (m, 2) array
-        See `mean_asymmetry_of`.
+    `constant`, `even` and `odd` are matrices (n, m) of each effect for unit variance; those of curves and asymmetries
+    are still to be multiplied by the even and the odd part of the kernel. `near` and `mirrored` (n, m) are distances
+    between the strains, and between those of one and the mirrored ones of the other; `from_rest_x` (n,) and
+    `from_rest_y` (m,) sizes of the strains; `a` (n, 2) and `b` (m, 2) see `mean_asymmetry_of`.
     """
 
     constant: dict[str, Floats]

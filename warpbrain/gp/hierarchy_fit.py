@@ -21,17 +21,9 @@ _STEP = 1e-4
 
 @dataclass(frozen=True)
 class Fitted:
-    """How the fit of a hierarchy ended.
+    """How the fit of a hierarchy ended: the objective is the negative log of likelihood times prior.
 
-    Attributes
-    ----------
-    objective : float
-        Negative log of likelihood times prior.
-    converged : bool
-    message : str
-    iterations : int
-    condition : float
-        Condition number of the covariance of the observations, in the 2-norm.
+    The condition number of the covariance of the observations is in the 2-norm.
     """
 
     objective: float

@@ -28,25 +28,19 @@ PARTS = 4
 
 @dataclass(frozen=True)
 class Score:
-    """Of one candidate.
+    """Of one candidate on studies or papers that it was not fitted to; these count alike.
 
     Attributes
     ----------
-    name : str
-    log_density : float
-        Held-out log predictive density of a log energy [nats a point]; studies count alike, and so do papers where
-        whole papers are left out.
-    log_density_error : float
-        Its standard error over studies or papers.
+    log_density, log_density_error : float
+        Held-out log predictive density of a log energy [nats a point], and its standard error over studies or papers.
     rms_error : float
         Root mean square of log energy minus its predicted mean.
     coverage_50, coverage_95 : float
         Part of the points within the central intervals of 50 % and 95 %.
-    values : tuple of float
-        The log density of each study or paper, for paired comparisons.
-    levels : tuple of float
-        Probability integral transform of the level of each study or paper (`Candidate.level_pit`): evenly spread
-        between 0 and 1 if the model is calibrated. Empty where it was not computed.
+    values, levels : tuple of float
+        Log density of each study or paper, and probability integral transform of its level (`Candidate.level_pit`),
+        evenly spread between 0 and 1 if the model is calibrated; empty where it was not computed.
     """
 
     name: str
@@ -62,18 +56,6 @@ class Score:
     def median(self) -> float:
         """Median of the log densities: one study that a model holds to be impossible does not decide it."""
         return float(np.median(self.values))
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Log density, its error, its median, the root mean square error and both coverages."""
-        return (
-            self.log_density,
-            self.log_density_error,
-            self.median,
-            self.rms_error,
-            self.coverage_50,
-            self.coverage_95,
-        )
 
 
 def folds(studies: Sequence[Study], fold: Fold) -> dict[str, list[Study]]:
@@ -130,13 +112,10 @@ def _seen(study: Study) -> Floats:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Of one model on the studies or papers of one method.
+    """Of one model on the studies or papers of one method, "all" for all of them.
 
     Attributes
     ----------
-    method : str
-        "all" for all of them.
-    count : int
     within : tuple of int
         How many have their level within each of `INTERVALS`.
     ranges : tuple of (float, float)
@@ -157,15 +136,9 @@ class Calibration:
 class Comparison:
     """Of one model with another, study by study or paper by paper.
 
-    Attributes
-    ----------
-    other : str
-    wins, count : int
-        How often the first has the larger log predictive density.
-    p_value : float
-        Of the sign test: how often as uneven a count, or a more uneven one, comes of models that are equally good.
-    difference, difference_error : float
-        Mean of the paired differences and its standard error [nats a point].
+    `wins` says how often the first has the larger log predictive density, `p_value` is that of the sign test: how often
+    as uneven a count, or a more uneven one, comes of models that are equally good. `difference` is the mean of the
+    paired differences with its standard error [nats a point].
     """
 
     other: str
@@ -182,14 +155,7 @@ def methods_of(held: Mapping[str, Sequence[Study]]) -> list[str]:
 
 
 def calibration(score: Score, methods: Sequence[str]) -> list[Calibration]:
-    """Of a score with levels: one for each method that is there, and one of all.
-
-    Parameters
-    ----------
-    score : Score
-    methods : sequence of str
-        Of each study or paper that was left out.
-    """
+    """Of a score with levels: one for each of the methods of what was left out, and one of all."""
     from scipy.stats import binomtest
 
     levels, names = np.array(score.levels), np.array(methods)

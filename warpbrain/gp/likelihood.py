@@ -35,15 +35,7 @@ TASKS = 12
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """Length scale, coregionalisation `B = w w^T + diag(kappa)` and noise.
-
-    Attributes
-    ----------
-    length_scale : float
-        Of stretch.
-    w, kappa, noise : (12,) array
-        `kappa` and the noise variances are positive.
-    """
+    """Length scale of stretch, coregionalisation `B = w w^T + diag(kappa)` and variance of the noise, (12,) each."""
 
     length_scale: float
     w: Floats
@@ -79,18 +71,9 @@ class Parameters:
 
 @dataclass(frozen=True, eq=False)
 class Replicates:
-    """Means of observations that share task and stretch.
+    """Means (m,) of observations that share task and stretch `x`.
 
-    Attributes
-    ----------
-    task : (m,) int array
-    x : (m,) array
-    mean : (m,) array
-        Mean of the observations there.
-    count : (m,) int array
-        How many there are.
-    scatter : (m,) array
-        Sum of their squared distances from the mean.
+    `count` says how many each is of, `scatter` is the sum of their squared distances from it.
     """
 
     task: Ints
@@ -129,16 +112,9 @@ class Replicates:
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """A covariance matrix that was factored.
+    """The lower triangle (m, m) of a covariance, `weights` (m,) = `K^-1` times the observed means, and the condition.
 
-    Attributes
-    ----------
-    cholesky : (m, m) array
-        Lower triangle.
-    weights : (m,) array
-        `K^-1` times the observed means.
-    condition : float
-        Condition number in the 1-norm, as LAPACK estimates it.
+    The condition number is in the 1-norm, as LAPACK estimates it.
     """
 
     cholesky: Floats
@@ -149,13 +125,7 @@ class Factored:
 class Likelihood:
     """Negative log marginal likelihood of observations as a function of the parameters.
 
-    Parameters
-    ----------
-    data : Replicates
-    kernel : str
-        Name in `KERNELS`.
-    jitter : float
-        Variance added to the diagonal, explicit and reported: none unless asked for.
+    `jitter` is a variance added to the diagonal, explicit and reported: none unless asked for.
     """
 
     def __init__(self, data: Replicates, kernel: str = "matern32", jitter: float = 0.0) -> None:
@@ -212,47 +182,38 @@ class Likelihood:
         constant = 0.5 * data.size * math.log(2.0 * math.pi)
         return 0.5 * float(data.mean @ factored.weights) + 0.5 * log_determinant + constant + float(own.sum())
 
-    def value_and_gradient(self, parameters: Parameters) -> tuple[float, Floats]:
-        """As `value`, with its derivative by the vector of parameters (37,)."""
-        return self._derivatives(parameters, self.factor(parameters))
-
     def value_gradient_and_information(self, parameters: Parameters) -> tuple[float, Floats, Floats]:
-        """As `value_and_gradient`, with the average information (37, 37) in the same parameters."""
+        """As `value`, with its derivative (37,) and the average information (37, 37) in the vector of parameters."""
         factored = self.factor(parameters)
-        value, gradient = self._derivatives(parameters, factored)
-        return value, gradient, self._information(parameters, factored)
+        _, k, dk = self.covariance(parameters)
+        B = parameters.coregionalisation[np.ix_(self.data.task, self.data.task)]
+        gradient = self._gradient(parameters, factored, k, B * dk)
+        return self._value(parameters, factored), gradient, self._information(parameters, factored, k, B * dk)
 
-    def _derivatives(self, parameters: Parameters, factored: Factored) -> tuple[float, Floats]:
+    def _gradient(self, parameters: Parameters, factored: Factored, k: Floats, by_length: Floats) -> Floats:
         from scipy.linalg.lapack import dpotri
 
-        data = self.data
-        _, k, dk = self.covariance(parameters)
+        data, noise = self.data, parameters.noise
         inverse, info = dpotri(factored.cholesky, lower=1)
         assert info == 0
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         G = 0.5 * (inverse - np.outer(factored.weights, factored.weights))
         by_B = self._blocks(G * k)
         by_noise = np.bincount(data.task, weights=np.diag(G) / data.count, minlength=TASKS)
-        noise = parameters.noise
-        extra = np.bincount(data.task, weights=data.count - 1, minlength=TASKS) / noise
-        extra -= self._scatter / noise**2
-        B = parameters.coregionalisation[np.ix_(data.task, data.task)]
-        gradient = np.concatenate(
+        extra = np.bincount(data.task, weights=data.count - 1, minlength=TASKS) / noise - self._scatter / noise**2
+        return np.concatenate(
             [
-                [float(np.sum(G * B * dk))],
+                [float(np.sum(G * by_length))],
                 2.0 * by_B @ parameters.w,
                 np.diag(by_B) * parameters.kappa,
                 (by_noise + 0.5 * extra) * noise,
             ]
         )
-        return self._value(parameters, factored), gradient
 
-    def _information(self, parameters: Parameters, factored: Factored) -> Floats:
+    def _information(self, parameters: Parameters, factored: Factored, k: Floats, by_length: Floats) -> Floats:
         from scipy.linalg import solve_triangular
 
         data, w, a = self.data, parameters.w, factored.weights
-        _, k, dk = self.covariance(parameters)
-        B = parameters.coregionalisation[np.ix_(data.task, data.task)]
         own = np.zeros((data.size, TASKS))
         own[np.arange(data.size), data.task] = 1.0
         by_task = k @ (own * a[:, None])
@@ -260,7 +221,7 @@ class Likelihood:
         by_w = w[data.task, None] * by_task + own * (by_task @ w)[:, None]
         by_kappa = parameters.kappa * own * by_task
         by_noise = parameters.noise * own * (a / data.count)[:, None]
-        columns = np.concatenate([((B * dk) @ a)[:, None], by_w, by_kappa, by_noise], axis=1)
+        columns = np.concatenate([(by_length @ a)[:, None], by_w, by_kappa, by_noise], axis=1)
         half = solve_triangular(factored.cholesky, columns, lower=True, check_finite=False)
         information = 0.5 * half.T @ half
         at = np.arange(1 + 2 * TASKS, 1 + 3 * TASKS)

@@ -193,17 +193,11 @@ class Fit:
 
     Attributes
     ----------
-    model : MetaModel
-    values : tuple of float
-        Its parameters.
-    cost : float
-        Half the sum of the squared residuals.
-    points : int
-        Number of residuals.
+    cost, points : float and int
+        Half the sum of the squared residuals, and their number.
     converged : bool
-        Whether the search ended where the cost is stationary in all directions that the bounds leave open.
-    message : str
-        Why it ended.
+        Whether the search ended where the cost is stationary in all directions that the bounds leave open; `message`
+        says why it ended.
     evaluations : int
         Of the energies, in all boxes together.
     at_bound : tuple of str

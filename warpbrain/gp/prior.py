@@ -78,19 +78,7 @@ class Prior:
         count: int = 1000,
         seed: int = 0,
     ) -> Prior:
-        """The prior of tissues.
-
-        Parameters
-        ----------
-        model : Process
-        groups : sequence of str
-            One for each tissue, all different: tissues of one group are one tissue.
-        law : str or sequence of str
-            Names of laws, one for all tissues or one for each.
-        poisson, formulation : float, str or tuple of str
-        count : int
-            Draws on which density and Gaussian approximation rest.
-        seed : int
+        """The prior of tissues of different groups, with one law for all of them or one for each, from `count` draws.
 
         Raises
         ------
@@ -160,13 +148,6 @@ class Prior:
         found = self._density.log_density(self._points(theta))
         return found if np.ndim(theta) > 1 else float(found[0])
 
-    def gaussian_log_density(self, theta: ArrayLike) -> Floats | float:
-        """The same of the Gaussian approximation, which knows no bounds."""
-        away = self._points(theta) - self.mean
-        _, log_determinant = np.linalg.slogdet(2.0 * np.pi * self.covariance)
-        found = -0.5 * (log_determinant + np.sum(away * np.linalg.solve(self.covariance, away.T).T, axis=1))
-        return found if np.ndim(theta) > 1 else float(found[0])
-
     def laws(self, theta: ArrayLike) -> tuple[Law, ...]:
         """The law of each tissue at a vector (p,).
 
@@ -201,22 +182,14 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class FoldedDensity:
-    """The kernel density of samples, folded back into a box.
+    """The kernel density of samples (n, p), folded back into a box with sides `low` and `high` (p,), some of them
+    infinite.
 
     Gaussian kernels have the covariance of the samples times Scott's `n^(-2 / (p + 4))`. What of a kernel lies beyond
     a side is mirrored in it, so the density is one on the box and does not sink towards its sides. Samples that pile up
     on a side, as parameters at a bound of a fit do, are a mass there that no density holds: it is spread inwards over
-    the width of a kernel. Where samples fall apart into clusters, they are told apart by `clusters`, and the covariance
-    is that within them: a kernel as wide as the gap between two would fill it.
-
-    Attributes
-    ----------
-    samples : (n, p) array
-        In the box.
-    low, high : (p,) array
-        Sides of the box; infinite where there is none.
-    clusters : (n,) array of int
-        Cluster of each sample.
+    the width of a kernel. Where samples fall apart into clusters, they are told apart by `clusters` (n,), and the
+    covariance is that within them: a kernel as wide as the gap between two would fill it.
     """
 
     samples: Floats

@@ -30,12 +30,10 @@ CURVES = (-2.0, 0.0, 2.0)
 
 @dataclass(frozen=True)
 class DrawnLaws:
-    """One draw of the laws of several tissues.
+    """Draw `number` of a seed of the laws of several tissues.
 
     Attributes
     ----------
-    number, seed : int
-        Which draw.
     groups : tuple of str
         One for each tissue. Tissues of one group are of one curve.
     stretches, curves : tuple of (n,) array
@@ -190,20 +188,16 @@ def rejection_rate(draws: Sequence[DrawnLaws]) -> float:
 
 @dataclass(frozen=True)
 class Moduli:
-    """Of one group, with one law.
+    """What a model says of the shear modulus [Pa] at rest of a group, through one law.
 
     Attributes
     ----------
-    group, law : str
-    fits : tuple of Fit
-        Of the curves that lie `CURVES` standard deviations from the mean.
-    unstable : tuple of str
-        Why each of these is unstable; empty where it is not.
+    fits, unstable : tuple of Fit and of str
+        Of the curves that lie `CURVES` standard deviations from the mean, and why each is unstable; empty if it is not.
     median, low, high : float
-        Of the shear modulus at rest [Pa] of stable draws: 50 %, 2.5 % and 97.5 % lie below.
+        Of stable draws: 50 %, 2.5 % and 97.5 % lie below.
     median_error : float
         Relative standard error of the median: the number of draws is finite.
-    draws : int
     rejection_rate : float
         Part of the attempts that gave an unstable law.
     """
@@ -221,22 +215,7 @@ class Moduli:
 
 
 def moduli(model: Process, group: str, law: str, draws: int = 1000, seed: int = 0, poisson: float = 0.45) -> Moduli:
-    """Fit a law to the curves of a group, and to draws of it.
-
-    Parameters
-    ----------
-    model : Process
-    group, law : str
-    draws, seed : int
-    poisson : float
-        With which laws are to be stable.
-
-    Raises
-    ------
-    InputError
-        If the model has seen no study of the group, or there is no such law.
-    SolveError
-        If no stable law is drawn.
+    """Fit a law to the curves of a group, and to stable draws of it; errors are those of `draw_laws`.
 
     Examples
     --------

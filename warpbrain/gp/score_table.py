@@ -20,7 +20,9 @@ def write_scores(path: Path, scores: Sequence[Score], held: Sequence[str]) -> No
         writer = csv.writer(file)
         writer.writerow([*COLUMNS, *held, *_level_columns(held)])
         for score in scores:
-            writer.writerow([score.name, *map(repr, (*score.numbers, *score.values, *score.levels))])
+            density = score.log_density, score.log_density_error, score.median
+            points = score.rms_error, score.coverage_50, score.coverage_95
+            writer.writerow([score.name, *map(repr, (*density, *points, *score.values, *score.levels))])
 
 
 def read_scores(path: Path, held: Sequence[str]) -> list[Score]:

@@ -152,17 +152,10 @@ def groups_of(studies: Sequence[Study]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Dataset:
-    """Training points of the coregionalised process, the studies one after the other.
+    """Training points of the coregionalised process (n,), the studies one after the other.
 
-    Attributes
-    ----------
-    task : (n,) array of int
-        Group of each point, `4 method + anatomy`, 0 to 11.
-    stretch : (n,) array
-    log_energy : (n,) array
-        `y = ln(Psi + 1e-4)`, energies in Pa.
-    study : (n,) array of int
-        Index of the study in the sequence that the dataset was made from.
+    `task` is the group of each point, 0 to 11, `log_energy` is `y = ln(Psi + 1e-4)` with energies in Pa, `study` the
+    index of the study in the sequence that the dataset was made from.
     """
 
     task: Ints
