@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta, binom
 
-from warpbrain.gp.calibration import INTERVALS, calibration, compared, methods_of
-from warpbrain.gp.leaving_out import Score, folds
+from warpbrain.gp.leaving_out import INTERVALS, Score, calibration, compared, folds, methods_of
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.score_table import calibration_lines, comparison_lines
 

@@ -5,10 +5,9 @@ import pytest
 from published_process import FITS, STORED
 
 from warpbrain.gp.coregionalised import Coregionalised, prior_mean, training_points
-from warpbrain.gp.literature.groups import GROUPS, STRETCHES
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.metamodels.fit import fit
-from warpbrain.gp.metamodels.models import METAMODELS
+from warpbrain.gp.literature.study import GROUPS, STRETCHES
+from warpbrain.gp.metamodels import METAMODELS, fit
 from warpbrain.gp.trained import trained
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import gaussian_kde
 
-from warpbrain.gp.density import FoldedDensity
+from warpbrain.gp.prior import FoldedDensity
 
 INF = np.inf
 

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import CENTRE, EFFECTS, Hierarchy, Structure, prior
+from warpbrain.gp.hierarchy import CENTRE, EFFECTS, Hierarchy, Places, Structure, observations, prior
 from warpbrain.gp.hierarchy_fit import fit_hierarchy, negative_log_likelihood
-from warpbrain.gp.literature.groups import STRETCHES
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.literature.study import Study
-from warpbrain.gp.observations import Places, observations
+from warpbrain.gp.literature.study import STRETCHES, Study
 from warpbrain.gp.secant import invariant, log_energy, log_secant_modulus
 from warpbrain.gp.trained import trained
 

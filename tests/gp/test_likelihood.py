@@ -9,11 +9,9 @@ from scipy.stats import multivariate_normal
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.kernels import KERNELS
-from warpbrain.gp.likelihood import Likelihood
-from warpbrain.gp.literature.dataset import dataset
+from warpbrain.gp.likelihood import TASKS, Likelihood, Parameters, Replicates
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.parameters import TASKS, Parameters
-from warpbrain.gp.replicates import Replicates
+from warpbrain.gp.literature.study import dataset
 
 
 def some(seed=0):
@@ -43,7 +41,7 @@ def test_means_of_replicates_say_all_that_the_observations_say(kernel):
 def test_gradient(kernel, seed):
     task, x, y, parameters = some(seed)
     likelihood = Likelihood(Replicates.of(task, x, y), kernel)
-    value, gradient = likelihood.value_and_gradient(parameters)
+    value, gradient, _ = likelihood.value_gradient_and_information(parameters)
     assert value == pytest.approx(likelihood.value(parameters), rel=1e-13)
     vector, h = parameters.to_vector(), 1e-5
     for k in range(len(vector)):
@@ -57,9 +55,8 @@ def test_average_information():
     task, x, y, parameters = some()
     data = Replicates.of(task, x, y)
     likelihood = Likelihood(data)
-    value, gradient, information = likelihood.value_gradient_and_information(parameters)
+    value, _, information = likelihood.value_gradient_and_information(parameters)
     assert value == pytest.approx(likelihood.value(parameters), rel=1e-13)
-    np.testing.assert_array_equal(gradient, likelihood.value_and_gradient(parameters)[1])
     vector, h = parameters.to_vector(), 1e-6
     steps = h * np.eye(len(vector))
     weights = likelihood.factor(parameters).weights

@@ -62,21 +62,22 @@ def test_samples_are_the_draws(neo_hookean):
     assert neo_hookean.theta.all()
 
 
+def gaussian(prior):
+    return multivariate_normal(prior.mean, prior.covariance)
+
+
 def test_of_a_neo_hookean_law_it_is_nearly_gaussian(neo_hookean):
     assert neo_hookean.rejection_rate == 0.0 and not neo_hookean.at_bound.any()
     assert neo_hookean.distances.max() < 0.05
-    expected = multivariate_normal(neo_hookean.mean, neo_hookean.covariance).logpdf(neo_hookean.theta)
-    np.testing.assert_allclose(neo_hookean.gaussian_log_density(neo_hookean.theta), expected, rtol=1e-10)
     # both densities say nearly the same of samples that neither has seen: the tails are those of several hierarchies
     fresh = neo_hookean.samples(200, seed=1)
-    away = neo_hookean.log_density(fresh) - neo_hookean.gaussian_log_density(fresh)
+    away = neo_hookean.log_density(fresh) - gaussian(neo_hookean).logpdf(fresh)
     assert abs(away.mean()) < 0.1
 
 
 def test_densities_of_one_point_are_numbers(neo_hookean):
     one = neo_hookean.log_density(neo_hookean.mean)
     assert isinstance(one, float) and one == pytest.approx(neo_hookean.log_density(neo_hookean.mean[None])[0])
-    assert isinstance(neo_hookean.gaussian_log_density(neo_hookean.mean), float)
 
 
 def test_an_exponent_of_either_sign(ogden):
@@ -87,7 +88,7 @@ def test_an_exponent_of_either_sign(ogden):
     assert 0.0 < ogden.rejection_rate < 0.2
     assert ogden.distances[1] > 3.0 * ogden.distances[0]
     fresh = ogden.samples(100, seed=1)
-    assert np.mean(ogden.log_density(fresh)) > np.mean(ogden.gaussian_log_density(fresh)) + 0.2
+    assert np.mean(ogden.log_density(fresh)) > np.mean(gaussian(ogden).logpdf(fresh)) + 0.2
     assert isinstance(ogden.laws(fresh[0])[0], Ogden)
 
 
@@ -98,7 +99,7 @@ def test_a_ratio_that_piles_up_at_its_ends(mooney_rivlin):
     assert ((ratio < 0.01) | (ratio > 0.99)).mean() == pytest.approx(mooney_rivlin.at_bound[0], abs=0.01)
     assert mooney_rivlin.distances[1] > 0.2
     fresh = mooney_rivlin.samples(100, seed=1)
-    assert np.mean(mooney_rivlin.log_density(fresh)) > np.mean(mooney_rivlin.gaussian_log_density(fresh)) + 0.2
+    assert np.mean(mooney_rivlin.log_density(fresh)) > np.mean(gaussian(mooney_rivlin).logpdf(fresh)) + 0.2
     beyond = np.array([mooney_rivlin.mean[0], 1.001])
     assert mooney_rivlin.log_density(beyond) == -np.inf
 

@@ -7,8 +7,7 @@ import pytest
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp import sampling
-from warpbrain.gp.metamodels.models import METAMODELS
-from warpbrain.gp.metamodels.stability import unstable
+from warpbrain.gp.metamodels import METAMODELS, unstable
 from warpbrain.gp.sampling import draw_laws, draw_many, law_of_curve, middle_law, rejection_rate, usual_stretches
 from warpbrain.gp.trained import KINDS, trained
 

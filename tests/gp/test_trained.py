@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from warpbrain.errors import InputError
-from warpbrain.gp.fitting import fit_model
-from warpbrain.gp.literature.groups import GROUPS
 from warpbrain.gp.literature.studies import VARIANTS
-from warpbrain.gp.trained import KINDS, MODEL, STUDIES, find_model, read_model, trained, write_model
+from warpbrain.gp.literature.study import GROUPS
+from warpbrain.gp.trained import KINDS, MODEL, STUDIES, find_model, fit_model, read_model, trained, write_model
 
 ADDED = '[[study]]\nname = "Lab-GM-Someone2026"\ngroup = "hyperelastic/grey matter"\nmu = 12000.0\n'
 

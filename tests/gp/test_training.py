@@ -8,9 +8,7 @@ from published_process import OBJECTIVE
 from scipy.stats import chi2
 
 from warpbrain.errors import SolveError
-from warpbrain.gp.likelihood import Likelihood
-from warpbrain.gp.parameters import TASKS, Parameters
-from warpbrain.gp.replicates import Replicates
+from warpbrain.gp.likelihood import TASKS, Likelihood, Parameters, Replicates
 from warpbrain.gp.trained import trained
 from warpbrain.gp.training import JITTER, climb, start, train
 

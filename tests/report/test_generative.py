@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.literature.groups import GROUPS
-from warpbrain.gp.literature.study import Study
+from warpbrain.gp.literature.study import GROUPS, Study
 from warpbrain.gp.trained import trained
 from warpbrain.report import generative_pictures as page
 from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies

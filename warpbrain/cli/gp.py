@@ -77,7 +77,7 @@ def _show(options: argparse.Namespace) -> None:
     from warpbrain.atomic import output_folder
     from warpbrain.gp.asymmetry import asymmetries_of_papers, asymmetry
     from warpbrain.gp.hierarchical import Hierarchical
-    from warpbrain.gp.moduli import moduli
+    from warpbrain.gp.sampling import moduli
     from warpbrain.gp.trained import trained
     from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
     from warpbrain.report.generative_text import asymmetry_lines, moduli_lines, write_moduli
@@ -145,8 +145,7 @@ def _fit(options: argparse.Namespace) -> None:
         raise InputError(f"--climbs {options.climbs}: means nothing with the {KINDS[0]} model")
 
     from warpbrain.atomic import check_new_folder, whole_folder
-    from warpbrain.gp.fitting import fit_model
-    from warpbrain.gp.trained import write_model
+    from warpbrain.gp.trained import fit_model, write_model
     from warpbrain.report.generative_text import fit_lines
 
     out = options.out or Path(f"warpbrain-gp-{options.gp}-{options.variant}")
@@ -166,7 +165,7 @@ def _fit(options: argparse.Namespace) -> None:
 def _print_change(options: argparse.Namespace, model: Process) -> None:
     """What a user's studies changed: the moduli of their groups before and after."""
     from warpbrain.gp.literature.studies import read_studies
-    from warpbrain.gp.moduli import moduli
+    from warpbrain.gp.sampling import moduli
     from warpbrain.gp.trained import trained
     from warpbrain.report.generative_text import moduli_lines
 
@@ -261,7 +260,7 @@ def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
 
 
 def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
-    from warpbrain.gp.metamodels.stability import unstable
+    from warpbrain.gp.metamodels import unstable
     from warpbrain.gp.sampling import law_of_curve
     from warpbrain.report.generative_text import LawRow
 
@@ -297,9 +296,8 @@ def _add_compare(actions: argparse._SubParsersAction[Any]) -> None:
 
 def _compare(options: argparse.Namespace) -> None:
     from warpbrain.atomic import check_writable
-    from warpbrain.gp.calibration import calibration, compared, methods_of
     from warpbrain.gp.candidates import DEFAULT, candidates
-    from warpbrain.gp.leaving_out import folds, leave_out
+    from warpbrain.gp.leaving_out import calibration, compared, folds, leave_out, methods_of
     from warpbrain.gp.literature.studies import read_studies
     from warpbrain.gp.score_table import calibration_lines, comparison_lines, read_scores, score_lines, write_scores
 

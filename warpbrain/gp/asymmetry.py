@@ -12,17 +12,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.gp.hierarchical import Hierarchical
 from warpbrain.gp.hierarchy import REACH
-from warpbrain.gp.literature.dataset import OFFSET
-from warpbrain.gp.literature.groups import STRETCHES
-from warpbrain.gp.literature.study import Study
-from warpbrain.gp.process import Process
+from warpbrain.gp.literature.study import STRETCHES, Study
 from warpbrain.gp.secant import equivalent_strain, invariant, stretch_of
-
-Floats = NDArray[np.float64]
 
 #: Parts of the largest strain at which both sides are compared: the middles of five equal ones.
 STRAINS = (np.arange(5) + 0.5) / 5.0
@@ -36,15 +31,12 @@ class Asymmetry:
 
     Attributes
     ----------
-    group : str
     strain : float
         Largest equivalent strain of the group on both sides.
     mean, low, high : float
         Of all papers in the mean, and its 95 % posterior interval.
-    new_low, new_high : float
-        95 % of new studies by new papers are between.
-    tension : float
-        Part of these that are stiffer in tension.
+    new_low, new_high, tension : float
+        95 % of new studies by new papers are between, and this part of them is stiffer in tension.
     """
 
     group: str
@@ -87,13 +79,6 @@ def asymmetry(model: Hierarchical, group: str) -> Asymmetry:
     )
 
 
-def drawn_asymmetries(model: Process, group: str, count: int, seed: int = 0) -> Floats:
-    """Asymmetries (count,) of draws of a group."""
-    stretches = _both_sides(_largest_strain(STRETCHES[group]))
-    drawn = (np.exp(model.draw([group], stretches, number, seed)[0]) - OFFSET for number in range(count))
-    return np.array([_of_energies(energies, stretches) for energies in drawn])
-
-
 def asymmetry_of(study: Study) -> float:
     """Of a published energy, within its own range."""
     stretches = _both_sides(_largest_strain(study.stretch))
@@ -105,7 +90,7 @@ def asymmetries_of_papers(studies: Iterable[Study]) -> dict[str, tuple[float, bo
     """The mean asymmetry of the hyperelastic studies of each paper, and whether a form of one could have another."""
     papers: dict[str, list[Study]] = {}
     for study in studies:
-        if study.group.startswith("hyperelastic/"):
+        if study.hyperelastic:
             papers.setdefault(study.paper, []).append(study)
     return {
         name: (float(np.mean([asymmetry_of(study) for study in own])), not all(study.symmetric for study in own))

@@ -13,22 +13,17 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp, ndtr
 
+from warpbrain.arrays import Floats
 from warpbrain.gp.coregionalised import Coregionalised, training_points
 from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import CENTRE, MEAN_ASYMMETRY
+from warpbrain.gp.hierarchy import CENTRE, MEAN_ASYMMETRY, observations
 from warpbrain.gp.hierarchy_fit import SAMPLE, fit_hierarchy, sample_hierarchies
-from warpbrain.gp.likelihood import Likelihood
-from warpbrain.gp.literature.dataset import OFFSET
-from warpbrain.gp.literature.study import Study
-from warpbrain.gp.observations import observations
-from warpbrain.gp.parameters import TASKS
+from warpbrain.gp.likelihood import TASKS, Likelihood
+from warpbrain.gp.literature.study import OFFSET, Study
 from warpbrain.gp.secant import invariant, log_secant_modulus
 from warpbrain.gp.training import JITTER, climb, start, train
-
-Floats = NDArray[np.float64]
 
 #: Name of the model that ships as the default.
 DEFAULT = "hierarchical (the default)"
@@ -44,16 +39,10 @@ OF_CURVES = (
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Of one study that was left out.
+    """Of one study that was left out, (n,) each.
 
-    Attributes
-    ----------
-    log_density : (n,) array
-        Of its log energies, each by itself [nats].
-    pit : (n,) array
-        Probability integral transform: how probable it was held to be that they are lower.
-    error : (n,) array
-        Log energy minus predicted mean.
+    The log density of each of its log energies by itself [nats], their probability integral transforms (how probable it
+    was held to be that they are lower), and log energy minus predicted mean.
     """
 
     log_density: Floats
@@ -88,23 +77,13 @@ class Candidate(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class CoregionalisedCandidate:
-    """The paper's process, or one like it.
-
-    Attributes
-    ----------
-    name, kernel : str
-    mean_modulus : float
-        See `Coregionalised`.
-    separate : bool
-        Groups share nothing but a length scale.
-    model : Coregionalised or None
-        None before the first fit.
-    """
+    """The paper's process, or one like it: `separate` groups share nothing but a length scale."""
 
     name: str
     kernel: str = "matern32"
     mean_modulus: float = 0.0
     separate: bool = False
+    #: None before the first fit.
     model: Coregionalised | None = None
 
     def fitted(self, studies: Sequence[Study]) -> CoregionalisedCandidate:
@@ -140,19 +119,9 @@ class CoregionalisedCandidate:
 
 @dataclass(frozen=True, eq=False)
 class HierarchicalCandidate:
-    """The hierarchical model, or one that lacks some of its effects.
+    """The hierarchical model, or one that is `without` some of its effects, averaged over a sample of hierarchies.
 
-    Attributes
-    ----------
-    name, kernel : str
-    without : tuple of str
-        Effects that it lacks.
-    mean_asymmetry : tuple of two floats
-        See `warpbrain.gp.hierarchy.Hierarchy`.
-    sample : int
-        Over how many hierarchies it averages; 0 for the best alone.
-    model : Hierarchical or None
-        None before the first fit.
+    A sample of 0 is the best hierarchy alone.
     """
 
     name: str
@@ -160,6 +129,7 @@ class HierarchicalCandidate:
     without: tuple[str, ...] = ()
     mean_asymmetry: tuple[float, float] = MEAN_ASYMMETRY
     sample: int = SAMPLE
+    #: None before the first fit.
     model: Hierarchical | None = None
 
     def fitted(self, studies: Sequence[Study]) -> HierarchicalCandidate:

@@ -7,20 +7,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.gp.drawing import Anchored, standard_normal
+from warpbrain.arrays import Floats, Ints
 from warpbrain.gp.kernels import KERNELS
-from warpbrain.gp.likelihood import Factored, Likelihood
-from warpbrain.gp.literature.dataset import dataset
-from warpbrain.gp.literature.groups import GROUPS, task_of
-from warpbrain.gp.literature.study import Study
-from warpbrain.gp.parameters import Parameters
-from warpbrain.gp.replicates import Replicates
+from warpbrain.gp.likelihood import Factored, Likelihood, Parameters, Replicates
+from warpbrain.gp.literature.study import GROUPS, Study, dataset, groups_of
+from warpbrain.gp.process import Draws, standard_normal
 from warpbrain.gp.secant import log_energy
 
-Floats = NDArray[np.float64]
-
+#: Tasks (n,) and stretches (n,) of places.
+_At = tuple[Ints, Floats]
 #: Stretches at which draws are drawn; between them they are the mean given these values.
 ANCHORS = np.linspace(0.4, 1.8, 141)
 
@@ -29,20 +26,9 @@ ANCHORS = np.linspace(0.4, 1.8, 141)
 class Coregionalised:
     """The coregionalised process of a set of studies (a `warpbrain.gp.process.Process`).
 
-    Attributes
-    ----------
-    studies : tuple of Study
-    parameters : Parameters
-    variant : str
-        Of the literature.
-    kernel : str
-        One of `warpbrain.gp.kernels.KERNELS`.
-    jitter : float
-        Variance added to the diagonal of the covariance.
-    mean_modulus : float
-        Shear modulus [Pa] of the neo-Hookean energy that is its mean; 0 for the paper's mean of zero.
-    points : int
-        How many points of each study it learns from.
+    `jitter` is a variance added to the diagonal of the covariance, `mean_modulus` the shear modulus [Pa] of the
+    neo-Hookean energy that is its mean (0 for the paper's mean of zero), `points` how many it learns from of each
+    study.
     """
 
     studies: tuple[Study, ...]
@@ -57,14 +43,13 @@ class Coregionalised:
     @property
     def groups(self) -> tuple[str, ...]:
         """Groups that it has seen studies of."""
-        seen = {study.group for study in self.studies}
-        return tuple(group for group in GROUPS if group in seen)
+        return groups_of(self.studies)
 
     def log_energy(self, group: str, stretches: ArrayLike) -> tuple[Floats, Floats]:
         """Mean and standard deviation (n,) of `ln(Psi + 1e-4)`, the noise of the group included, as in the paper."""
         l = np.asarray(stretches, dtype=np.float64)
         mean, covariance = self._predict([group], l, l)
-        variance = np.diag(covariance) + self.parameters.noise[task_of(group)]
+        variance = np.diag(covariance) + self.parameters.noise[GROUPS.index(group)]
         return mean, np.sqrt(np.maximum(variance, 0.0))
 
     def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
@@ -78,34 +63,15 @@ class Coregionalised:
         The noise of a group is one number a curve: it stands for what studies differ by, and moves a whole curve as the
         paper's `k` does. Independent noise at every stretch would be no function.
         """
+        normal = standard_normal(len(groups) * (1 + len(ANCHORS)), number, seed)
         l = np.asarray(stretches, dtype=np.float64)
-        anchored = self._anchored(tuple(groups))
-        normal = standard_normal(len(anchored.mean) + len(groups), number, seed)
-        mean, cross = self._from_anchors(tuple(groups), l)
-        latent = (mean + cross @ anchored.weights(normal[len(groups) :])).reshape(len(groups), -1)
-        noise = np.sqrt(self.parameters.noise[[task_of(group) for group in groups]])
+        latent = self._draws.at(tuple(groups), l, normal[len(groups) :], self._predict)
+        noise = np.sqrt(self.parameters.noise[[GROUPS.index(group) for group in groups]])
         return latent + (noise * normal[: len(groups)])[:, None]
 
-    def _anchored(self, groups: tuple[str, ...]) -> Anchored:
-        if groups not in self._drawn:
-            self._drawn[groups] = Anchored(*self._predict(groups, ANCHORS, ANCHORS))
-        return self._drawn[groups]
-
-    def _from_anchors(self, groups: tuple[str, ...], stretches: Floats) -> tuple[Floats, Floats]:
-        """Mean and covariance with the anchors; the last ones are kept, for many draws at the same stretches."""
-        key = groups, stretches.tobytes()
-        if key not in self._last:
-            self._last.clear()
-            self._last[key] = self._predict(groups, stretches, ANCHORS)
-        return self._last[key]
-
     @cached_property
-    def _drawn(self) -> dict[tuple[str, ...], Anchored]:
-        return {}
-
-    @cached_property
-    def _last(self) -> dict[tuple[tuple[str, ...], bytes], tuple[Floats, Floats]]:
-        return {}
+    def _draws(self) -> Draws:
+        return Draws(ANCHORS)
 
     def level_of(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> tuple[float, float]:
         """Mean and standard deviation of the mean log energy over new studies, each at its own stretches.
@@ -121,31 +87,27 @@ class Coregionalised:
 
     def _predict(self, groups: Sequence[str], at: Floats, other: Floats) -> tuple[Floats, Floats]:
         """Mean of the shared curve at (groups * n,) and covariance with other stretches, given the studies."""
-        tasks = np.array([task_of(group) for group in groups], dtype=np.int64)
+        tasks = np.array([GROUPS.index(group) for group in groups], dtype=np.int64)
 
-        def places(stretches: Floats) -> tuple[NDArray[np.int64], Floats]:
+        def places(stretches: Floats) -> _At:
             return np.repeat(tasks, len(stretches)), np.tile(stretches, len(tasks))
 
         here = places(at)
         return self._predict_at(here, here if other is at else places(other))
 
-    def _predict_at(
-        self, here: tuple[NDArray[np.int64], Floats], there: tuple[NDArray[np.int64], Floats]
-    ) -> tuple[Floats, Floats]:
+    def _predict_at(self, here: _At, there: _At) -> tuple[Floats, Floats]:
         """The same at any pairs of task and stretch."""
         from scipy.linalg import solve_triangular
 
         data, factored = self._seen
         k = self._covariance((data.task, data.x), here)
-        whitened = solve_triangular(factored.cholesky, k, lower=True)
-        if there is here:
-            to = whitened
-        else:
-            to = solve_triangular(factored.cholesky, self._covariance((data.task, data.x), there), lower=True)
         mean = prior_mean(here[1], self.mean_modulus) + k.T @ factored.weights
+        whitened = to = solve_triangular(factored.cholesky, k, lower=True)
+        if there is not here:
+            to = solve_triangular(factored.cholesky, self._covariance((data.task, data.x), there), lower=True)
         return mean, self._covariance(here, there) - whitened.T @ to
 
-    def _covariance(self, a: tuple[NDArray[np.int64], Floats], b: tuple[NDArray[np.int64], Floats]) -> Floats:
+    def _covariance(self, a: _At, b: _At) -> Floats:
         distance = np.abs(a[1][:, None] - b[1][None, :])
         k = KERNELS[self.kernel](distance, self.parameters.length_scale)[0]
         return self.parameters.coregionalisation[np.ix_(a[0], b[0])] * k

@@ -21,19 +21,19 @@ through all that is shared: overall, method and paper.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.gp.kernels import KERNELS
-from warpbrain.gp.literature.groups import ANATOMIES, METHODS
-from warpbrain.gp.observations import Places
-from warpbrain.gp.secant import equivalent_strain
+from warpbrain.gp.literature.study import ANATOMIES, METHODS, Study
+from warpbrain.gp.secant import equivalent_strain, log_secant_modulus
 
-Floats = NDArray[np.float64]
-
+#: A curve of a hyperelastic study is seen at this many stretches. It has one to eight parameters: a hundred points of
+#: it are not a hundred observations.
+STRETCHES = 10
 #: About which moduli lie [Pa], and how widely (standard deviation of the logarithm): weak, and not learnt.
 CENTRE, OVERALL = np.log(1500.0), 3.0
 #: Standard deviations of `a` and `b` before the data are seen: weak, and not learnt. A standard deviation of `a` makes
@@ -72,18 +72,80 @@ LENGTH, LENGTH_SPREAD = 0.5, 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Hierarchy:
-    """Standard deviations of the effects, and the length scale of the curves.
+class Places:
+    """Where secant moduli are looked at, (n,) each.
 
-    Attributes
-    ----------
-    spread : mapping of str to float
-        Keys of `EFFECTS`.
-    length_scale : float
-    kernel : str
-        Of the curves, a key of `warpbrain.gp.kernels.KERNELS`.
-    mean_asymmetry : tuple of two floats
-        Standard deviations of `a` and `b` before the data are seen; zero for a model without.
+    `study` and `source`, its paper, are numbers that tell them apart (negative: new ones), `task` is the group. Where
+    the form of a study takes tension and compression alike (`Study.symmetric`) it says nothing of asymmetry.
+    """
+
+    study: Ints
+    source: Ints
+    task: Ints
+    stretch: Floats
+    symmetric: Bools
+
+    @property
+    def asymmetric(self) -> Bools:
+        """Curved, and free to be stiffer on one side of rest."""
+        return self.curved & ~self.symmetric
+
+    @property
+    def curved(self) -> Bools:
+        """Hyperelastic: elsewhere only a modulus was published."""
+        return self.task // len(ANATOMIES) == METHODS.index("hyperelastic")
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """Secant moduli of studies, `z = ln(Psi / I)` (n,) with moduli in Pa, and where they are."""
+
+    places: Places
+    log_modulus: Floats
+
+
+def observations(studies: Sequence[Study]) -> Observations:
+    """Secant moduli: `STRETCHES` for a hyperelastic study, one for another."""
+    names = papers(studies)
+    rows: list[tuple[int, int, int, float, bool]] = []
+    moduli = [np.empty(0)]
+    for index, study in enumerate(studies):
+        grid = _stretches(study)
+        values = log_secant_modulus(grid, study.energy(grid))
+        if not study.hyperelastic:
+            grid, values = np.ones(1), values.mean(keepdims=True)
+        rows += [(index, names.index(study.paper), study.task, l, study.symmetric) for l in grid]
+        moduli.append(values)
+    return Observations(places_of(rows), np.concatenate(moduli))
+
+
+def places_of(rows: Sequence[tuple[int, int, int, float, bool]]) -> Places:
+    """Places of rows of their numbers."""
+    table = np.array(rows, dtype=np.float64).reshape(-1, 5)
+    study, source, task = table[:, :3].T.astype(np.int64)
+    return Places(study, source, task, table[:, 3], table[:, 4] == 1.0)
+
+
+def papers(studies: Sequence[Study]) -> list[str]:
+    """The papers that studies are from; the place of one is its number in `Places.source`."""
+    return sorted({study.paper for study in studies})
+
+
+def _stretches(study: Study) -> Floats:
+    """The middles of equal parts of its range, so that neither 1 nor an end is among them."""
+    low, high = study.stretch
+    if not study.hyperelastic:
+        return np.array([low, high])
+    half = STRETCHES // 2
+    middle = (np.arange(half) + 0.5) / half
+    return np.concatenate([low + (1.0 - low) * middle, 1.0 + (high - 1.0) * middle])
+
+
+@dataclass(frozen=True, eq=False)
+class Hierarchy:
+    """Standard deviations of `EFFECTS`, the length scale of the curves and their kernel, a key of `KERNELS`.
+
+    `mean_asymmetry` has the standard deviations of `a` and `b` before the data are seen; zero for a model without.
     """
 
     spread: dict[str, float]
@@ -148,17 +210,10 @@ class Hierarchy:
 class Structure:
     """What of the covariance between two sets of places does not depend on the hierarchy.
 
-    Attributes
-    ----------
-    constant, even, odd : mapping of str to (n, m) array
-        Matrix of each effect for unit variance; those of curves and asymmetries are still to be multiplied by the even
-        and the odd part of the kernel.
-    near, mirrored : (n, m) array
-        Between the strains, and between those of one and the mirrored ones of the other.
-    from_rest_x, from_rest_y : (n,) and (m,) array
-        Sizes of the strains.
-    a, b : (n, 2) and (m, 2) array
-        See `mean_asymmetry_of`.
+    `constant`, `even` and `odd` are matrices (n, m) of each effect for unit variance; those of curves and asymmetries
+    are still to be multiplied by the even and the odd part of the kernel. `near` and `mirrored` (n, m) are distances
+    between the strains, and between those of one and the mirrored ones of the other; `from_rest_x` (n,) and
+    `from_rest_y` (m,) sizes of the strains; `a` (n, 2) and `b` (m, 2) see `mean_asymmetry_of`.
     """
 
     constant: dict[str, Floats]
@@ -222,5 +277,5 @@ def prior() -> tuple[Floats, Floats]:
     return mean, np.array([*[PRIOR_SPREAD] * len(EFFECTS), LENGTH_SPREAD])
 
 
-def _same(a: NDArray[np.int64], b: NDArray[np.int64]) -> Floats:
+def _same(a: Ints, b: Ints) -> Floats:
     return (a[:, None] == b[None, :]).astype(float)

@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
-from warpbrain.gp.hierarchy import CENTRE, EFFECTS, MEAN_ASYMMETRY, REST, Hierarchy, Structure, prior
-from warpbrain.gp.observations import Observations
-
-Floats = NDArray[np.float64]
+from warpbrain.gp.hierarchy import CENTRE, EFFECTS, MEAN_ASYMMETRY, REST, Hierarchy, Observations, Structure, prior
 
 #: Hierarchies of a sample, unless said otherwise.
 SAMPLE = 24
@@ -24,17 +21,9 @@ _STEP = 1e-4
 
 @dataclass(frozen=True)
 class Fitted:
-    """How the fit of a hierarchy ended.
+    """How the fit of a hierarchy ended: the objective is the negative log of likelihood times prior.
 
-    Attributes
-    ----------
-    objective : float
-        Negative log of likelihood times prior.
-    converged : bool
-    message : str
-    iterations : int
-    condition : float
-        Condition number of the covariance of the observations, in the 2-norm.
+    The condition number of the covariance of the observations is in the 2-norm.
     """
 
     objective: float

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Floats
 
 
 def matern12(distance: Floats, length: float) -> tuple[Floats, Floats]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.gp.coordinates import coordinates, laws_from, to_coordinates
-from warpbrain.gp.density import FoldedDensity
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import DrawnLaws, draw_many
 
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
     from warpbrain.physics.laws import Law
     from warpbrain.physics.laws.law import Coordinate
 
-Floats = NDArray[np.float64]
+
+#: Smallest width of a kernel along a bounded coordinate, relative to the box: where all samples are on one side, their
+#: spread gives none.
+NARROWEST = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,19 +79,7 @@ class Prior:
         count: int = 1000,
         seed: int = 0,
     ) -> Prior:
-        """The prior of tissues.
-
-        Parameters
-        ----------
-        model : Process
-        groups : sequence of str
-            One for each tissue, all different: tissues of one group are one tissue.
-        law : str or sequence of str
-            Names of laws, one for all tissues or one for each.
-        poisson, formulation : float, str or tuple of str
-        count : int
-            Draws on which density and Gaussian approximation rest.
-        seed : int
+        """The prior of tissues of different groups, with one law for all of them or one for each, from `count` draws.
 
         Raises
         ------
@@ -157,13 +149,6 @@ class Prior:
         found = self._density.log_density(self._points(theta))
         return found if np.ndim(theta) > 1 else float(found[0])
 
-    def gaussian_log_density(self, theta: ArrayLike) -> Floats | float:
-        """The same of the Gaussian approximation, which knows no bounds."""
-        away = self._points(theta) - self.mean
-        _, log_determinant = np.linalg.slogdet(2.0 * np.pi * self.covariance)
-        found = -0.5 * (log_determinant + np.sum(away * np.linalg.solve(self.covariance, away.T).T, axis=1))
-        return found if np.ndim(theta) > 1 else float(found[0])
-
     def laws(self, theta: ArrayLike) -> tuple[Law, ...]:
         """The law of each tissue at a vector (p,).
 
@@ -194,6 +179,63 @@ class Prior:
         negative = (self.theta[:, signed] < 0.0).astype(np.int64)
         clusters = negative @ (2 ** np.arange(negative.shape[1]))
         return FoldedDensity(self.theta, low, high, clusters)
+
+
+@dataclass(frozen=True, eq=False)
+class FoldedDensity:
+    """The kernel density of samples (n, p), folded back into a box with sides `low` and `high` (p,), some of them
+    infinite.
+
+    Gaussian kernels have the covariance of the samples times Scott's `n^(-2 / (p + 4))`. What of a kernel lies beyond
+    a side is mirrored in it, so the density is one on the box and does not sink towards its sides. Samples that pile up
+    on a side, as parameters at a bound of a fit do, are a mass there that no density holds: it is spread inwards over
+    the width of a kernel. Where samples fall apart into clusters, they are told apart by `clusters` (n,), and the
+    covariance is that within them: a kernel as wide as the gap between two would fill it.
+    """
+
+    samples: Floats
+    low: Floats
+    high: Floats
+    clusters: Ints
+
+    def log_density(self, at: ArrayLike) -> Floats:
+        """Log density (m,) at points (m, p); minus infinity outside of the box."""
+        from scipy.linalg import solve_triangular
+        from scipy.special import logsumexp
+
+        points = np.atleast_2d(np.asarray(at, dtype=np.float64))
+        count, size = self.samples.shape
+        centres = solve_triangular(self._factor, self.samples.T, lower=True).T
+        terms = []
+        for image in self._images(points):
+            away = solve_triangular(self._factor, image.T, lower=True).T
+            squares = np.sum(away**2, axis=1)[:, None] - 2.0 * away @ centres.T + np.sum(centres**2, axis=1)
+            terms.append(logsumexp(-0.5 * squares, axis=1))
+        found: Floats = logsumexp(terms, axis=0)
+        found -= np.log(count) + 0.5 * size * np.log(2.0 * np.pi) + np.log(np.diag(self._factor)).sum()
+        inside = np.all((points >= self.low) & (points <= self.high), axis=1)
+        return np.where(inside, found, -np.inf)
+
+    def _images(self, points: Floats) -> list[Floats]:
+        """The points and their mirror images in all sides; a kernel is narrow, so images of images are of no weight."""
+        by_column = []
+        for column, low, high in zip(points.T, self.low, self.high, strict=True):
+            sides = [side for side in (low, high) if np.isfinite(side)]
+            by_column.append([column, *(2.0 * side - column for side in sides)])
+        return [np.stack(columns, axis=1) for columns in product(*by_column)]
+
+    @cached_property
+    def _factor(self) -> Floats:
+        """Cholesky factor of the covariance of a kernel."""
+        count, size = self.samples.shape
+        away = self.samples.copy()
+        for cluster in np.unique(self.clusters):
+            away[self.clusters == cluster] -= away[self.clusters == cluster].mean(axis=0)
+        covariance = away.T @ away / count * count ** (-2.0 / (size + 4.0))
+        bounded = np.isfinite(self.high - self.low)
+        widest = np.where(bounded, NARROWEST * np.where(bounded, self.high - self.low, 1.0), 0.0)
+        missing = np.maximum(widest**2 - np.diag(covariance), 0.0)
+        return np.linalg.cholesky(covariance + np.diag(missing))
 
 
 def _theta(draws: Iterable[DrawnLaws]) -> Floats:

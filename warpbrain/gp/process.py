@@ -1,16 +1,27 @@
-"""What every trained generative model can be asked."""
+"""What every trained generative model can be asked, and draws that are functions.
+
+A draw is drawn at anchors; elsewhere it is what follows from its values there.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Floats
 from warpbrain.gp.literature.study import Study
 
-Floats = NDArray[np.float64]
+#: Added to the diagonal of the covariance of anchors, relative to its mean: they are dense enough for a smooth curve to
+#: be singular in double precision. A draw moves by its root, 1e-4 of a standard deviation.
+JITTER = 1e-8
+#: Of groups, stretches (n,) and other ones (m,): the mean at the former (groups * n,) and the covariance with the
+#: latter (groups * n, groups * m).
+Moments = Callable[[tuple[str, ...], Floats, Floats], tuple[Floats, Floats]]
 
 
 class Process(Protocol):
@@ -51,3 +62,45 @@ class Process(Protocol):
         number of several parts, as (7, 1), is another draw: the first that replaces draw 7.
         """
         ...
+
+
+def standard_normal(size: int, number: int | tuple[int, ...], seed: int) -> Floats:
+    """Numbers (size,) of draw `number` of a seed: the same however many draws are made, and in whatever order."""
+    parts = number if isinstance(number, tuple) else (number,)
+    return np.random.default_rng([seed, *parts]).standard_normal(size)
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Draws of a normal distribution over curves, at anchors (a,) of stretch, with what many draws share."""
+
+    anchors: Floats
+
+    def at(self, groups: tuple[str, ...], stretches: Floats, normal: Floats, moments: Moments) -> Floats:
+        """The draw (groups, n) of independent standard normal numbers (groups * a,), always of the same moments.
+
+        It has the values `L normal` at the anchors, `L L^T` the covariance, and elsewhere the mean given these:
+        `c^T (L L^T)^-1 L normal = c^T L^-T normal`.
+        """
+        from scipy.linalg import cholesky, solve_triangular
+
+        if groups not in self._factors:
+            _, covariance = moments(groups, self.anchors, self.anchors)
+            diagonal = np.diag(covariance)
+            self._factors[groups] = cholesky(covariance + JITTER * diagonal.mean() * np.eye(len(diagonal)), lower=True)
+        key = groups, stretches.tobytes()
+        if key not in self._last:
+            self._last.clear()
+            self._last[key] = moments(groups, stretches, self.anchors)
+        mean, cross = self._last[key]
+        weights = solve_triangular(self._factors[groups], normal, lower=True, trans="T")
+        return np.asarray((mean + cross @ weights).reshape(len(groups), -1))
+
+    @cached_property
+    def _factors(self) -> dict[tuple[str, ...], Floats]:
+        return {}
+
+    @cached_property
+    def _last(self) -> dict[tuple[tuple[str, ...], bytes], tuple[Floats, Floats]]:
+        """Of the last stretches alone: many draws are at the same ones."""
+        return {}

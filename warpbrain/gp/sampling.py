@@ -1,4 +1,4 @@
-"""Laws that the literature makes likely: curves of a generative model, and the laws fitted to them."""
+"""Laws that the literature makes likely: curves of a generative model, the laws fitted to them, and their moduli."""
 
 from __future__ import annotations
 
@@ -8,20 +8,15 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
-from warpbrain.gp.literature.dataset import OFFSET
-from warpbrain.gp.literature.groups import STRETCHES
-from warpbrain.gp.metamodels.fit import Fit, fit
-from warpbrain.gp.metamodels.models import METAMODELS, MetaModel
-from warpbrain.gp.metamodels.stability import unstable
+from warpbrain.gp.literature.study import OFFSET, STRETCHES
+from warpbrain.gp.metamodels import METAMODELS, Fit, MetaModel, fit, unstable
 from warpbrain.gp.process import Process
 
 if TYPE_CHECKING:
     from warpbrain.physics.laws import Law
-
-Floats = NDArray[np.float64]
 
 #: Stretches of a curve that is fitted, as in the paper.
 POINTS = 101
@@ -29,16 +24,16 @@ POINTS = 101
 FIT_OFFSET = 1e-3
 #: Attempts at one draw, the first included: where this many are unstable the law and the literature do not go together.
 ATTEMPTS = 200
+#: Curves whose laws are told: this many standard deviations from the mean.
+CURVES = (-2.0, 0.0, 2.0)
 
 
 @dataclass(frozen=True)
 class DrawnLaws:
-    """One draw of the laws of several tissues.
+    """Draw `number` of a seed of the laws of several tissues.
 
     Attributes
     ----------
-    number, seed : int
-        Which draw.
     groups : tuple of str
         One for each tissue. Tissues of one group are of one curve.
     stretches, curves : tuple of (n,) array
@@ -76,7 +71,7 @@ def usual_stretches(group: str) -> Floats:
 def law_of_curve(model: Process, group: str, k: float = 0.0, law: str = "neo-hookean") -> Fit:
     """The law of the curve `k` standard deviations from the mean, as the paper samples.
 
-    Nothing is redrawn here: `warpbrain.gp.metamodels.stability.unstable` says what the law is worth.
+    Nothing is redrawn here: `warpbrain.gp.metamodels.unstable` says what the law is worth.
 
     Raises
     ------
@@ -189,6 +184,64 @@ def rejection_rate(draws: Sequence[DrawnLaws]) -> float:
     """Part of all attempts at some draws that were unstable."""
     rejected = sum(len(draw.rejected) for draw in draws)
     return rejected / (rejected + len(draws)) if draws else 0.0
+
+
+@dataclass(frozen=True)
+class Moduli:
+    """What a model says of the shear modulus [Pa] at rest of a group, through one law.
+
+    Attributes
+    ----------
+    fits, unstable : tuple of Fit and of str
+        Of the curves that lie `CURVES` standard deviations from the mean, and why each is unstable; empty if it is not.
+    median, low, high : float
+        Of stable draws: 50 %, 2.5 % and 97.5 % lie below.
+    median_error : float
+        Relative standard error of the median: the number of draws is finite.
+    rejection_rate : float
+        Part of the attempts that gave an unstable law.
+    """
+
+    group: str
+    law: str
+    fits: tuple[Fit, ...]
+    unstable: tuple[str, ...]
+    median: float
+    low: float
+    high: float
+    median_error: float
+    draws: int
+    rejection_rate: float
+
+
+def moduli(model: Process, group: str, law: str, draws: int = 1000, seed: int = 0, poisson: float = 0.45) -> Moduli:
+    """Fit a law to the curves of a group, and to stable draws of it; errors are those of `draw_laws`.
+
+    Examples
+    --------
+    >>> from warpbrain.gp.trained import trained
+    >>> found = moduli(trained(), "hyperelastic/brain", "neo-hookean", draws=40)
+    >>> found.low < found.median < found.high
+    True
+    """
+    fits = tuple(law_of_curve(model, group, k, law) for k in CURVES)
+    drawn = list(draw_many(model, [group], law, draws, seed, poisson))
+    values = np.array([draw.shear_moduli[0] for draw in drawn])
+    low, median, high = np.quantile(values, [0.025, 0.5, 0.975]).tolist()
+    # of a normal distribution's median, in logarithms
+    error = float(np.sqrt(0.5 * np.pi / draws) * np.log(values).std())
+    return Moduli(
+        group,
+        law,
+        fits,
+        tuple(unstable(fitted, poisson) for fitted in fits),
+        median,
+        low,
+        high,
+        error,
+        draws,
+        rejection_rate(drawn),
+    )
 
 
 def _fit(model: Process, metamodel: MetaModel, stretches: Floats, curve: Floats) -> Fit:

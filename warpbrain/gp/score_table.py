@@ -8,8 +8,7 @@ from pathlib import Path
 
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
-from warpbrain.gp.calibration import INTERVALS, Calibration, Comparison
-from warpbrain.gp.leaving_out import Score
+from warpbrain.gp.leaving_out import INTERVALS, Calibration, Comparison, Score
 
 #: Columns before the log density of each study or paper.
 COLUMNS = ("model", "log density [nats a point]", "standard error", "median", "rms error", "within 50 %", "within 95 %")
@@ -21,7 +20,9 @@ def write_scores(path: Path, scores: Sequence[Score], held: Sequence[str]) -> No
         writer = csv.writer(file)
         writer.writerow([*COLUMNS, *held, *_level_columns(held)])
         for score in scores:
-            writer.writerow([score.name, *map(repr, (*score.numbers, *score.values, *score.levels))])
+            density = score.log_density, score.log_density_error, score.median
+            points = score.rms_error, score.coverage_50, score.coverage_95
+            writer.writerow([score.name, *map(repr, (*density, *points, *score.values, *score.levels))])
 
 
 def read_scores(path: Path, held: Sequence[str]) -> list[Score]:

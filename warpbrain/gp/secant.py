@@ -8,11 +8,10 @@ logarithm `z` is what the hierarchical model describes: constant for a neo-Hooke
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.gp.literature.dataset import OFFSET
-
-Floats = NDArray[np.float64]
+from warpbrain.arrays import Floats
+from warpbrain.gp.literature.study import OFFSET
 
 
 def invariant(stretches: ArrayLike) -> Floats:

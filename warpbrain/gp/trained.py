@@ -1,4 +1,4 @@
-"""Trained models: those that ship, and those of a user.
+"""Trained models: those that ship, those of a user, and the fitting of either kind with a record of how it went.
 
 A model is a folder with `model.json`, which holds the parameters, the variant of the literature they are of and how
 they were found, and with `studies.toml`, the studies that a user added, if any. Factors are computed when they are
@@ -9,7 +9,10 @@ other things than those of today: such a model is fitted again to its own studie
 from __future__ import annotations
 
 import json
+import time
 import warnings
+from collections.abc import Callable
+from dataclasses import asdict
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -19,16 +22,16 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
-from warpbrain.gp.coregionalised import Coregionalised
+from warpbrain.gp.coregionalised import Coregionalised, training_points
 from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import EFFECTS, Hierarchy
+from warpbrain.gp.hierarchy import EFFECTS, Hierarchy, observations
 from warpbrain.gp.hierarchy_fit import SAMPLE, Fitted, fit_hierarchy, sample_hierarchies
 from warpbrain.gp.kernels import KERNELS
+from warpbrain.gp.likelihood import TASKS, Parameters
 from warpbrain.gp.literature.studies import VARIANTS, Variant, read_studies
-from warpbrain.gp.literature.study import Study
-from warpbrain.gp.observations import observations
-from warpbrain.gp.parameters import TASKS, Parameters
+from warpbrain.gp.literature.study import GROUPS, Study
 from warpbrain.gp.process import Process
+from warpbrain.gp.training import Climb, train
 from warpbrain.values import finite
 
 Kind = Literal["hierarchical", "coregionalised"]
@@ -112,6 +115,75 @@ def read_model(folder: Path) -> Process:
     except InputError as error:
         raise InputError(f"{path}: parameters: {error}") from None
     return Coregionalised(studies, parameters, variant, kernel, _positive(path, given, "jitter"))
+
+
+def fit_model(
+    kind: Kind = "hierarchical",
+    variant: Variant = "corrected",
+    add: Path | None = None,
+    *,
+    climbs: int = 1,
+    progress: Callable[[float, str], None] = lambda part, said: None,
+) -> tuple[Process, dict[str, Any]]:
+    """Fit a model to the literature and to the studies of a user's file.
+
+    Parameters
+    ----------
+    kind : {"hierarchical", "coregionalised"}
+    variant : {"corrected", "as_published"}
+    add : Path, optional
+        File of studies, see `warpbrain.gp.literature.studies`.
+    climbs : int
+        Of the coregionalised process, see `warpbrain.gp.training.train`.
+    progress : callable
+        Is told the part done, 0 to 1, and what is going on.
+
+    Returns
+    -------
+    model : Process
+    record : dict
+        Objective, convergence, restarts, conditioning and seconds; for `write_model` and for the reader.
+
+    Raises
+    ------
+    InputError
+        If the file of studies is wrong.
+    SolveError
+        If no covariance can be factored.
+    """
+    began = time.perf_counter()
+    studies = read_studies(variant, add)
+    command = f"warpbrain gp fit --gp {kind} --variant {variant}" + (f" --climbs {climbs}" if climbs > 1 else "")
+    record: dict[str, Any] = {"command": command + (" --add studies.toml" if add else ""), "studies": len(studies)}
+    model: Process
+    if kind == "hierarchical":
+        progress(0.0, "climbing")
+        model, fitted = fitted_hierarchical(studies, variant)
+        record |= asdict(fitted)
+    else:
+        data = training_points(studies)
+        training = train(data, climbs=climbs, progress=progress)
+        model = Coregionalised(studies, training.best.parameters, variant, training.kernel, training.jitter)
+        record |= {
+            "points": int(data.count.sum()),
+            "means of replicates": data.size,
+            "jitter": training.jitter,
+            "negative log likelihood": training.best.value,
+            "climbs": [_climb_table(climb) for climb in training.climbs],
+            "starts": [
+                {"apart": None if start.apart is None else GROUPS[start.apart], "every": training.step}
+                | _climb_table(start.climb)
+                for start in training.starts
+            ],
+        }
+    record["seconds"] = time.perf_counter() - began
+    return model, record
+
+
+def _climb_table(climb: Climb) -> dict[str, Any]:
+    table = asdict(climb)
+    del table["parameters"]
+    return table
 
 
 def fitted_hierarchical(

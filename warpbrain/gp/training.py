@@ -13,14 +13,10 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
-from warpbrain.gp.likelihood import Likelihood
-from warpbrain.gp.parameters import TASKS, Parameters
-from warpbrain.gp.replicates import Replicates
-
-Floats = NDArray[np.float64]
+from warpbrain.gp.likelihood import TASKS, Likelihood, Parameters, Replicates
 
 #: Variance added to the diagonal of the covariance, as in the paper's training.
 JITTER = 1e-8
@@ -35,20 +31,9 @@ _LONGEST = np.repeat([0.5, np.inf, 3.0, 3.0], [1, TASKS, TASKS, TASKS])
 class Climb:
     """Where one optimisation ended.
 
-    Attributes
-    ----------
-    parameters : Parameters
-    value : float
-        Negative log marginal likelihood.
-    converged : bool
-        Whether an iteration gained less than was asked for, before they ran out.
-    iterations, evaluations : int
-    gain : float
-        Of the last iteration.
-    gradient : float
-        Largest derivative by a free parameter.
-    condition : float
-        Condition number of the covariance there.
+    `value` is the negative log marginal likelihood, `gain` what the last iteration lowered it by, `gradient` its
+    largest derivative by a free parameter, `condition` that of the covariance; it `converged` if an iteration gained
+    less than was asked for before they ran out.
     """
 
     parameters: Parameters
@@ -63,14 +48,7 @@ class Climb:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """One start on the thinned stretches.
-
-    Attributes
-    ----------
-    apart : int or None
-        The group that was set apart at the start.
-    climb : Climb
-    """
+    """A climb on the thinned stretches, and the group that was set apart at its start, if any."""
 
     apart: int | None
     climb: Climb
@@ -78,18 +56,9 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Training:
-    """What training found, and how.
+    """Climbs on all observations, and starts on every `step`-th stretch, both best first.
 
-    Attributes
-    ----------
-    climbs : tuple of Climb
-        On all observations, best first.
-    starts : tuple of Start
-        On the thinned ones, best first; those whose covariance could not be factored are not there.
-    step : int
-        Every `step`-th stretch was used for these.
-    jitter : float
-    kernel : str
+    Starts whose covariance could not be factored are not there.
     """
 
     climbs: tuple[Climb, ...]
@@ -228,7 +197,7 @@ def climb(
     )
 
 
-def _free(x: Floats, gradient: Floats) -> NDArray[np.bool_]:
+def _free(x: Floats, gradient: Floats) -> Bools:
     """Which parameters are not held at the end of their range."""
     return ~(((x <= _LOWEST) & (gradient > 0.0)) | ((x >= _HIGHEST) & (gradient < 0.0)))
 

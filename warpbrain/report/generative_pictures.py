@@ -13,9 +13,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.gp.literature.dataset import OFFSET
-from warpbrain.gp.literature.groups import ANATOMIES, METHODS
-from warpbrain.gp.literature.study import Study
+from warpbrain.gp.literature.study import ANATOMIES, METHODS, OFFSET, Study
 from warpbrain.gp.process import Process
 from warpbrain.gp.secant import invariant
 from warpbrain.report import views

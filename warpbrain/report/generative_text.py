@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from warpbrain.gp.asymmetry import Asymmetry
-from warpbrain.gp.metamodels.fit import Fit
-from warpbrain.gp.moduli import CURVES, Moduli
+from warpbrain.gp.metamodels import Fit
 from warpbrain.gp.process import Process
-from warpbrain.gp.sampling import DrawnLaws, rejection_rate
+from warpbrain.gp.sampling import CURVES, DrawnLaws, Moduli, rejection_rate
 from warpbrain.report.files import write_csv
 
 
@@ -41,7 +40,7 @@ def asymmetry_lines(found: Sequence[Asymmetry], papers: Mapping[str, tuple[float
 
 
 def fit_lines(model: Process, record: Mapping[str, Any]) -> list[str]:
-    """Objective, convergence, restarts, conditioning and time of a record of `warpbrain.gp.fitting.fit_model`."""
+    """Objective, convergence, restarts, conditioning and time of a record of `warpbrain.gp.trained.fit_model`."""
     lines = [f"{model.name} model of the literature as {model.variant}, {record['studies']} studies"]
     if "climbs" not in record:
         lines += [

@@ -1,13 +1,14 @@
 """A file of a user's: three lines are enough, and whatever is wrong is named with the study, the key and the cure."""
 
 import re
+from contextlib import suppress
 
 import numpy as np
 import pytest
 
 from warpbrain.errors import InputError
-from warpbrain.gp.literature.dataset import dataset
-from warpbrain.gp.literature.studies import check_studies, read_studies
+from warpbrain.gp.literature.studies import read_studies
+from warpbrain.gp.literature.study import dataset
 
 HEAD = '[[study]]\nname = "Mine 2024"\ngroup = "hyperelastic/brain"\n'
 
@@ -22,17 +23,15 @@ def added(folder, text: str):
     """The one study that a file adds."""
     *shipped, mine = read_studies(add=write(folder, text))
     assert tuple(shipped) == read_studies()
-    assert check_studies(folder / "mine.toml") == ()
     return mine
 
 
 def problems(folder, text: str | bytes) -> list[str]:
     """Everything that is wrong, without the folder's path."""
     path = write(folder, text)
-    found = [str(problem) for problem in check_studies(path)]
     with pytest.raises(InputError) as error:
         read_studies(add=path)
-    assert str(error.value) == "\n".join(found)
+    found = str(error.value).split("\n")
     return [problem.replace(f"{path}: ", "") for problem in found]
 
 
@@ -209,8 +208,10 @@ def test_a_cut_file_never_raises_anything_else(tmp_path):
     whole = (HEAD + 'form = "ogden"\nmu = [-400.0]\nalpha = [-5.0]\nstretch = [0.9, 1.1]\n').encode()
     rng = np.random.default_rng(0)
     for end in range(len(whole)):
-        check_studies(write(tmp_path, whole[:end]))
+        with suppress(InputError):
+            read_studies(add=write(tmp_path, whole[:end]))
     for _ in range(200):
         broken = bytearray(whole)
         broken[rng.integers(len(broken))] = rng.integers(256)
-        check_studies(write(tmp_path, bytes(broken)))
+        with suppress(InputError):
+            read_studies(add=write(tmp_path, bytes(broken)))

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from warpbrain.gp.literature.dataset import dataset
-from warpbrain.gp.literature.groups import ANATOMIES, GROUPS, METHODS, STRETCHES, task_of
 from warpbrain.gp.literature.studies import read_studies
+from warpbrain.gp.literature.study import ANATOMIES, GROUPS, METHODS, STRETCHES, dataset
 
 
 def test_points_and_curves_of_what_the_paper_trained_on():
@@ -22,7 +21,7 @@ def test_corrected_leaves_no_elastography_of_abnormalities():
 
 
 def test_tasks_are_numbered_as_in_the_paper():
-    assert [task_of(f"{method}/{anatomy}") for method in METHODS for anatomy in ANATOMIES] == list(range(12))
+    assert [GROUPS.index(f"{method}/{anatomy}") for method in METHODS for anatomy in ANATOMIES] == list(range(12))
     assert GROUPS[0] == "MRE/grey matter" and GROUPS[7] == "linear/abnormal" and GROUPS[10] == "hyperelastic/brain"
     assert set(STRETCHES) == set(GROUPS)
 

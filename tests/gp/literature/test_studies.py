@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from warpbrain.errors import InputError
-from warpbrain.gp.literature.energies import rivlin_as_coded
-from warpbrain.gp.literature.groups import GROUPS
+from warpbrain.gp.literature.forms import rivlin_as_coded
 from warpbrain.gp.literature.studies import read_studies
+from warpbrain.gp.literature.study import GROUPS
 
 PUBLISHED = {study.number: study for study in read_studies("as_published")}
 CORRECTED = {study.number: study for study in read_studies("corrected")}

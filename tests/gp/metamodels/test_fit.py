@@ -10,9 +10,7 @@ from scipy.optimize import least_squares, minimize_scalar
 
 from warpbrain.errors import InputError
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.metamodels.box import SEARCHES
-from warpbrain.gp.metamodels.fit import fit
-from warpbrain.gp.metamodels.models import METAMODELS
+from warpbrain.gp.metamodels import METAMODELS, SEARCHES, fit
 from warpbrain.physics.laws import Ogden
 
 OFFSET = 1e-3

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from warpbrain.errors import InputError
-from warpbrain.gp.metamodels.fit import Fit, fit
-from warpbrain.gp.metamodels.models import METAMODELS
-from warpbrain.gp.metamodels.stability import unstable
+from warpbrain.gp.metamodels import METAMODELS, Fit, fit, unstable
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 
 

@@ -1,1 +1,1 @@
-"""Published strain energies of brain tissue: 73 studies as data, their energies, and the points that they make."""
+"""Published strain energies of brain tissue: 73 studies as data (`studies.toml`), their forms, and what they make."""

@@ -1,13 +1,56 @@
-"""The forms of strain energy that a study can have: their energies, shear moduli and the keys that each takes."""
+"""The forms of strain energy that a study can have, on the incompressible uniaxial path `(l, l^-1/2, l^-1/2)`.
+
+An energy takes stretches `l` > 0 of any shape and parameters in SI, and is `Psi` [Pa = J/m3] of the same shape. On the
+path (supplement eq. (2); the products keep their digits near `l = 1`)
+
+    I1 - 3 = l^2 + 2/l - 3 = (l - 1)^2 (l + 2) / l
+    I2 - 3 = 2 l + 1/l^2 - 3 = (l - 1)^2 (2 l + 1) / l^2
+
+Papers write one form in several ways. A convention takes a paper's parameters and returns ours, which are the
+supplement's: `sum_p mu_p/alpha_p (sum_i l_i^alpha_p - 3)` for Ogden, `C1 (I1 - 3) + C2 (I2 - 3)` for Mooney-Rivlin.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from warpbrain.gp.literature import conventions, energies
-from warpbrain.gp.literature.conventions import Convention, Numbers, Parameter, as_they_are
-from warpbrain.gp.literature.energies import Floats
+import numpy as np
+
+from warpbrain.arrays import Floats
+
+#: Parameters by name: moduli in Pa, exponents without unit; those that come in a list are tuples.
+Parameters = Mapping[str, float | tuple[float, ...]]
+Numbers = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a form, or one list of numbers with an entry for each term (`several`).
+
+    Its unit is ``"Pa"`` or nothing; it lies between `above` and `below`, and may be 0 if `zero`.
+    """
+
+    name: str
+    unit: str = "Pa"
+    several: bool = False
+    above: float = -math.inf
+    below: float = math.inf
+    zero: bool = True
+
+
+@dataclass(frozen=True)
+class Convention:
+    """One way to write a form: the parameters that a paper gives, and what makes ours of them."""
+
+    keys: tuple[Parameter, ...]
+    convert: Callable[..., Parameters]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the keys."""
+        return tuple(key.name for key in self.keys)
 
 
 @dataclass(frozen=True)
@@ -17,8 +60,6 @@ class Form:
     Attributes
     ----------
     name : str
-    formula : str
-        In our parameters, which are those of the first convention unless that says otherwise.
     energy : callable
         `Psi(l)` [Pa] on the incompressible uniaxial path: stretches of any shape, then the parameters by name.
     shear_modulus : callable
@@ -30,7 +71,6 @@ class Form:
     """
 
     name: str
-    formula: str
     energy: Callable[..., Floats]
     shear_modulus: Callable[..., float]
     conventions: Mapping[str, Convention]
@@ -42,156 +82,202 @@ class Form:
         return max(self.conventions, key=lambda name: len(given & set(self.conventions[name].names)))
 
 
+def first(l: Floats) -> Floats:
+    """`I1 - 3` on the path."""
+    return (l - 1.0) ** 2 * (l + 2.0) / l
+
+
+def second(l: Floats) -> Floats:
+    """`I2 - 3` on the path."""
+    return (l - 1.0) ** 2 * (2.0 * l + 1.0) / l**2
+
+
+def _keys(*keys: str | Parameter) -> tuple[Parameter, ...]:
+    """Names are those of moduli."""
+    return tuple(Parameter(key) if isinstance(key, str) else key for key in keys)
+
+
+def _ours(*keys: str | Parameter) -> Convention:
+    """The paper writes it as we do."""
+    return Convention(_keys(*keys), lambda **parameters: parameters)
+
+
+def _other(convert: Callable[..., Parameters], *keys: str | Parameter) -> Convention:
+    return Convention(_keys(*keys), convert)
+
+
+#: Forms by the name that a study gives.
+FORMS: dict[str, Form] = {}
+
+
+def _form(
+    shear_modulus: Callable[..., float], of_first_invariant: bool = False, **conventions: Convention
+) -> Callable[[Callable[..., Floats]], Callable[..., Floats]]:
+    """The energy that follows makes a form of its name."""
+
+    def add(energy: Callable[..., Floats]) -> Callable[..., Floats]:
+        name = energy.__name__.replace("_", "-")
+        FORMS[name] = Form(name, energy, shear_modulus, conventions, of_first_invariant)
+        return energy
+
+    return add
+
+
+_NU = Parameter("nu", "", above=-1.0, below=0.5)
+_ALPHA, _BETA = Parameter("alpha", "", zero=False), Parameter("beta", "")
+_TERMS = Parameter("mu", several=True), replace(_ALPHA, several=True)
+_HALF_TERMS = Parameter("C", several=True), Parameter("m", "", several=True, zero=False)
+
+
 def _ogden_modulus(*, mu: Numbers, alpha: Numbers) -> float:
     return 0.5 * sum(m * a for m, a in zip(mu, alpha, strict=True))
 
 
-def _pa(*names: str) -> tuple[Parameter, ...]:
-    return tuple(Parameter(name, "Pa") for name in names)
+def _ogden_of_halves(*, C: Numbers, m: Numbers) -> Parameters:
+    """From `sum_p C_p/(2 m_p) (sum_i l_i^(2 m_p) - 3)`."""
+    return {"mu": C, "alpha": tuple(2.0 * v for v in m)}
 
 
-_NU = Parameter("nu", above=-1.0, below=0.5)
-_YOUNG = (*_pa("E"), _NU)
-_MU_ALPHA = (Parameter("mu", "Pa", several=True), Parameter("alpha", several=True, zero=False))
-_C_M = (Parameter("C", "Pa", several=True), Parameter("m", several=True, zero=False))
-_SQUARES = "sum_p 2 mu_p/alpha_p^2 (sum_i l_i^alpha_p - 3)"
-_OGDEN = "sum_p mu_p/alpha_p (sum_i l_i^alpha_p - 3)"
-_HALVES = "sum_p C_p/(2 m_p) (sum_i l_i^(2 m_p) - 3)"
-_MOONEY = "C1 (I1 - 3) + C2 (I2 - 3)"
-_GENT = "-mu eta/2 ln(1 - (I1 - 3)/eta)"
-_RIVLIN = "C10 (I1 - 3) + C01 (I2 - 3) + C11 (I1 - 3) (I2 - 3)"
+def _mooney_of_halves(*, C1: float, C2: float) -> Parameters:
+    """From `C1/2 (I1 - 3) + C2/2 (I2 - 3)`."""
+    return {"C1": 0.5 * C1, "C2": 0.5 * C2}
 
 
-def _one(name: str, formula: str, keys: tuple[Parameter, ...]) -> dict[str, Convention]:
-    return {name: Convention(keys, formula, as_they_are)}
+#: From `sum_p 2 mu_p/alpha_p^2 (sum_i l_i^alpha_p - 3)`, as Abaqus, FEBio, Budday, Miller and Chinzei write it.
+_SQUARES = _other(
+    lambda *, mu, alpha: {"mu": tuple(2.0 * m / a for m, a in zip(mu, alpha, strict=True)), "alpha": alpha}, *_TERMS
+)
 
 
-_ALL = (
-    Form(
-        "linear",
-        "mu dev(e) : dev(e), e_i = l_i - 1",
-        energies.linear,
-        lambda *, mu: mu,
-        {
-            "shear": Convention(_pa("mu"), "mu, the shear modulus", as_they_are),
-            "young": Convention(_YOUNG, "mu = E / (2 (1 + nu))", conventions.shear_of_young),
-        },
-    ),
-    Form(
-        "linear-volumetric",
-        "mu sum_i e_i^2 + lam/2 (sum_i e_i)^2, e_i = l_i - 1",
-        energies.linear_volumetric,
-        lambda *, E, nu: 0.5 * E / (1.0 + nu),
-        _one("young", "mu = E / (2 (1 + nu)), lam = E nu / ((1 + nu) (1 - 2 nu))", _YOUNG),
-    ),
-    Form(
-        "neo-hookean",
-        "mu/2 (I1 - 3)",
-        energies.neo_hookean,
-        lambda *, mu: mu,
-        _one("supplement", "mu/2 (I1 - 3)", _pa("mu")),
-        of_first_invariant=True,
-    ),
-    Form(
-        "mooney-rivlin",
-        _MOONEY,
-        energies.mooney_rivlin,
-        lambda *, C1, C2: 2.0 * (C1 + C2),
-        {
-            "supplement": Convention(_pa("C1", "C2"), _MOONEY, as_they_are),
-            "budday": Convention(_pa("mu", "c"), "c (I1 - 3) + (mu/2 - c) (I2 - 3)", conventions.mooney_of_total),
-            "mihai": Convention(_pa("C1", "C2"), "C1/2 (I1 - 3) + C2/2 (I2 - 3)", conventions.mooney_of_halves),
-        },
-    ),
-    Form(
-        "ogden",
-        _OGDEN,
-        energies.ogden,
-        _ogden_modulus,
-        {
-            "supplement": Convention(_MU_ALPHA, _OGDEN, as_they_are),
-            "budday": Convention(_MU_ALPHA, _SQUARES, conventions.ogden_of_squares),
-            "miller": Convention(_MU_ALPHA, _SQUARES, conventions.ogden_of_squares),
-            "abaqus": Convention(_MU_ALPHA, _SQUARES, conventions.ogden_of_squares),
-            "mihai": Convention(_C_M, _HALVES, conventions.ogden_of_halves),
-        },
-    ),
-    Form(
-        "ogden-mooney",
-        f"{_OGDEN} + {_MOONEY}",
-        energies.ogden_mooney,
-        lambda *, mu, alpha, C1, C2: _ogden_modulus(mu=mu, alpha=alpha) + 2.0 * (C1 + C2),
-        {
-            "supplement": Convention((*_MU_ALPHA, *_pa("C1", "C2")), f"{_OGDEN} + {_MOONEY}", as_they_are),
-            "mihai": Convention(
-                (*_C_M, *_pa("C1", "C2")),
-                f"{_HALVES} + C1/2 (I1 - 3) + C2/2 (I2 - 3)",
-                conventions.ogden_mooney_of_halves,
-            ),
-        },
-    ),
-    Form(
-        "fung",
-        "C/(2 alpha) (alpha (I1 - 3) + exp(alpha (I1 - 3)) - 1)",
-        energies.fung,
-        lambda *, C, alpha: 2.0 * C,
-        _one(
-            "mihai",
-            "C/(2 alpha) (alpha (I1 - 3) + exp(alpha (I1 - 3)) - 1)",
-            (*_pa("C"), Parameter("alpha", zero=False)),
-        ),
-        of_first_invariant=True,
-    ),
-    Form(
-        "gent",
-        _GENT,
-        energies.gent,
-        lambda *, mu, eta: mu,
-        {
-            "budday": Convention((*_pa("mu"), Parameter("eta", above=0.0)), _GENT, as_they_are),
-            "mihai": Convention(
-                (*_pa("C"), Parameter("beta", above=0.0)),
-                "-C/(2 beta) ln(1 - beta (I1 - 3))",
-                conventions.gent_of_inverse,
-            ),
-        },
-        of_first_invariant=True,
-    ),
-    Form(
-        "demiray",
-        "mu/(2 beta) (exp(beta (I1 - 3)) - 1)",
-        energies.demiray,
-        lambda *, mu, beta: mu,
-        _one("budday", "mu/(2 beta) (exp(beta (I1 - 3)) - 1)", (*_pa("mu"), Parameter("beta", zero=False))),
-        of_first_invariant=True,
-    ),
-    Form(
-        "yeoh",
-        "C10 (I1 - 3) + C30 (I1 - 3)^3",
-        energies.yeoh,
-        lambda *, C10, C30: 2.0 * C10,
-        _one("yeoh", "C10 (I1 - 3) + C30 (I1 - 3)^3", _pa("C10", "C30")),
-        of_first_invariant=True,
-    ),
-    Form(
-        "rivlin",
-        _RIVLIN,
-        energies.rivlin,
-        lambda *, C10, C01, C11: 2.0 * (C10 + C01),
-        _one("rivlin", _RIVLIN, _pa("C10", "C01", "C11")),
-    ),
-    Form(
-        "rivlin-as-coded",
-        "rivlin with C : C for I2, + K/alpha^2 (cosh(alpha (J - 1)) - 1), J = l^(1 - 2 nu)",
-        energies.rivlin_as_coded,
-        # C : C has four times the curvature of I2; the volume change of the path adds a little
-        lambda *, C10, C01, C11, K, alpha, nu: 2.0 * (C10 + 4.0 * C01) + K * (1.0 - 2.0 * nu) ** 2 / 3.0,
-        _one(
-            "rivlin",
-            "rivlin with C : C for I2, + K/alpha^2 (cosh(alpha (J - 1)) - 1)",
-            (*_pa("C10", "C01", "C11", "K"), Parameter("alpha", zero=False), _NU),
-        ),
+@_form(
+    lambda *, mu: mu,
+    shear=_ours("mu"),
+    young=_other(lambda *, E, nu: {"mu": 0.5 * E / (1.0 + nu)}, "E", _NU),
+)
+def linear(l: Floats, *, mu: float) -> Floats:
+    """Linear elasticity on a path that keeps volume: `mu dev(e) : dev(e) = 2/3 mu (l - l^-1/2)^2`, `e_i = l_i - 1`.
+
+    The path has no volume change, so the energy of one has no place in it: this is `linear_volumetric` without it.
+    """
+    return 2.0 / 3.0 * mu * (l - l**-0.5) ** 2
+
+
+@_form(lambda *, E, nu: 0.5 * E / (1.0 + nu), young=_ours("E", _NU))
+def linear_volumetric(l: Floats, *, E: float, nu: float) -> Floats:
+    """Linear elasticity as the paper's curves have it: `mu sum e_i^2 + lam/2 (sum e_i)^2`, `e_i = l_i - 1`.
+
+    `mu = E / (2 (1 + nu))` and `lam = E nu / ((1 + nu) (1 - 2 nu))`. The sum of the strains is not zero but
+    `3/4 (l - 1)^2` to second order, which charges the path for a volume change that it does not have.
+    """
+    mu = 0.5 * E / (1.0 + nu)
+    lam = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    along, across = l - 1.0, l**-0.5 - 1.0
+    return mu * (along**2 + 2.0 * across**2) + 0.5 * lam * (along + 2.0 * across) ** 2
+
+
+@_form(lambda *, mu: mu, True, supplement=_ours("mu"))
+def neo_hookean(l: Floats, *, mu: float) -> Floats:
+    """`mu/2 (I1 - 3)`."""
+    return 0.5 * mu * first(l)
+
+
+@_form(
+    lambda *, C1, C2: 2.0 * (C1 + C2),
+    supplement=_ours("C1", "C2"),
+    # c (I1 - 3) + (mu/2 - c) (I2 - 3)
+    budday=_other(lambda *, mu, c: {"C1": c, "C2": 0.5 * mu - c}, "mu", "c"),
+    mihai=_other(_mooney_of_halves, "C1", "C2"),
+)
+def mooney_rivlin(l: Floats, *, C1: float, C2: float) -> Floats:
+    """`C1 (I1 - 3) + C2 (I2 - 3)`."""
+    return C1 * first(l) + C2 * second(l)
+
+
+@_form(
+    _ogden_modulus,
+    supplement=_ours(*_TERMS),
+    budday=_SQUARES,
+    miller=_SQUARES,
+    abaqus=_SQUARES,
+    mihai=_other(_ogden_of_halves, *_HALF_TERMS),
+)
+def ogden(l: Floats, *, mu: Sequence[float], alpha: Sequence[float]) -> Floats:
+    """`sum_p mu_p/alpha_p (l^alpha_p + 2 l^(-alpha_p/2) - 3)`."""
+    log = np.log(l)
+    terms = [m / a * (np.expm1(a * log) + 2.0 * np.expm1(-0.5 * a * log)) for m, a in zip(mu, alpha, strict=True)]
+    return np.sum(terms, axis=0)
+
+
+@_form(
+    lambda *, mu, alpha, C1, C2: _ogden_modulus(mu=mu, alpha=alpha) + 2.0 * (C1 + C2),
+    supplement=_ours(*_TERMS, "C1", "C2"),
+    mihai=_other(
+        lambda *, C, m, **mooney: {**_ogden_of_halves(C=C, m=m), **_mooney_of_halves(**mooney)},
+        *_HALF_TERMS,
+        "C1",
+        "C2",
     ),
 )
-#: Forms by the name that a study gives.
-FORMS: dict[str, Form] = {form.name: form for form in _ALL}
+def ogden_mooney(l: Floats, *, mu: Sequence[float], alpha: Sequence[float], C1: float, C2: float) -> Floats:
+    """Ogden and Mooney-Rivlin together (Mihai 2017)."""
+    return ogden(l, mu=mu, alpha=alpha) + mooney_rivlin(l, C1=C1, C2=C2)
+
+
+@_form(lambda *, C, alpha: 2.0 * C, True, mihai=_ours("C", _ALPHA))
+def fung(l: Floats, *, C: float, alpha: float) -> Floats:
+    """`C/(2 alpha) (alpha (I1 - 3) + exp(alpha (I1 - 3)) - 1)` (Mihai 2015)."""
+    x = alpha * first(l)
+    return 0.5 * C / alpha * (x + np.expm1(x))
+
+
+@_form(
+    lambda *, mu, eta: mu,
+    True,
+    budday=_ours("mu", Parameter("eta", "", above=0.0)),
+    # -C/(2 beta) ln(1 - beta (I1 - 3))
+    mihai=_other(lambda *, C, beta: {"mu": C, "eta": 1.0 / beta}, "C", replace(_BETA, above=0.0)),
+)
+def gent(l: Floats, *, mu: float, eta: float) -> Floats:
+    """`-mu eta/2 ln(1 - (I1 - 3)/eta)` (Budday 2017); infinite from `I1 - 3 = eta` on."""
+    x = np.minimum(first(l) / eta, 1.0)
+    with np.errstate(divide="ignore"):
+        return -0.5 * mu * eta * np.log1p(-x)
+
+
+@_form(lambda *, mu, beta: mu, True, budday=_ours("mu", replace(_BETA, zero=False)))
+def demiray(l: Floats, *, mu: float, beta: float) -> Floats:
+    """`mu/(2 beta) (exp(beta (I1 - 3)) - 1)` (Budday 2017)."""
+    return 0.5 * mu / beta * np.expm1(beta * first(l))
+
+
+@_form(lambda *, C10, C30: 2.0 * C10, True, yeoh=_ours("C10", "C30"))
+def yeoh(l: Floats, *, C10: float, C30: float) -> Floats:
+    """`C10 (I1 - 3) + C30 (I1 - 3)^3` (Schiavone 2009)."""
+    x = first(l)
+    return C10 * x + C30 * x**3
+
+
+@_form(lambda *, C10, C01, C11: 2.0 * (C10 + C01), rivlin=_ours("C10", "C01", "C11"))
+def rivlin(l: Floats, *, C10: float, C01: float, C11: float) -> Floats:
+    """`C10 (I1 - 3) + C01 (I2 - 3) + C11 (I1 - 3) (I2 - 3)` (Laksari 2012)."""
+    x, y = first(l), second(l)
+    return C10 * x + C01 * y + C11 * x * y
+
+
+# C : C has four times the curvature of I2; the volume change of the path adds a little
+@_form(
+    lambda *, C10, C01, C11, K, alpha, nu: 2.0 * (C10 + 4.0 * C01) + K * (1.0 - 2.0 * nu) ** 2 / 3.0,
+    rivlin=_ours("C10", "C01", "C11", "K", _ALPHA, _NU),
+)
+def rivlin_as_coded(l: Floats, *, C10: float, C01: float, C11: float, K: float, alpha: float, nu: float) -> Floats:
+    """`rivlin` with two slips of the paper's source: `C : C` for `I2`, and a volume change on a path without one.
+
+        C10 (I1 - 3) + C01 (C:C - 3) + C11 (I1 - 3) (C:C - 3) + K/alpha^2 (cosh(alpha (J - 1)) - 1)
+
+    with `C : C = l^4 + 2/l^2` and `J = l^(1 - 2 nu)`. That `J` and the constants are known, the shape of the last
+    term is not: it is taken from the usual compressible law with these two constants. With `K` = 2.38 Pa, as the
+    missing unit made it, the term is less than 1e-4 Pa on the study's range, one part in ten million at its ends.
+    """
+    x, y = first(l), l**4 + 2.0 * l**-2 - 3.0
+    J = l ** (1.0 - 2.0 * nu)
+    return C10 * x + C01 * y + C11 * x * y + K / alpha**2 * (np.cosh(alpha * (J - 1.0)) - 1.0)

@@ -1,17 +1,35 @@
-"""One published strain energy."""
+"""One published strain energy, the twelve groups that such studies are of, and the points that they make."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpbrain.gp.literature.conventions import Parameters
-from warpbrain.gp.literature.energies import Floats
-from warpbrain.gp.literature.forms import FORMS
-from warpbrain.gp.literature.groups import task_of
+from warpbrain.arrays import Floats, Ints
+from warpbrain.gp.literature.forms import FORMS, Parameters
+
+#: How a study measured, in the paper's order: elastography, linear elasticity, hyperelasticity.
+METHODS = ("MRE", "linear", "hyperelastic")
+#: What it measured, in the paper's order.
+ANATOMIES = ("grey matter", "white matter", "brain", "abnormal")
+#: Names of the groups; the place of a name is its task, `4 method + anatomy`, 0 to 11, as the paper numbers them.
+GROUPS = tuple(f"{method}/{anatomy}" for method in METHODS for anatomy in ANATOMIES)
+
+#: Stretches (low, high) on which the paper samples a group: what a study gets that names none.
+STRETCHES: dict[str, tuple[float, float]] = {
+    **{f"MRE/{anatomy}": (0.95, 1.05) for anatomy in ANATOMIES},
+    **{f"linear/{anatomy}": (0.9, 1.1) for anatomy in ANATOMIES},
+    "hyperelastic/grey matter": (0.9, 1.1),
+    "hyperelastic/white matter": (0.9, 1.1),
+    "hyperelastic/brain": (0.6, 1.4),
+    "hyperelastic/abnormal": (0.8, 1.2),
+}
+#: Added to an energy before its logarithm is taken [Pa].
+OFFSET = 1e-4
 
 
 @dataclass(frozen=True)
@@ -23,7 +41,7 @@ class Study:
     name : str
         As in the paper's Table 1.
     group : str
-        Method and anatomy, one of `warpbrain.gp.literature.groups.GROUPS`.
+        Method and anatomy, one of `GROUPS`.
     form : str
         One of `warpbrain.gp.literature.forms.FORMS`.
     compression, tension : mapping of str to float or tuple of float
@@ -60,7 +78,7 @@ class Study:
     @property
     def task(self) -> int:
         """Number of its group, 0 to 11."""
-        return task_of(self.group)
+        return GROUPS.index(self.group)
 
     @property
     def paper(self) -> str:
@@ -119,3 +137,56 @@ class Study:
             return np.linspace(low, high, count)
         half = count // 2
         return np.concatenate([np.linspace(low, 1.0, half), np.linspace(1.0, high, count - half)])
+
+    @property
+    def hyperelastic(self) -> bool:
+        """Whether it published a curve: elastography and linear studies publish a modulus."""
+        return self.group.startswith("hyperelastic/")
+
+
+def groups_of(studies: Sequence[Study]) -> tuple[str, ...]:
+    """The groups that studies are of, in the paper's order."""
+    seen = {study.group for study in studies}
+    return tuple(group for group in GROUPS if group in seen)
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Training points of the coregionalised process (n,), the studies one after the other.
+
+    `task` is the group of each point, 0 to 11, `log_energy` is `y = ln(Psi + 1e-4)` with energies in Pa, `study` the
+    index of the study in the sequence that the dataset was made from.
+    """
+
+    task: Ints
+    stretch: Floats
+    log_energy: Floats
+    study: Ints
+
+    def __len__(self) -> int:
+        return len(self.stretch)
+
+    def curves(self) -> tuple[int, ...]:
+        """Number of studies in each of the 12 tasks."""
+        _, points = np.unique(self.study, return_index=True)
+        return tuple(np.bincount(self.task[points], minlength=len(GROUPS)).tolist())
+
+
+def dataset(studies: Sequence[Study], count: int = 100) -> Dataset:
+    """The points of studies, `count` for each (`Study.grid`).
+
+    Examples
+    --------
+    >>> from warpbrain.gp.literature.studies import read_studies
+    >>> points = dataset(read_studies("as_published"))
+    >>> len(points), points.curves()
+    (7300, (5, 5, 1, 1, 1, 1, 16, 7, 10, 10, 15, 1))
+    """
+    grids = [study.grid(count) for study in studies]
+    energies = [study.energy(grid) for study, grid in zip(studies, grids, strict=True)]
+    return Dataset(
+        task=np.repeat(np.array([study.task for study in studies], dtype=np.int64), count),
+        stretch=np.concatenate([*grids, np.empty(0)]),
+        log_energy=np.log(np.concatenate([*energies, np.empty(0)]) + OFFSET),
+        study=np.repeat(np.arange(len(studies), dtype=np.int64), count),
+    )

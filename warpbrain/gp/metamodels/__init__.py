@@ -1,1 +1,0 @@
-"""Meta-models: laws of one or two parameters, fitted to curves of strain energy."""
