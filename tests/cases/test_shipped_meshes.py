@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from warpbrain.cases.building.node_sets import RADIUS, with_example_sets
 from warpbrain.mesh import (
@@ -63,27 +64,25 @@ def meshes() -> dict[str, TetMesh]:
     return {name: read_mesh(str(DATA / f"{name}.vtu"), unit="mm") for name in MESHES}
 
 
-@pytest.fixture(params=MESHES)
+@pytest.fixture(scope="module", params=MESHES)
 def name(request) -> str:
+    """All tests of a mesh run before those of the next: what is computed of it, is computed once."""
     return request.param
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def mesh(meshes, name) -> TetMesh:
     return meshes[name]
 
 
 @pytest.fixture(scope="module")
-def qualities() -> dict[str, Quality]:
-    """What was measured before, by name."""
-    return {}
+def quality(mesh) -> Quality:
+    return measure(mesh)
 
 
-@pytest.fixture
-def quality(qualities, mesh, name) -> Quality:
-    if name not in qualities:
-        qualities[name] = measure(mesh)
-    return qualities[name]
+@pytest.fixture(scope="module")
+def outer(mesh) -> NDArray[np.int64]:
+    return split_boundary(mesh.points, mesh.tetrahedra)[0]
 
 
 def test_volume_and_size(mesh, name):
@@ -155,9 +154,8 @@ def test_ventricles_are_open(mesh):
     assert x.min() < -0.015 and x.max() > 0.015
 
 
-def test_surfaces_have_no_staircase(mesh):
+def test_surfaces_have_no_staircase(mesh, outer):
     """Neighbouring faces of the outer surface meet at small angles; voxel faces would pile up at 0 and 90 degrees."""
-    outer, _ = split_boundary(mesh.points, mesh.tetrahedra)
     normal = face_vectors(mesh.points, outer)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     edges = np.sort(outer[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -170,8 +168,7 @@ def test_surfaces_have_no_staircase(mesh):
     assert (bend[beside] > 75).mean() < 0.02
 
 
-def test_set_surface(mesh):
-    outer, _ = split_boundary(mesh.points, mesh.tetrahedra)
+def test_set_surface(mesh, outer):
     np.testing.assert_array_equal(mesh.node_sets["surface"], nodes_of(outer, len(mesh.points)))
 
 
@@ -184,11 +181,10 @@ def test_superior_cap(mesh):
     assert (mesh.points[cap, 0] < -0.01).any() and (mesh.points[cap, 0] > 0.01).any()
 
 
-def test_skull_base_holds_the_brain(mesh):
+def test_skull_base_holds_the_brain(mesh, outer):
     fixed, surface = mesh.node_sets["fixed"], mesh.node_sets["surface"]
     assert not (fixed & mesh.node_sets["superior"]).any()
     assert not (fixed & ~surface).any()
-    outer, _ = split_boundary(mesh.points, mesh.tetrahedra)
     area = node_areas(mesh.points, outer)
     assert 0.08 < area[fixed].sum() / area.sum() < 0.35
     held = mesh.points[fixed]
