@@ -8,34 +8,25 @@ motions of 20 steps over the part of the solves that may linger when a pass ends
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 
 import numpy as np
 import warp as wp
 import warp.optim.linear as warp_linear
+from choices import DEVICE, milliseconds
 
 from warpbrain.bench.batches import phantom_job
 from warpbrain.ensemble.batch import Batch
 from warpbrain.ensemble.course import step_batch
 from warpbrain.kernels.linear import linear_kernels
 
-DEVICE = sys.argv[1] if len(sys.argv) > 1 else "cpu"
 SAMPLES = int(sys.argv[2]) if len(sys.argv) > 2 else (8 if DEVICE == "cpu" else 256)
 TOLERANCE = 1e-6
 
 
-def milliseconds(work: Callable[[], object], repeats: int = 5) -> float:
+def least(work: Callable[[], object], repeats: int = 5) -> float:
     """Least wall time of some work [ms], after a first go."""
-    work()
-    times = []
-    for _ in range(repeats):
-        wp.synchronize_device(DEVICE)
-        start = time.perf_counter()
-        work()
-        wp.synchronize_device(DEVICE)
-        times.append(1000.0 * (time.perf_counter() - start))
-    return min(times)
+    return milliseconds(work, repeats, min)
 
 
 class WarpBatch:
@@ -128,9 +119,9 @@ def solvers() -> None:
         batch._cg.right_hand_side.assign(right)
 
     ours()
-    own = milliseconds(replay) - milliseconds(copy_only)
+    own = least(replay) - least(copy_only)
     other = WarpBatch(batch, right)
-    theirs = milliseconds(other.solve)
+    theirs = least(other.solve)
     apart = np.abs(other.x.numpy().reshape(SAMPLES, -1, 3).transpose(1, 2, 0) - solution).max() / np.abs(solution).max()
     print(f"{SAMPLES} systems, {iterations.min()} to {iterations.max()} iterations, solutions {apart:.1e} apart")
     print(
@@ -156,7 +147,7 @@ def lingering() -> None:
                 for _ in step_batch(batch, course, numbers):
                     pass
 
-            each = milliseconds(run, 3) / (SAMPLES * job.steps)
+            each = least(run, 3) / (SAMPLES * job.steps)
             print(f"  samples {order}, {100 * linger:>4.1f} % may linger: {each:.4f} ms a step and sample")
 
 

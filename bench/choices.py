@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from statistics import median
 
 import numpy as np
 import warp as wp
@@ -24,8 +25,8 @@ DEVICE = sys.argv[1] if len(sys.argv) > 1 else "cpu"
 STEPS = 20
 
 
-def milliseconds(work: Callable[[], object], repeats: int = 40) -> float:
-    """Median wall time of some work [ms], after a first go."""
+def milliseconds(work: Callable[[], object], repeats: int = 40, of: Callable[[list[float]], float] = median) -> float:
+    """Wall time of some work [ms] after a first go, the median of several."""
     work()
     times = []
     for _ in range(repeats):
@@ -34,7 +35,7 @@ def milliseconds(work: Callable[[], object], repeats: int = 40) -> float:
         work()
         wp.synchronize_device(DEVICE)
         times.append(1000.0 * (time.perf_counter() - start))
-    return float(np.median(times))
+    return of(times)
 
 
 def step(simulator: Simulator, captured: bool = True) -> float:

@@ -30,11 +30,11 @@ from referee.draw import MECHANISMS, NOISY, OUTSIDE, RIGID_SHIFT, RIGID_TURN, UN
 from referee.effects.effect import unit
 from referee.equilibrium import Balance, balance
 from referee.evidence import normal, pair, scaled, single
+from referee.labels import effects_of, setting_of
 from referee.library import Draws, Forces, draws_of, library
 from referee.linear_response import LinearResponse
 from referee.plan import BOTH, SHARES
 from referee.problem import Problem
-from referee.rebuilding import effects_of, setting_of
 from referee.sensing import place_sensors
 from referee.setting import EACH, FIELD, NOISE, OVERALL, mean_square
 from referee.sight import Sight
@@ -42,6 +42,7 @@ from referee.sizing import first_order, spanning
 from referee.threads import single as one_thread
 from referee.truth import cap_force_of
 from referee.unknowns import MODES, unknown_forces
+from warpbrain.terminal.quiet import start_warp_quietly
 
 Floats = NDArray[np.float64]
 Random = np.random.Generator
@@ -98,6 +99,7 @@ def analysed(label: Mapping[str, Any]) -> dict[str, Any]:
         `conditional`: of each effect how much it stands out given the others; `draws`: of each residual the p-value of
         nothing and the sets of causes with their probabilities; `seconds` of processor time.
     """
+    start_warp_quietly()
     started = time.process_time()
     if label["kind"] == "trap" and label["names"][0] not in MODELLED:
         return {"case": label["case"], "conditional": [], "draws": [], "seconds": 0.0}

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import bsr_matrix, csr_matrix
 
 from referee.faces import Faces
-from referee.pattern import Pattern
 from warpbrain.mesh import TetMesh, boundary_faces
 
 Floats = NDArray[np.float64]
@@ -18,6 +19,35 @@ Bools = NDArray[np.bool_]
 
 #: Corners of each edge in the order in which FElupe (as VTK) numbers the middles.
 SIDES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """Blocks of a sparse matrix, and what adds up those of each pair of nodes of a tetrahedron."""
+
+    columns: Ints
+    starts: Ints
+    adding: csr_matrix
+    diagonal: Ints
+
+    @classmethod
+    def of(cls, cells: Ints, n: int) -> Pattern:
+        """The pattern of tetrahedra (m, a) of n nodes."""
+        rows, columns = np.broadcast_arrays(cells[:, :, None], cells[:, None, :])
+        keys, place = np.unique(rows.ravel() * n + columns.ravel(), return_inverse=True)
+        starts = np.searchsorted(keys, np.arange(n + 1) * n)
+        diagonal = np.searchsorted(keys, np.arange(n) * (n + 1))
+        count = len(place)
+        adding = csr_matrix((np.ones(count, np.float32), (place, np.arange(count))), shape=(len(keys), count))
+        return cls(keys % n, starts, adding, diagonal)
+
+    def matrix(self, local: Floats, springs: Floats | None) -> bsr_matrix:
+        """Assemble local matrices (m, a, b, 3, 3)."""
+        data = (self.adding @ local.reshape(-1, 9)).reshape(-1, 3, 3)
+        if springs is not None:
+            data[self.diagonal] += springs
+        n = len(self.starts) - 1
+        return bsr_matrix((data, self.columns, self.starts), shape=(3 * n, 3 * n))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,23 +90,30 @@ class Body:
         return count + np.searchsorted(keys, pairs @ [count, 1])
 
     @cached_property
-    def region(self) -> tuple[Floats, Floats, Floats]:
-        """Gradients (m, q, 10, 3) [1/m], volumes (m, q) [m3] and places (m, q, 3) [m] of the quadrature points."""
+    def _felupe(self) -> Any:
         import felupe
 
-        region = felupe.RegionQuadraticTetra(felupe.Mesh(self.points, self.cells, "tetra10"))
-        gradients = np.ascontiguousarray(np.transpose(region.dhdX, (3, 2, 0, 1)))
-        volumes = np.ascontiguousarray(region.dV.T)
-        shapes = region.h[..., 0] if region.h.ndim == 3 else region.h
-        return gradients, volumes, np.einsum("aq,eai->eqi", shapes, self.points[self.cells])
+        return felupe.RegionQuadraticTetra(felupe.Mesh(self.points, self.cells, "tetra10"))
 
     @cached_property
+    def region(self) -> tuple[Floats, Floats]:
+        """Volumes (m, q) [m3] and places (m, q, 3) [m] of the quadrature points."""
+        return np.ascontiguousarray(self._felupe.dV.T), np.einsum("aq,eai->eqi", self.shapes, self.points[self.cells])
+
+    @cached_property
+    def straight(self) -> tuple[Floats, Floats]:
+        """Gradients (q, 10, 3) in the reference tetrahedron, and what makes of them those of each one (m, 3, 3) [1/m].
+
+        Edges are straight, so that one matrix for each tetrahedron does so at all quadrature points.
+        """
+        reference = np.ascontiguousarray(np.transpose(self._felupe.dhdr[..., 0], (2, 0, 1)))
+        return reference, np.ascontiguousarray(np.transpose(self._felupe.drdX[:, :, 0], (2, 0, 1)))
+
+    @property
     def shapes(self) -> Floats:
         """Shape functions (10, q) at the quadrature points."""
-        import felupe
-
-        region = felupe.RegionQuadraticTetra(felupe.Mesh(self.points, self.cells, "tetra10"), grad=False)
-        return region.h[..., 0] if region.h.ndim == 3 else region.h
+        h: Floats = self._felupe.h
+        return h[..., 0] if h.ndim == 3 else h
 
     @cached_property
     def pattern(self) -> Pattern:

@@ -48,7 +48,7 @@ def creep(
     until : float
         See `referee.equilibrium.balance`.
     """
-    stress = np.zeros((*problem.body.region[2].shape, 3))
+    stress = np.zeros((*problem.body.region[1].shape, 3))
     found = [balance(replace(problem, factor=1.0 + sum(beta for beta, _ in branches)), start, near, until)]
     elastic = _second(problem, found[0].u)
     stresses = [beta * elastic for beta, _ in branches]

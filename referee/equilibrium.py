@@ -86,7 +86,7 @@ def balance(
 
 def linearised(problem: Problem, u: Floats, response: Response, near: Linear | None = None) -> Linear:
     """The tangent at a displacement; one `near` lends what it was factorised for, if it holds the same."""
-    matrix = problem.tangent(u, response)
+    matrix = problem.tangent(u, response, np.float32)
     if near is not None and (near.held == problem.held).all():
         return Linear(matrix, problem.held, near.coarse)
     return Linear(matrix, problem.held, Coarse(problem.body, matrix, problem.held))
@@ -135,5 +135,5 @@ def _newton(problem: Problem, u: Floats, F: Floats, near: Linear | None, until: 
             return Balance(u, linear, size / acting, step + 1)
         gained = size / last
         if gained > _KEPT:
-            linear = Linear(problem.tangent(u, response), problem.held, linear.coarse)
+            linear = Linear(problem.tangent(u, response, np.float32), problem.held, linear.coarse)
     raise NoTruth(f"forces do not balance in {_STEPS} steps: {size:.1e} N are left")

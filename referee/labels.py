@@ -1,7 +1,9 @@
-"""Labels: what is true of a case, sealed apart from its folder until the tool has spoken."""
+"""Labels: what is true of a case, sealed apart from its folder until the tool has spoken, and what it was made of."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from concealed.sealing import fingerprint, sealed, write_sealed
+from referee import effects
+from referee.effects import Effect
 from referee.observe import seen
 from referee.plan import Planned
+from referee.setting import Setting
 from referee.sizing import Sized
 from referee.truth import Truth
 
@@ -30,16 +35,16 @@ def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dic
     points = truth.setting.body.points
     clean = truth.effect(fitted)
     noise = seen(truth, checked, 2) - _registered(truth, checked)
-    effects = []
+    acting = []
     for one, given in zip(truth.found, truth.given, strict=True):
         stands = {"detectability": one.d, "conditional": given, "upper": one.upper, "wanted": one.wanted}
         told = {name: _number(value) for name, value in stands.items()}
-        effects.append({**one.effect.told(), **told, "drawn_again": one.again, **_alone(truth, one)})
+        acting.append({**one.effect.told(), **told, "drawn_again": one.again, **_alone(truth, one)})
     return {
         "case": name,
         "kind": plan.kind,
         "names": list(plan.names),
-        "effects": effects,
+        "effects": acting,
         "detectability": _number(truth.whole),
         "upper": _number(truth.upper),
         "rms_effect_m": _number(np.sqrt((clean**2).sum(axis=2).mean())),
@@ -90,3 +95,28 @@ def seal(folder: Path, label: dict[str, Any]) -> str:
     data = sealed(label)
     write_sealed(folder / f"{label['case']}.json.gz", data)
     return fingerprint(data)
+
+
+#: Classes of effects by the kind that a label tells.
+_CLASSES: dict[str, type[Effect]] = {
+    found.kind: found for name in effects.__all__ if name != "Effect" for found in [getattr(effects, name)]
+}
+
+
+def setting_of(label: Mapping[str, Any]) -> Setting:
+    """The setting that a label tells."""
+    return Setting(**{name: _plain(value) for name, value in label["setting"].items()})
+
+
+def effects_of(label: Mapping[str, Any]) -> list[Effect]:
+    """The effects that a label tells, at their size."""
+    found = []
+    for told in label["effects"]:
+        kind = _CLASSES[told["kind"]]
+        # what a label of an earlier run does not tell has the value that it had then
+        found.append(kind(**{f.name: _plain(told[f.name]) for f in fields(kind) if f.name in told}))
+    return found
+
+
+def _plain(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

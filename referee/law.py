@@ -112,28 +112,44 @@ class Response:
         """Isochoric second Piola-Kirchhoff stress (m, q, 3, 3) [Pa]."""
         return (self.v * (self.shape[0] / self.stretch**2)[..., None, :]) @ np.swapaxes(self.v, -1, -2)
 
-    def tangent(self, factor: float = 1.0) -> Floats:
+    def tangent(self, factor: float = 1.0, precision: type[np.floating] = np.float64) -> Floats:
         """Derivative (m, q, 9, 9) [Pa] of the stress by the deformation gradient, rows and columns ``3 i + J``."""
-        l, (t, H) = self.stretch, (factor * s + v for s, v in zip(self.shape, self.volume, strict=True))
-        e = np.log(l)
+        l = self.stretch
+        t, H = (factor * shape + volume for shape, volume in zip(self.shape, self.volume, strict=True))
         axes = np.zeros((*l.shape[:-1], 9, 9))
-        for i in range(3):
-            for j in range(3):
-                if i == j:
-                    axes[..., 4 * i, 4 * i] = (H[..., i, i] - t[..., i]) / l[..., i] ** 2
-                    continue
-                axes[..., 4 * i, 4 * j] = H[..., i, j] / (l[..., i] * l[..., j])
-                near = np.abs(e[..., i] - e[..., j]) < _EQUAL
-                apart = np.where(near, 1.0, l[..., i] ** 2 - l[..., j] ** 2)
-                limit = (0.5 * (H[..., i, i] + H[..., j, j]) - H[..., i, j]) / (2.0 * l[..., i] * l[..., j])
-                a = np.where(near, limit, (t[..., i] - t[..., j]) / apart)
-                axes[..., 3 * i + j, 3 * i + j] = a
-                axes[..., 3 * i + j, 3 * j + i] = (l[..., j] ** 2 * a - t[..., j]) / (l[..., i] * l[..., j])
-        turn = np.einsum("...ia,...Jb->...iJab", self.u, self.v).reshape(*l.shape[:-1], 9, 9)
-        return turn @ axes @ np.swapaxes(turn, -1, -2)
+        own = H.copy()
+        own[..., range(3), range(3)] -= t
+        axes[..., ::4, ::4] = own / (l[..., :, None] * l[..., None, :])
+        i, j = np.array([0, 0, 1]), np.array([1, 2, 2])
+        e, product = np.log(l), l[..., i] * l[..., j]
+        near = np.abs(e[..., i] - e[..., j]) < _EQUAL
+        apart = np.where(near, 1.0, l[..., i] ** 2 - l[..., j] ** 2)
+        limit = (0.5 * (H[..., i, i] + H[..., j, j]) - H[..., i, j]) / (2.0 * product)
+        a = np.where(near, limit, (t[..., i] - t[..., j]) / apart)
+        across = (l[..., j] ** 2 * a - t[..., j]) / product
+        ij, ji = 3 * i + j, 3 * j + i
+        axes[..., ij, ij] = axes[..., ji, ji] = a
+        axes[..., ij, ji] = axes[..., ji, ij] = across
+        u, v = self.u.astype(precision), self.v.astype(precision)
+        turn = (u[..., :, None, :, None] * v[..., None, :, None, :]).reshape(axes.shape)
+        return turn @ axes.astype(precision) @ np.swapaxes(turn, -1, -2)
 
 
-def respond(law: Law, F: Floats, mu: Floats, bulk: Floats, growth: Floats) -> Response:
+#: Singular vectors `u` and `v` (m, q, 3, 3) and values (m, q, 3) of deformation gradients `u diag(stretch) v^T`.
+Stretches = tuple[Floats, Floats, Floats]
+
+
+def stretches_of(F: Floats) -> Stretches:
+    """Principal stretches and their axes of deformation gradients (m, q, 3, 3)."""
+    # the axes of F^T F: two and a half times faster than singular values, and stretches are far from zero
+    squares, v = np.linalg.eigh(np.swapaxes(F, -1, -2) @ F)
+    stretch = np.sqrt(squares)
+    return F @ v / stretch[..., None, :], v, stretch
+
+
+def respond(
+    law: Law, F: Floats, mu: Floats, bulk: Floats, growth: Floats, stretches: Stretches | None = None
+) -> Response:
     """Response of tissue that has grown.
 
     The volumetric energy is ``K/4 (J^2 - 1 - 2 ln J)``; growth changes the volume without stress by a factor
@@ -146,11 +162,10 @@ def respond(law: Law, F: Floats, mu: Floats, bulk: Floats, growth: Floats) -> Re
     F : (m, q, 3, 3) array
     mu, bulk, growth : (m, 1) or (m, q) array
         Shear and bulk modulus [Pa], and the logarithm of the volume without stress.
+    stretches : Stretches, optional
+        Of `F`, where they are known.
     """
-    # the axes of F^T F: two and a half times faster than singular values, and stretches are far from zero
-    squares, v = np.linalg.eigh(np.swapaxes(F, -1, -2) @ F)
-    stretch = np.sqrt(squares)
-    u = F @ v / stretch[..., None, :]
+    u, v, stretch = stretches_of(F) if stretches is None else stretches
     e = np.log(stretch) - growth[..., None] / 3.0
     trace = e.sum(axis=-1, keepdims=True)
     first, second = law.slopes(e - trace / 3.0)

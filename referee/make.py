@@ -23,6 +23,7 @@ from referee.setting import draw_setting
 from referee.sizing import Wish
 from referee.threads import single
 from referee.truth import LEAST, Truth, solve_truth
+from warpbrain.terminal.quiet import start_warp_quietly
 
 #: Rooms of a set.
 CASES, LABELS = "cases", "labels"
@@ -91,6 +92,7 @@ def make_case(out: Path, name: str, plan: Planned, seed: Sequence[int]) -> str:
     str
         How it went, without what is true of it.
     """
+    start_warp_quietly()
     started = time.perf_counter()
     given_up: list[str] = []
     for attempt in range(ATTEMPTS):

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
 from referee.body import Body
-from referee.law import Law, Response, respond
+from referee.law import Law, Response, Stretches, respond
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 #: Forces (n, 3) [N] at a displacement (n, 3) [m].
 Load = Callable[[Floats], Floats]
 #: Tetrahedra whose matrices are made together: what they need stays in the processor's cache.
-_TOGETHER = 128
+_TOGETHER = 64
 
 
 class Inverted(Exception):
@@ -60,21 +60,28 @@ class Problem:
 
     def gradient(self, u: Floats) -> Floats:
         """Deformation gradients (m, q, 3, 3); `Inverted` if one is not a deformation."""
-        G = self.body.region[0]
-        F = np.swapaxes(u[self.body.cells], 1, 2)[:, None] @ G + np.eye(3)
+        reference, inverse = self.body.straight
+        q, nodes, _ = reference.shape
+        # products of few large matrices: those of a tetrahedron's own gradients are many and small
+        moved = np.swapaxes(u[self.body.cells], 1, 2).reshape(-1, nodes) @ np.swapaxes(reference, 0, 1).reshape(
+            nodes, -1
+        )
+        F = np.swapaxes((moved.reshape(-1, 3 * q, 3) @ inverse).reshape(-1, 3, q, 3), 1, 2) + np.eye(3)
         if np.linalg.det(F).min() <= 0.0:
             raise Inverted
         return F
 
-    def response(self, F: Floats) -> Response:
+    def response(self, F: Floats, stretches: Stretches | None = None) -> Response:
         """Of the law."""
-        return respond(self.law, F, self.mu, self.bulk, self.growth)
+        return respond(self.law, F, self.mu, self.bulk, self.growth, stretches)
 
     def local(self, P: Floats) -> Floats:
         """Forces (m, 10, 3) [N] of a stress (m, q, 3, 3) [Pa] on the nodes of each tetrahedron."""
-        G, volumes, _ = self.body.region
-        forces: Floats = (G @ np.swapaxes(P * volumes[..., None, None], -1, -2)).sum(axis=1)
-        return forces
+        volumes, (reference, inverse) = self.body.region[0], self.body.straight
+        q, nodes, _ = reference.shape
+        pulled = np.swapaxes(P * volumes[..., None, None], 1, 2).reshape(-1, 3 * q, 3) @ np.swapaxes(inverse, 1, 2)
+        forces = pulled.reshape(-1, 3 * q) @ np.swapaxes(reference, 1, 2).reshape(3 * q, nodes)
+        return np.swapaxes(forces.reshape(-1, 3, nodes), 1, 2)
 
     def gathered(self, local: Floats) -> Floats:
         """Forces (n, 3) [N] on all nodes."""
@@ -94,21 +101,25 @@ class Problem:
             out += (stiffness @ (u - rest)[..., None])[..., 0]
         return out
 
-    def tangent(self, u: Floats, response: Response) -> bsr_matrix:
+    def tangent(self, u: Floats, response: Response, precision: type[np.floating] = np.float64) -> bsr_matrix:
         """Derivative of the residual, without that of the loads."""
-        G, volumes, _ = self.body.region
+        volumes, (reference, inverse) = self.body.region[0], self.body.straight
         cells, q = volumes.shape
-        local = np.empty((cells, 10, 10, 3, 3))
+        products = np.einsum("qaJ,qbL->abqJL", reference, reference).reshape(100, -1).astype(precision)
+        local = np.empty((cells, 100, 9), precision)
         for start in range(0, cells, _TOGETHER):
             some = slice(start, start + _TOGETHER)
-            A = response.of(some).tangent(self.factor)
+            # with stretches along reference axes, so that gradients of nodes are the same in all tetrahedra
+            axes = inverse[some, None]
+            part = response.of(some)
+            A = replace(part, v=axes @ part.v).tangent(self.factor, precision)
             if self.stress is not None:
                 # delta_ik S_JL
+                S = axes @ self.stress[some] @ np.swapaxes(axes, -1, -2)
                 for i in range(3):
-                    A[..., 3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += self.stress[some]
-            g = np.ascontiguousarray(G[some])
-            # (i J, k L) -> (J, i k L)
-            A = (A * volumes[some, :, None, None]).reshape(-1, q, 3, 3, 3, 3).transpose(0, 1, 3, 2, 4, 5)
-            blocks = ((g @ A.reshape(-1, q, 3, 27)).reshape(-1, q, 90, 3) @ np.swapaxes(g, 2, 3)).sum(axis=1)
-            local[some] = blocks.reshape(-1, 10, 3, 3, 10).transpose(0, 1, 4, 2, 3)
+                    A[..., 3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += S
+            A *= volumes[some, :, None, None].astype(precision)
+            # (q, i J, k L) -> (q J L, i k)
+            A = A.reshape(-1, q, 3, 3, 3, 3).transpose(0, 1, 3, 5, 2, 4).reshape(-1, 9 * q, 9)
+            np.matmul(products, A, out=local[some])
         return self.body.pattern.matrix(local, None if self.springs is None else self.springs(u)[0])

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from concealed.observing import SIGMA, Blur
 from referee.body import Body
-from referee.fields import random_field
 from referee.geometry import declared_case, true_body
 from referee.law import Demiray, Law, Ogden
 from referee.problem import Load, Problem
@@ -33,6 +32,10 @@ POISSON, NOISE = (0.46, 0.48), (0.8, 1.25)
 SHIFT, TURN = 0.7e-3, float(np.deg2rad(0.7))
 #: Demiray's exponent; share of the first of two terms of Ogden's law, and both exponents.
 DEMIRAY, OGDEN = (0.3, 2.0), ((0.4, 0.7), (2.0, 5.0), (-3.0, -1.0))
+
+
+#: Random Fourier features of a field (Rahimi and Recht 2007).
+_FEATURES = 600
 
 
 def mean_square(ends: tuple[float, float]) -> float:
@@ -192,6 +195,28 @@ class Setting:
     def told(self) -> dict[str, Any]:
         """Everything of it, for the label."""
         return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
+
+
+def random_field(points: Floats, length: float, seed: int, components: int = 1) -> Floats:
+    """Gaussian fields (n, components) of mean 0, variance 1 and covariance ``exp(-r^2 / (2 length^2))``.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        [m]
+    length : float
+        [m]
+    seed : int
+        The same field at whatever points.
+    components : int
+    """
+    random = np.random.default_rng(seed)
+    out = np.empty((len(points), components))
+    for k in range(components):
+        waves = random.normal(size=(3, _FEATURES)) / length
+        phases = random.uniform(0.0, 2.0 * np.pi, _FEATURES)
+        out[:, k] = np.sqrt(2.0 / _FEATURES) * np.cos(points @ waves + phases).sum(axis=1)
+    return out
 
 
 def cap_force(body: Body, total: Floats) -> Floats:

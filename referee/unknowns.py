@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from referee.equilibrium import Balance
-from referee.law import Law, respond
+from referee.law import Law, Stretches, respond, stretches_of
 from referee.problem import Problem
 from referee.setting import BOTH_LAWS, EACH, FIELD, LENGTHS, OVERALL, POISSON, mean_square
 from referee.sight import Change
@@ -63,13 +63,14 @@ def unknowns_of(problem: Problem, base: Balance) -> Unknowns:
 def unknown_forces(problem: Problem, base: Balance) -> tuple[list[Floats], list[Floats]]:
     """Inner forces (n, 3) [N] that come up with the tissues and with the others of `Unknowns`."""
     F = problem.gradient(base.u)
-    response = problem.response(F)
+    stretches = stretches_of(F)
+    response = problem.response(F, stretches)
     inner = problem.local(response.stress(problem.factor))
     labels = problem.body.mesh.tissue
     tissues = [problem.gathered(inner * (labels == label)[:, None, None]) for label in np.unique(labels)]
     fields = stiffness_modes(problem.body.centroids, np.linalg.norm(inner, axis=(1, 2)))
     others = [problem.gathered(inner * field[:, None, None]) for field in fields.T]
-    others += [problem.gathered(problem.local(_poisson(problem, F))), *_laws(problem, F)]
+    others += [problem.gathered(problem.local(_poisson(problem, F, stretches))), *_laws(problem, F, stretches)]
     return tissues, others
 
 
@@ -114,19 +115,19 @@ def stiffness_modes(places: Floats, weight: Floats, count: int = MODES) -> Float
     return (columns @ axes) / weight[:, None]
 
 
-def _poisson(problem: Problem, F: Floats) -> Floats:
+def _poisson(problem: Problem, F: Floats, stretches: Stretches) -> Floats:
     """Stress for one standard deviation of Poisson's ratio."""
     low, high = POISSON
     ratio, sd = 0.5 * (low + high), (high - low) / np.sqrt(12.0)
     slope = 1.0 / (1.0 + ratio) + 2.0 / (1.0 - 2.0 * ratio)
-    response = respond(problem.law, F, 0.0 * problem.mu, sd * slope * problem.bulk, problem.growth)
+    response = respond(problem.law, F, 0.0 * problem.mu, sd * slope * problem.bulk, problem.growth, stretches)
     return response.stress()
 
 
-def _laws(problem: Problem, F: Floats) -> list[Floats]:
+def _laws(problem: Problem, F: Floats, stretches: Stretches) -> list[Floats]:
     """Forces of each law that may be drawn less their mean: as many as there are laws, of the same covariance."""
     laws, shares = zip(*BOTH_LAWS, strict=True)
-    forces = np.stack([_shape(problem, F, law) for law in laws])
+    forces = np.stack([_shape(problem, F, stretches, law) for law in laws])
     weights = np.array(shares)[:, None, None]
     apart = np.sqrt(weights) * (forces - (weights * forces).sum(axis=0))
     flat = apart.reshape(len(laws), -1)
@@ -135,6 +136,6 @@ def _laws(problem: Problem, F: Floats) -> list[Floats]:
     return list(np.einsum("lk,lni->kni", axes[:, kept], apart))
 
 
-def _shape(problem: Problem, F: Floats, law: Law) -> Floats:
+def _shape(problem: Problem, F: Floats, stretches: Stretches, law: Law) -> Floats:
     alone = replace(problem, law=law, bulk=0.0 * problem.bulk)
-    return alone.gathered(alone.local(alone.response(F).stress()))
+    return alone.gathered(alone.local(alone.response(F, stretches).stress()))

@@ -24,7 +24,7 @@ class UniformForce(BodyForce):
     direction: Place
 
     def density(self, body: Body) -> Floats:
-        return np.broadcast_to(self.size * unit(np.asarray(self.direction)), body.region[2].shape)
+        return np.broadcast_to(self.size * unit(np.asarray(self.direction)), body.region[1].shape)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ class Swirl(BodyForce):
     length: float
 
     def density(self, body: Body) -> Floats:
-        r = (body.region[2] - np.asarray(self.centre)) / self.length
+        r = (body.region[1] - np.asarray(self.centre)) / self.length
         decay = self.size * np.exp(-0.5 * (r**2).sum(axis=-1))
         return decay[..., None] * np.cross(unit(np.asarray(self.axis)), r)
 
@@ -72,7 +72,7 @@ class Attraction(BodyForce):
     radius: float
 
     def density(self, body: Body) -> Floats:
-        _, volumes, places = body.region
+        volumes, places = body.region
         along = unit(np.subtract(self.other, self.centre))
         hills = [hill(places, place, self.radius) for place in (self.centre, self.other)]
         here, there = (weight / (weight * volumes).sum() for weight in hills)

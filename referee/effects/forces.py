@@ -33,7 +33,7 @@ class BodyForce(Effect):
 
     def act(self, problem: Problem) -> Problem:
         body = problem.body
-        _, volumes, _ = body.region
+        volumes, _ = body.region
         local = np.einsum("aq,eqi->eai", body.shapes, self.density(body) * volumes[..., None])
         force = problem.gathered(local)
         return adding(problem, lambda u: force)
@@ -66,7 +66,7 @@ class Gravity(BodyForce):
     def density(self, body: Body) -> Floats:
         down = unit(np.asarray(self.direction))
         middle = body.points.mean(axis=0)
-        depth = (body.region[2] - middle) @ down - ((body.points - middle) @ down).min()
+        depth = (body.region[1] - middle) @ down - ((body.points - middle) @ down).min()
         dry = 1.0 / (1.0 + np.exp(np.clip((depth - self.size) / 0.0005, -50.0, 50.0)))
         return BUOYANCY * dry[..., None] * down
 

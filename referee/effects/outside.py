@@ -76,7 +76,7 @@ class PreStress(Effect):
 
     def act(self, problem: Problem) -> Problem:
         a, n = unit(np.asarray(self.axis)), unit(np.asarray(self.normal))
-        places = problem.body.region[2]
+        places = problem.body.region[1]
         within = np.abs((places - np.asarray(self.centre)) @ n) < 0.5 * self.thickness
         stress = self.size * within[..., None, None] * (np.outer(a, a) - np.eye(3) / 3.0)
         return replace(problem, stress=stress if problem.stress is None else problem.stress + stress)

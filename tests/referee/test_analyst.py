@@ -15,10 +15,10 @@ from referee.detectability import conditional
 from referee.draw import draw_effect
 from referee.equilibrium import balance
 from referee.evidence import normal, pair, scaled, single
+from referee.labels import effects_of, setting_of
 from referee.library import Draws, Forces
 from referee.linear_response import LinearResponse
 from referee.plan import Planned
-from referee.rebuilding import effects_of, setting_of
 from referee.sensing import place_sensors
 from referee.setting import draw_setting
 from referee.sight import Sight

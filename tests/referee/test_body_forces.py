@@ -21,7 +21,7 @@ def force(problem, effect):
 
 def test_a_uniform_force_weighs_the_volume(problem, verify):
     found = force(problem, UniformForce(size=500.0, direction=(1.0, 0.0, 0.0))).sum(axis=0)
-    volume = problem.body.region[1].sum()
+    volume = problem.body.region[0].sum()
     verify(
         "sum of the nodal forces of a uniform body force on quadratic tetrahedra",
         "force density times volume",

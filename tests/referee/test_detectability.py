@@ -10,10 +10,9 @@ from referee.detectability import Detectability
 from referee.draw import wanted
 from referee.effects import Inclusion
 from referee.equilibrium import NoTruth, balance
-from referee.fields import random_field
 from referee.law import Demiray, Ogden
 from referee.sensing import place_sensors
-from referee.setting import BOTH_LAWS, DEMIRAY, FIELD, LENGTHS, OGDEN, draw_setting
+from referee.setting import BOTH_LAWS, DEMIRAY, FIELD, LENGTHS, OGDEN, draw_setting, random_field
 from referee.sight import Change, Sight
 from referee.sizing import Wish
 from referee.truth import cap_force_of, solve_truth
