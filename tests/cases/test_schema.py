@@ -24,7 +24,9 @@ NOT_OF_THE_TEXT = {
 
 
 def test_it_is_a_schema():
-    jsonschema.Draft202012Validator.check_schema(json.loads(schema_text()))
+    schema = json.loads(schema_text())
+    assert schema == case_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
 
 
 @pytest.mark.parametrize("file", [file for variants in SHIPPED.values() for file in variants.values()])

@@ -110,10 +110,15 @@ def _add_build(actions: argparse._SubParsersAction[Any]) -> None:
 
 
 def _list(options: argparse.Namespace) -> None:
+    # neither NumPy nor a mesh is loaded for a list
     from warpbrain.cases.shipped import catalogue
-    from warpbrain.report.case_text import list_lines
 
-    print(*list_lines(catalogue()), sep="\n")
+    row = "{:<14} {:<7} {:<10} {:>7} {:>9} {:>9}   {}"
+    print(row.format("case", "tissue", "origin", "nodes", "elements", "cm3", "recordings"))
+    for entry in catalogue():
+        recordings = ", ".join(f"{name} ({count})" for name, count in entry.recordings.items()) or "none"
+        numbers = (entry.nodes, entry.tetrahedra, f"{entry.volume_cm3:.1f}")
+        print(row.format(entry.name, entry.tissue, entry.origin, *numbers, recordings))
     print(
         "\nA stand-in is the MNI anatomy, deformed and scaled to a patient's published figures: not the "
         "patient's images.\nOf resect-01 to resect-15 the landmarks are patients', measured; the mesh is the template, "

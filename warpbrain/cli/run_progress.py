@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.physics.words import tabled
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
@@ -24,6 +23,7 @@ _INDENT = 12 * " "
 @contextmanager
 def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[Watching]:
     """Who is told of the steps, after the head of their table is printed."""
+    from warpbrain.physics.words import tabled
     from warpbrain.simulation.courses import Watching
 
     if options.until is not None:

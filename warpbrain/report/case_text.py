@@ -1,14 +1,11 @@
-"""Cases in words: the list of those that ship, all that one says, and what checking it found."""
+"""A case in words: all that it says, and what checking it found."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.checking import Checked
-from warpbrain.cases.shipped import Entry
 from warpbrain.mesh import Quality, measure
 from warpbrain.physics.words import length
 from warpbrain.recordings.recording import (
@@ -21,18 +18,6 @@ from warpbrain.recordings.recording import (
 )
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.summary import SET_TITLES, STAND_IN
-
-_ROW = "{:<14} {:<7} {:<10} {:>7} {:>9} {:>9}   {}"
-
-
-def list_lines(entries: Sequence[Entry]) -> list[str]:
-    """A head, and one line about each case."""
-    lines = [_ROW.format("case", "tissue", "origin", "nodes", "elements", "cm3", "recordings")]
-    for entry in entries:
-        recordings = ", ".join(f"{name} ({count})" for name, count in entry.recordings.items()) or "none"
-        numbers = (entry.nodes, entry.tetrahedra, f"{entry.volume_cm3:.1f}")
-        lines.append(_ROW.format(entry.name, entry.tissue, entry.origin, *numbers, recordings))
-    return lines
 
 
 def show_lines(case: Case) -> list[str]:
