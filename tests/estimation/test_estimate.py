@@ -123,6 +123,15 @@ def test_points_that_cannot_move_pin_nothing() -> None:
     assert found(replace(case, recordings=(held,))).identifiability.nothing
 
 
+def test_where_nothing_acts_nothing_moves_and_points_pin_nothing() -> None:
+    case = block({"brain": WHITE}, "pushed")
+    case = replace(case, boundaries=case.boundaries[:1])
+    points = case.mesh.points[case.mesh.node_sets["top"]]
+    still = PointsRecording(name="still", file="", points=points, displacement=np.zeros_like(points), sigma=1e-4)
+    posterior = found(replace(case, recordings=(still,)), EstimationOptions(samples=64))
+    assert posterior.identifiability.nothing and not posterior.best.point.state.u.any()
+
+
 def test_a_fifth_of_gross_errors_is_found_and_does_not_count() -> None:
     case = block({"brain": WHITE}, "pushed")
     recording = beads(truth(case), count=60, noise=1e-4)

@@ -152,6 +152,8 @@ class Diagnosing:
         predictions = {REFITTED: confirming.predict(nothing, confirming.held_out_for(best))}
         if held_out is not None:
             predictions = {REFITTED: held_out.without, EXPLAINED: held_out.explained}
+        # whoever keeps many diagnoses does not keep what they were found by
+        search.release()
         return Diagnosis(
             case=self.case,
             decision=checked.decision,

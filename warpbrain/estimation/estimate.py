@@ -201,7 +201,9 @@ class Estimation:
                 break
         else:
             self._remarks.append("the error of the mesh was still changing when it was last computed")
-        part = errors[-1].change.size / root_mean_square(modes[0].point.state.u)
+        change, moved = errors[-1].change.size, root_mean_square(modes[0].point.state.u)
+        # where nothing acts nothing moves, on either mesh
+        part = change / moved if moved > 0.0 else 0.0
         if part > _TOO_COARSE:
             self._remarks.append(
                 f"the mesh is coarse: on elements of half the size displacements change by {100.0 * part:.0f} %; what "

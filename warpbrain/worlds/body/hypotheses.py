@@ -268,6 +268,10 @@ class HypothesisSearch:
         hypothesis = replace(fitted.hypothesis, log_prior=fitted.hypothesis.log_prior - log_prior)
         return replace(fitted, hypothesis=hypothesis).with_evidence(reduced.hypothesis.log_evidence + gain)
 
+    def release(self) -> None:
+        """Let go of the linear models about fits, each of which holds factors: 150 MB at 5,000 nodes."""
+        self._expanded.clear()
+
     def _forget_supersets(self, names: frozenset[str]) -> None:
         """Remove supersets whose linear model is about an earlier fit of a set; expanding it again weighs them anew."""
         if self._expanded.pop(names, None) is not None:
