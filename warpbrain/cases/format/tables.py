@@ -37,7 +37,7 @@ CASE = Table(
         Key(
             "registration",
             "table",
-            "How well recordings are registered to the anatomy, one standard deviation; 1 degree, in a brain 1 mm, if absent.",
+            "How well recordings are registered to the anatomy (one sd); 1 degree, in a brain 1 mm, if absent.",
             keys=(
                 Key("mm", "number", "Of each component of the shift, whatever the units.", "mm", True, above=0.0),
                 Key("degrees", "number", "Of the turn about each axis.", "degrees", True, above=0.0),
