@@ -1,6 +1,7 @@
 """A package of its own beside this one: what it names by entry points is read, run and refused as what is here."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -14,8 +15,12 @@ from folders import SIDE, write_folder
 
 from warpbrain import plugins
 from warpbrain.errors import InputError
+from warpbrain.frame import Frame
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.plugins import added_by_packages
+from warpbrain.problems import Problems
+from warpbrain.recordings import tracked_points
+from warpbrain.recordings.recording import TrackedPoints
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "examples" / "package"
@@ -106,3 +111,26 @@ def test_what_cannot_be_added_names_its_package(monkeypatch, name, value, expect
     with pytest.raises(InputError, match=r"^a package: entry point") as error:
         added_by_packages("mechanisms", mechanisms())
     assert expected in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("read", "message"),
+    [
+        ({"points": np.zeros((0, 3)), "displacement": np.zeros((0, 3))}, "found no points"),
+        ({"displacement": np.zeros((3, 3))}, r"displacement: expected finite numbers of shape \(2, 3\)"),
+        ({"displacement": np.full((2, 3), np.nan)}, "displacement: expected finite numbers"),
+        ({"time": np.zeros(3)}, r"time: expected finite numbers of shape \(2,\), found \(3,\)"),
+        ({"ids": ("a",)}, "ids: expected one for each of 2 points, found 1"),
+        ({"ids": ("a", "a")}, "found an id twice"),
+    ],
+)
+def test_what_a_reader_gets_wrong_is_told_of_its_file(tmp_path, monkeypatch, read, message):
+    path, problems = tmp_path / "points.xyz", Problems()
+    path.write_text("x")
+    sound = {"points": np.zeros((2, 3)), "displacement": np.zeros((2, 3))}
+    monkeypatch.setattr(
+        tracked_points, "added_readers", lambda: {".xyz": lambda path: TrackedPoints(**{**sound, **read})}
+    )
+    assert tracked_points.tracked_points(path, Frame("mm", "RAS"), None, problems) is None
+    [problem] = problems.found
+    assert problem.file == path and re.match(message, problem.message)

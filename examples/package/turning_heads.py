@@ -11,7 +11,7 @@ from warpbrain.mesh import volume_forces
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
-from warpbrain.recordings.tracked_points import TrackedPoints
+from warpbrain.recordings.recording import TrackedPoints
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -107,7 +107,9 @@ class Diagnosing:
             If the case as declared has no equilibrium.
         """
         with one_thread_of_blas():
-            return self._run()
+            diagnosis = self._run()
+        diagnosis.search.release()
+        return diagnosis
 
     def _run(self) -> Diagnosis:
         options = self.options
@@ -152,8 +154,6 @@ class Diagnosing:
         predictions = {REFITTED: confirming.predict(nothing, confirming.held_out_for(best))}
         if held_out is not None:
             predictions = {REFITTED: held_out.without, EXPLAINED: held_out.explained}
-        # whoever keeps many diagnoses does not keep what they were found by
-        search.release()
         return Diagnosis(
             case=self.case,
             decision=checked.decision,

@@ -164,7 +164,7 @@ class GaussianModel:
         return self.precision_at(rows)(self.scale)
 
     def precision_at(self, rows: Floats) -> Callable[[float], Floats]:
-        """The same by the factor on the noise: what all have in common is computed once."""
+        """`S^-1` times rows (n,) or (n, b), as a function of the scale: what no scale changes is computed once."""
         values, B = self._spectrum.values, self._spectrum.dual
         of_noise, projected = self._noise.precision @ rows, B.T @ rows
 

@@ -13,11 +13,6 @@ Hypotheses that differ in some columns `G` alone, or in their length f, share al
 `G^T S_0^-1 G = V diag(l) V^T` and `D = S_0^-1 G V`
 
     S^-1 = S_0^-1 - D diag(f^2 / (1 + f^2 l)) D^T
-
-Hypotheses that differ in some columns `G` alone, or in their length f, share all else: with
-`G^T S_0^-1 G = V diag(l) V^T` and `D = S_0^-1 G V`
-
-    S^-1 = S_0^-1 - D diag(f^2 / (1 + f^2 l)) D^T
 """
 
 from __future__ import annotations
@@ -281,9 +276,8 @@ class _Search:
         for number in numbers:
             rows = points[number]
             part = slice(at, at := at + len(rows))
-            increase = (self._variances[self.kinds[number]] - self._variances[before]) * model.noise_blocks(rows[None])[
-                0
-            ]
+            [noise] = model.noise_blocks(rows[None])
+            increase = (self._variances[self.kinds[number]] - self._variances[before]) * noise
             inner[part, part] += np.linalg.inv(increase)
             log_determinant += float(np.linalg.slogdet(increase)[1])
         factor = np.linalg.cholesky(inner)

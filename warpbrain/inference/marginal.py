@@ -75,7 +75,17 @@ class Marginal:
 
 @dataclass(frozen=True, eq=False)
 class Summed:
-    """A sum over scales of the noise and over gross errors: its logarithm, and the most probable of both."""
+    """Evidence summed over scales of the noise and over gross errors.
+
+    Attributes
+    ----------
+    log_evidence : float
+        [nats]
+    scale : float
+        The most probable factor on the noise.
+    inflation : (g,) array
+        The most probable inflation of each point at that scale.
+    """
 
     log_evidence: float
     scale: float
@@ -83,7 +93,9 @@ class Summed:
 
 
 class RowsAtScales:
-    """Rows under columns of given lengths and further ones of any, at all scales of the noise.
+    """Evidence of rows under a model with further columns, whose length and the scale of the noise may vary.
+
+    What neither changes is computed once.
 
     Parameters
     ----------
@@ -106,11 +118,12 @@ class RowsAtScales:
         self._at: dict[float, tuple[PointRows, FurtherColumns]] = {}
 
     def summed(self, length: float = 1.0, scale: float = 1.0, inflation: Floats | None = None) -> Summed:
-        """The evidence where the further columns are so many times as long.
+        """The evidence with the further columns multiplied by a factor.
 
         Parameters
         ----------
         length : float
+            That factor.
         scale : float
             A factor on the noise near the most probable one, where the sum begins.
         inflation : (g,) array, optional
@@ -136,7 +149,7 @@ class RowsAtScales:
         return Summed(float(np.logaddexp.reduce(logs)), float(values[best]), inflations[best])
 
     def with_gross_errors(self, scale: float, length: float = 1.0, start: Floats | None = None) -> GrossErrors:
-        """At one scale, with further columns so many times as long."""
+        """Density at one scale of the noise, with the further columns multiplied by `length`."""
         if scale not in self._at:
             weighted, of_further = (times(scale) for times in self._weighted)
             rows = PointRows(self._model.with_scale(scale), self._residual, self._points, weighted)
@@ -151,7 +164,7 @@ def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], sca
 
 
 def marginal_of(model: GaussianModel, points: Sequence[Ints], summed: Summed) -> Marginal:
-    """What a sum has come to, with the columns of the hypothesis at any scale."""
+    """Evidence and most probable model of a sum; `model` has the columns of the hypothesis, at a scale of one."""
     at_best = model.of_noise(model.columns, summed.scale)
     excess = columns_of_inflation(at_best, points, summed.inflation)
     with_excess = model.of_noise(np.column_stack([model.columns, excess]), summed.scale)

@@ -41,19 +41,35 @@ class Recording:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PointsRecording(Recording):
-    """Tracked points: where each was and how far it went.
+class TrackedPoints:
+    """What a file tells of tracked points: where each was and how far it went.
 
     Attributes
     ----------
     points, displacement : (n, 3) array
-        [m]
+        [m], RAS.
     time : (n,) array or None
         [s]
     ids : tuple of n str, or None
     sigmas : (n,) array or None
-        Noise of one component of each point [m]; takes precedence over `sigma`.
+        Noise of one component of each point [m]; takes precedence over that of the recording.
     weights : (n,) array or None
+    """
+
+    points: Floats
+    displacement: Floats
+    time: Floats | None = None
+    ids: tuple[str, ...] | None = None
+    sigmas: Floats | None = None
+    weights: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PointsRecording(TrackedPoints, Recording):
+    """Tracked points of a case.
+
+    Attributes
+    ----------
     outside : {"error", "nearest"}
         What a point farther outside the mesh than a local edge is: a mistake, or observed at the nearest point of it.
     moved_file : str or None
@@ -61,12 +77,6 @@ class PointsRecording(Recording):
     """
 
     kind: ClassVar[str] = "points"
-    points: Floats
-    displacement: Floats
-    time: Floats | None = None
-    ids: tuple[str, ...] | None = None
-    sigmas: Floats | None = None
-    weights: Floats | None = None
     outside: str = "error"
     moved_file: str | None = None
 

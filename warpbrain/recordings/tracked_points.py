@@ -3,63 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from warpbrain.arrays import Floats
-from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.plugins import added_by_packages
 from warpbrain.problems import Problems
 from warpbrain.recordings.markups import is_markup, paired, read_markup
+from warpbrain.recordings.recording import TrackedPoints
 from warpbrain.recordings.tables import Table, read_table
 from warpbrain.recordings.tags import read_tags
 from warpbrain.recordings.text import is_readable, shown
 
 POSITION = ("x", "y", "z")
 DISPLACEMENT = ("ux", "uy", "uz")
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class TrackedPoints:
-    """What a file tells of points: where each was at rest and how far it went.
-
-    Attributes
-    ----------
-    points, displacement : (n, 3) array
-        [m], RAS.
-    time : (n,) array or None
-        [s]
-    ids : tuple of n str, or None
-    sigmas : (n,) array or None
-        Noise of one component of each point [m].
-    weights : (n,) array or None
-    """
-
-    points: Floats
-    displacement: Floats
-    time: Floats | None = None
-    ids: tuple[str, ...] | None = None
-    sigmas: Floats | None = None
-    weights: Floats | None = None
-
-    def __post_init__(self) -> None:
-        n = len(self.points)
-        for name, shape in {
-            "points": (n, 3),
-            "displacement": (n, 3),
-            "time": (n,),
-            "sigmas": (n,),
-            "weights": (n,),
-        }.items():
-            values = getattr(self, name)
-            if values is not None and (np.shape(values) != shape or not np.isfinite(values).all()):
-                raise InputError(f"{name}: expected finite numbers of shape {shape}, found {np.shape(values)}")
-        if not n or (self.ids is not None and len(self.ids) != n):
-            raise InputError(f"ids: expected one for each of {n} points" if n else "points: found none")
 
 
 #: Reads a file of the ending that it is registered for (entry points of the group `warpbrain.recordings`, named like
@@ -109,10 +68,27 @@ def _of_package(path: Path, read: Reader, problems: Problems) -> TrackedPoints |
     except (ValueError, OSError) as error:
         problems.add(path, "", str(error))
         return None
-    if tracked.ids is not None and tracked.time is None and len(set(tracked.ids)) < len(tracked.ids):
-        problems.add(path, "", "found an id twice, expected each once where there is no time")
-        return None
-    return tracked
+    fault = _fault(tracked)
+    if fault:
+        problems.add(path, "", fault)
+    return None if fault else tracked
+
+
+def _fault(tracked: TrackedPoints) -> str:
+    """What is wrong with points that another package has read; empty if nothing is."""
+    n, ids = len(tracked.points), tracked.ids
+    if not n:
+        return "found no points"
+    shapes = {"points": (n, 3), "displacement": (n, 3), "time": (n,), "sigmas": (n,), "weights": (n,)}
+    for name, shape in shapes.items():
+        values = getattr(tracked, name)
+        if values is not None and (np.shape(values) != shape or not np.isfinite(values).all()):
+            return f"{name}: expected finite numbers of shape {shape}, found {np.shape(values)}"
+    if ids is not None and len(ids) != n:
+        return f"ids: expected one for each of {n} points, found {len(ids)}"
+    if ids is not None and tracked.time is None and len(set(ids)) < n:
+        return "found an id twice, expected each once where there is no time"
+    return ""
 
 
 def _of_csv(path: Path, frame: Frame, problems: Problems) -> TrackedPoints | None:
@@ -122,14 +98,14 @@ def _of_csv(path: Path, frame: Frame, problems: Problems) -> TrackedPoints | Non
     ids = table.words("id") if "id" in table else None
     if ids is not None and "t" not in table:
         _check_unique(table, ids)
-    points = table.vectors(*POSITION), table.vectors(*DISPLACEMENT)
-    time = table.times(strictly=ids is not None, of=ids) if "t" in table else None
-    sigmas = frame.metres * table.bounded("sigma", 0.0, itself=False) if "sigma" in table else None
-    weights = table.bounded("weight", 0.0, itself=True) if "weight" in table else None
-    if problems:
-        return None
-    start, displacement = (frame.lengths(vectors) for vectors in points)
-    return TrackedPoints(points=start, displacement=displacement, time=time, ids=ids, sigmas=sigmas, weights=weights)
+    return TrackedPoints(
+        points=frame.lengths(table.vectors(*POSITION)),
+        displacement=frame.lengths(table.vectors(*DISPLACEMENT)),
+        time=table.times(strictly=ids is not None, of=ids) if "t" in table else None,
+        ids=ids,
+        sigmas=frame.metres * table.bounded("sigma", 0.0, itself=False) if "sigma" in table else None,
+        weights=table.bounded("weight", 0.0, itself=True) if "weight" in table else None,
+    )
 
 
 def _of_tags(path: Path, problems: Problems) -> TrackedPoints | None:

@@ -269,8 +269,9 @@ class HypothesisSearch:
         return replace(fitted, hypothesis=hypothesis).with_evidence(reduced.hypothesis.log_evidence + gain)
 
     def release(self) -> None:
-        """Let go of the linear models about fits, each of which holds factors: 150 MB at 5,000 nodes."""
+        """Let go of factors and of the finer mesh, which no result needs: hundreds of megabytes at 5,000 nodes."""
         self._expanded.clear()
+        self._fitter.finer.release()
 
     def _forget_supersets(self, names: frozenset[str]) -> None:
         """Remove supersets whose linear model is about an earlier fit of a set; expanding it again weighs them anew."""

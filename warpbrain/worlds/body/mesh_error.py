@@ -94,6 +94,10 @@ class FinerStates:
         self.states = states
         self._finer = FinerMesh(states.device)
 
+    def release(self) -> None:
+        """Let go of the finer mesh and of all that was computed on it; a further error makes them anew."""
+        self._finer = FinerMesh(self.states.device)
+
     def errors(self, state: SolvedState, volume: Proposal, prior: Gaussian) -> MeshErrors:
         """The error of a state, and its derivatives by the tissue and by its `volume_of`; `SolveError` as `error`."""
         error, hypothesis = self.error(state.hypothesis, state), state.hypothesis
