@@ -24,6 +24,7 @@ repeated until they are those of the state to 0.1 %, or of the last time step: s
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from hashlib import sha256
 from typing import Any, ClassVar
 
 import numpy as np
@@ -49,6 +50,8 @@ STATES = ("fixed", "sliding", "lifting")
 _SLIP = 1e-4
 #: Distance that is left [m] at which augmentation ends, and displacement of what is stuck.
 _NEAR, _STUCK = 1e-5, 5e-8
+#: Distance fields of a mesh that are kept.
+_KEPT_FIELDS = 4
 #: Part of the largest pressure by which those of friction may differ from those of the state.
 _SETTLED = 1e-3
 
@@ -183,11 +186,9 @@ class ContactTerm(KernelTerm):
         boundary = body.mesh.boundary
         shared = np.isin(boundary, members)
         touching = boundary[shared.any(axis=1)]
-        # what the body's own triangles cannot follow need not be resolved
-        spacing = min(_edge(points, faces), _edge(body.mesh.points, touching))
         # of its own surface only differences count: the smoother, the better
         given = contact.surface is not None
-        self._field = DistanceField(points, faces, spacing, body.mesh.points[members], given, device, precision)
+        self._field = _distance_field(body, points, faces, members, touching, given)
         # a node at the rim of the set touches with what is in the set; one without a face there with all it has
         area = node_areas(body.mesh.points, boundary[shared.all(axis=1)])[members]
         area = np.where(area > 0.0, area, node_areas(body.mesh.points, boundary)[members])
@@ -285,6 +286,24 @@ class ContactTerm(KernelTerm):
         self._found.zero_()
         self._pressing.zero_()
         self._tractions.zero_()
+
+
+def _distance_field(
+    body: Body, points: Floats, faces: NDArray[np.int32], members: Ints, touching: NDArray[np.int32], in_place: bool
+) -> DistanceField:
+    """The distance from a surface near what touches it; the last ones of a mesh are kept."""
+    known = body.mesh.shared.setdefault("distance fields", {})
+    parts = (points, faces, members, touching)
+    digest = sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).digest()
+    key = (body.device.alias, body.precision.name, in_place, digest)
+    if key not in known:
+        for oldest in list(known)[: max(len(known) + 1 - _KEPT_FIELDS, 0)]:
+            known.pop(oldest, None)
+        # what the body's own triangles cannot follow need not be resolved
+        spacing = min(_edge(points, faces), _edge(body.mesh.points, touching))
+        near = body.mesh.points[members]
+        known[key] = DistanceField(points, faces, spacing, near, in_place, body.device, body.precision)
+    return known[key]
 
 
 def _edge(points: Floats, faces: NDArray[np.int32]) -> float:
