@@ -20,32 +20,20 @@ from warpbrain.worlds.body.weighted_set import WeightedSet
 
 @dataclass(frozen=True, eq=False)
 class HeldOutErrors:
-    """Held-out rows with a set of causes and with none.
-
-    Attributes
-    ----------
-    without, explained : Prediction
-    improvement : (part, low, high)
-        Part of the error that is removed, and its 95 % interval.
-    patterns : (low, high)
-        Quantiles of 5 and 95 % of the error [m] with random patterns in the place of mechanisms.
-    """
+    """Held-out rows with a set of causes and with none."""
 
     without: Prediction
     explained: Prediction
+    #: (part, low, high): part of the error that is removed, and its 95 % interval.
     improvement: tuple[float, float, float]
+    #: (low, high): quantiles of 5 and 95 % of the error [m] with random patterns in the place of mechanisms.
     patterns: tuple[float, float]
 
 
 class Confirming:
     """Checks the sets of one search.
 
-    Parameters
-    ----------
-    search : HypothesisSearch
-    draws : int
-        Of rows from each model.
-    random : Generator
+    `draws`: of rows from each model.
     """
 
     def __init__(self, search: HypothesisSearch, draws: int, random: np.random.Generator) -> None:

@@ -15,19 +15,13 @@ from warpbrain.worlds.body.parameters import mechanism_numbers
 
 @dataclass(frozen=True)
 class SizeOverTime:
-    """One parameter of a mechanism at the recorded times.
+    """One parameter of a mechanism at the recorded times."""
 
-    Attributes
-    ----------
-    parameter, says, unit : str
-        Its name, and what it is in words.
-    seconds, values, deviations : tuple of m floats
-        Times [s], and the parameter with its standard deviation in `unit`.
-    """
-
+    #: Its name, and what it is in words.
     parameter: str
     says: str
     unit: str
+    #: Times [s], and the parameter with its standard deviation in `unit`.
     seconds: tuple[float, ...]
     values: tuple[float, ...]
     deviations: tuple[float, ...]
@@ -36,13 +30,7 @@ class SizeOverTime:
 def size_over_time(effect: Effect, z: Floats, covariance: Floats) -> SizeOverTime | None:
     """The parameter that changes most, to first order; None if the size of an effect is no function of time.
 
-    Parameters
-    ----------
-    effect : Effect
-    z : (k,) array
-        Its coordinates.
-    covariance : (k, k) array
-        Of these.
+    `z` (k,): its coordinates. `covariance` (k, k): of these.
     """
     varying = effect.proposed.over_time
     if varying is None:

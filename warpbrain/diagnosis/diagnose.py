@@ -72,17 +72,7 @@ class _Checked:
 class Diagnosing:
     """Diagnoses one case.
 
-    Parameters
-    ----------
-    case : Case
-    options : DiagnosisOptions, optional
-    device : str, optional
-    listener : Listener, optional
-
-    Raises
-    ------
-    InputError
-        If the case has too few recordings for any conclusion, or is a specimen.
+    `InputError` if the case has too few recordings for any conclusion, or is a specimen.
     """
 
     def __init__(
@@ -101,10 +91,7 @@ class Diagnosing:
     def run(self) -> Diagnosis:
         """Run every stage.
 
-        Raises
-        ------
-        SolveError
-            If the case as declared has no equilibrium.
+        `SolveError` if the case as declared has no equilibrium.
         """
         with one_thread_of_blas():
             diagnosis = self._run()

@@ -49,11 +49,7 @@ def distance(sensors: Sensors, errors: Floats) -> float:
 class HeldOut:
     """Predicts the rows of one case.
 
-    Parameters
-    ----------
-    sensors : Sensors
-    local : bool
-        Whether all that acts is local.
+    `local`: whether all that acts is local.
     """
 
     def __init__(self, sensors: Sensors, local: bool) -> None:
@@ -87,17 +83,8 @@ class HeldOut:
         A pattern is a random mixture of the modes of a smooth force with the size that fits best. The best of `tries`
         patterns is taken, as the mechanism is the best of its places.
 
-        Parameters
-        ----------
-        without : GaussianModel
-            Of all else that acts.
-        residual : (n,) array
-        modes : (n, m) array
-            As large as the noise.
-        freedom : int
-            Coefficients of the mechanism.
-        tries : int
-        random : Generator
+        `without`: of all else that acts. `residual` (n,). `modes` (n, m): as large as the noise. `freedom`:
+        coefficients of the mechanism.
         """
         sizes = beliefs("unknown.sizes")
         chosen = []

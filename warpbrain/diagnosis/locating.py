@@ -96,13 +96,7 @@ def ball_of(sites: Floats, weights: Floats) -> tuple[Floats, float]:
 def map_of_search(search: HypothesisSearch, draws: int, random: np.random.Generator, alpha: float = 0.05) -> ScoreMap:
     """The map of what is left of the recordings of a case if nothing acts but what it declares, its tissue fitted.
 
-    Parameters
-    ----------
-    search : HypothesisSearch
-    draws : int
-        Of recordings if nothing else acts.
-    random : Generator
-    alpha : float
+    `draws`: of recordings if nothing else acts.
     """
     nothing = search.nothing
     model = nothing.marginal.model
@@ -122,17 +116,8 @@ def score_map(
 ) -> ScoreMap:
     """The map of residuals (n,).
 
-    Parameters
-    ----------
-    at : Linearisation
-    model : GaussianModel
-        Of noise and nuisances.
-    residual : (n,) array
-    draws : (n, b) array
-        Of rows if no cause acts.
-    length, spacing : float
-        Of patches and between them [m].
-    alpha : float
+    `model`: of noise and nuisances. `residual` (n,). `draws` (n, b): of rows if no cause acts. `length`, `spacing`: of
+    patches and between them [m].
     """
     from scipy.special import chdtrc, chdtri
 

@@ -33,12 +33,7 @@ def next_measurements(
 ) -> tuple[Measurement, ...]:
     """Measurements in the order of how they discriminate between two mechanisms, the first of which is taken for true.
 
-    Parameters
-    ----------
-    base : Base
-    first, second : WeightedSet
-        Sets with the first and with the second mechanism.
-    names : (str, str)
+    `first`, `second`: sets with the first and with the second mechanism. `names` (str, str).
     """
     pairs = zip((first, second), names, strict=True)
     effects = tuple(weighted_set.effects[weighted_set.mechanisms.index(name)] for weighted_set, name in pairs)

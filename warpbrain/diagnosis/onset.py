@@ -57,17 +57,8 @@ class Onset:
 def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianModel, residual: Floats) -> Onset | None:
     """When a cause set in; None where nothing was recorded at several times.
 
-    Parameters
-    ----------
-    base : Base
-    cause : Cause or None
-        The best explanation, as if it acted all the time; None: an unknown force.
-    in_time : bool
-        Whether it changes in time under constant loads.
-    model : GaussianModel
-        Of all else that acts.
-    residual : (n,) array
-        Less what is expected of all else.
+    `cause`: the best explanation, as if it acted all the time; None: an unknown force. `in_time`: whether it changes in
+    time under constant loads. `model`: of all else that acts. `residual` (n,): less what is expected of all else.
     """
     times = np.array(base.states.times)
     if len(times) < 2:

@@ -72,18 +72,8 @@ def traits_of(
 ) -> Traits:
     """Traits of what residuals (n,) show beside noise and nuisances.
 
-    Parameters
-    ----------
-    at : Linearisation
-    model : GaussianModel
-        Of noise and nuisances.
-    residual : (n,) array
-    noise : float
-        Typical noise of displacements [m].
-    length : float
-        Of patches [m].
-    centre : (3,) array
-        About which moments are taken [m].
+    `model`: of noise and nuisances. `residual` (n,). `noise`: typical noise of displacements [m]. `length`: of patches
+    [m]. `centre` (3,): about which moments are taken [m].
     """
     sites, answers = force_patches(at, length)
     # patches on held nodes have no effect
@@ -114,18 +104,11 @@ def traits_of(
 
 @dataclass(frozen=True, eq=False)
 class _Resultant:
-    """Posterior of net force and moment.
+    """Posterior of net force and moment."""
 
-    Attributes
-    ----------
-    mean, covariance : (6,) and (6, 6) array
-    size : float
-        Of the patches, relative to those that move as much as the noise: the likeliest.
-    """
-
-    mean: Floats
-    covariance: Floats
-    size: float
+    mean: Floats  # (6,)
+    covariance: Floats  # (6, 6)
+    size: float  # of the patches, relative to those that move as much as the noise: the likeliest
 
     @classmethod
     def of(

@@ -20,21 +20,13 @@ class Kind(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A cause at one place, level, node set or course.
+    """A cause at one place, level, node set or course."""
 
-    Parameters
-    ----------
-    columns : (n, k) array
-        What a unit of size of each coefficient changes of each row.
-    mean : (n,) array, optional
-        Expected change of each row, whatever the size, such as the weight at a level of the fluid; zero if not given.
-    weight : float
-        Probability among the places of its cause.
-    """
-
-    columns: Floats
+    columns: Floats  # (n, k), what a unit of size of each coefficient changes of each row
+    #: (n,): expected change of each row, whatever the size, such as the weight at a level of the fluid; zero if not
+    #: given.
     mean: Floats | None = None
-    weight: float = 1.0
+    weight: float = 1.0  # probability among the places of its cause
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,21 +35,12 @@ class Cause:
 
     Coefficients are normal with the standard deviation `s`, which is one of a few sizes: a scale mixture, by which the
     prior penalises a small cause no more than a large one.
-
-    Parameters
-    ----------
-    name : str
-    places : tuple of Place
-    log_prior : float
-        Logarithm of the odds that it acts, before anything was recorded.
-    sizes : (s,) array
-        Standard deviations of the coefficients, in units of the columns.
-    kind : Kind
     """
 
     name: str
     places: tuple[Place, ...]
-    log_prior: float
+    log_prior: float  # logarithm of the odds that it acts, before anything was recorded
+    #: (s,): standard deviations of the coefficients, in units of the columns.
     sizes: Floats = field(default_factory=lambda: np.ones(1))
     kind: Kind = Kind.PHYSICS
 

@@ -62,12 +62,7 @@ def decide(
 ) -> tuple[Decision, dict[Decision, float]]:
     """The best verdict, and the expected loss of all that were compared.
 
-    Parameters
-    ----------
-    hypotheses : sequence of Hypothesis
-    probabilities : (h,) array
-    losses : mapping of str to float
-        See `Calibration`.
+    `probabilities` (h,). `losses`: see `Calibration`.
     """
     truths = [Truth.of(hypothesis) for hypothesis in hypotheses]
     expected = {

@@ -21,48 +21,25 @@ class Member:
 
 @dataclass(frozen=True)
 class Configuration:
-    """Causes with places and sizes at a scale of the noise.
-
-    Attributes
-    ----------
-    members : tuple of Member
-    scale : float
-    log_density : float
-        Of it and the rows.
-    log_share : float
-        Of a single cause, the log of the part that its place has in the evidence, all sizes and scales together.
-    """
+    """Causes with places and sizes at a scale of the noise."""
 
     members: tuple[Member, ...]
     scale: float
-    log_density: float
+    log_density: float  # of it and the rows
+    #: Of a single cause, the log of the part that its place has in the evidence, all sizes and scales together.
     log_share: float = 0.0
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A set of causes.
-
-    Attributes
-    ----------
-    causes : tuple of str
-    kinds : tuple of Kind
-        Of each of them.
-    log_evidence : float
-        Log density of the rows, summed over places, sizes and scales.
-    log_prior : float
-        Sum of the log odds of its causes.
-    best : Configuration
-        The most probable one.
-    elsewhere : tuple of Configuration
-        Of a single cause, the most probable ones at other places, the best first.
-    """
+    """A set of causes."""
 
     causes: tuple[str, ...]
-    kinds: tuple[Kind, ...]
-    log_evidence: float
-    log_prior: float
-    best: Configuration
+    kinds: tuple[Kind, ...]  # of each of them
+    log_evidence: float  # log density of the rows, summed over places, sizes and scales
+    log_prior: float  # sum of the log odds of its causes
+    best: Configuration  # the most probable one
+    #: Of a single cause, the most probable ones at other places, the best first.
     elsewhere: tuple[Configuration, ...] = ()
 
     def of_kind(self, kind: Kind) -> tuple[str, ...]:

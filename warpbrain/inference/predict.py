@@ -17,20 +17,11 @@ from warpbrain.inference.gaussian import GaussianModel
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Every block of rows predicted from all others.
+    """Every block of rows predicted from all others."""
 
-    Attributes
-    ----------
-    errors : (n,) array
-        What was recorded less what was predicted.
-    blocks : (n,) int array
-    log_densities : (b,) array
-        Of each block given the others.
-    """
-
-    errors: Floats
-    blocks: Ints
-    log_densities: Floats
+    errors: Floats  # (n,), what was recorded less what was predicted
+    blocks: Ints  # (n,)
+    log_densities: Floats  # (b,), of each block given the others
 
     def improvement(
         self, over: Prediction, rows: Bools, random: np.random.Generator, draws: int = 2000
@@ -57,11 +48,7 @@ class Prediction:
 def predict(model: GaussianModel, residual: Floats, blocks: Ints) -> Prediction:
     """Predict every block of rows.
 
-    Parameters
-    ----------
-    model : GaussianModel
-    residual : (n,) array
-    blocks : (n,) int array
+    `residual` (n,), `blocks` (n,).
     """
     return predict_with(model, residual, blocks, [np.zeros((len(model), 0))])[0]
 
@@ -73,12 +60,7 @@ def predict_with(
 
     With columns `G` the inverse covariance is `P - u (I + G^T u)^-1 u^T`, `u = P G` (Woodbury).
 
-    Parameters
-    ----------
-    model : GaussianModel
-    residual : (n,) array
-    blocks : (n,) int array
-    column_sets : sequence of (n, k) arrays
+    `residual` (n,), `blocks` (n,), `column_sets` (n, k).
     """
     weighted = model.precision_times(residual)
     rows_of = [np.flatnonzero(blocks == block) for block in np.unique(blocks)]
@@ -104,15 +86,8 @@ def log_factors_of_fields(
 ) -> Floats:
     """Log Bayes factor (d,) of a mixture of fields and sizes over none.
 
-    Parameters
-    ----------
-    model : GaussianModel
-    fields : sequence of (n, k) arrays
-    sizes : (s,) array
-        Factors on the columns of a field, all equally probable.
-    residuals : (n, d) array
-    weights : (f,) array, optional
-        Log probability of each field; equal unless given.
+    `fields` (n, k). `sizes` (s,): factors on the columns of a field, all equally probable. `residuals` (n, d).
+    `weights` (f,): log probability of each field; equal unless given.
     """
     white = model.standardised(residuals)
     weights = np.full(len(fields), -np.log(len(fields))) if weights is None else weights

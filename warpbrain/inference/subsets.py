@@ -20,31 +20,17 @@ from warpbrain.inference.hypothesis import Configuration, Hypothesis, Member, Po
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Which sets are summed over.
+    """Which sets are summed over."""
 
-    Parameters
-    ----------
-    scales, log_scale_prior : (k,) array
-        Factors on the noise that are summed over, and the log probability of each.
-    places : int
-        Best places of each cause of which pairs are made.
-    beam : int
-        Best configurations of pairs to which a third cause is added at each scale; 0: no triples.
-    most : int
-        Causes of a set at most.
-    negligible : float
-        Pairs and triples are left out at scales where every single cause is below this part of the greatest density.
-    elsewhere : int
-        Configurations of each single cause at other places than the best that are kept.
-    """
-
+    #: (k,): factors on the noise that are summed over, and the log probability of each.
     scales: Floats
     log_scale_prior: Floats
-    places: int = 50
-    beam: int = 30
-    most: int = 3
+    places: int = 50  # best places of each cause of which pairs are made
+    beam: int = 30  # best configurations of pairs to which a third cause is added at each scale; 0: no triples
+    most: int = 3  # causes of a set at most
+    #: Pairs and triples are left out at scales where every single cause is below this part of the greatest density.
     negligible: float = 1e-4
-    elsewhere: int = 0
+    elsewhere: int = 0  # configurations of each single cause at other places than the best that are kept
 
 
 class _Sums:
@@ -125,13 +111,7 @@ class _Sums:
 def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], search: Search) -> Posterior:
     """Probabilities of sets of at most three causes.
 
-    Parameters
-    ----------
-    model : GaussianModel
-        Of rows (n,) on which no cause acts.
-    residual : (n,) array
-    causes : sequence of Cause
-    search : Search
+    `model`: of rows (n,) on which no cause acts. `residual` (n,).
     """
     sums = _Sums(1 + search.elsewhere)
     by_scale: list[tuple[float, float, Blocks, Floats]] = []
@@ -170,14 +150,7 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
 def likely_places(model: GaussianModel, residual: Floats, causes: Sequence[Cause], most: int) -> dict[str, Ints]:
     """Numbers of the most probable places of each cause by its name, if it acts alone, at the scale of a model.
 
-    Parameters
-    ----------
-    model : GaussianModel
-        Of rows (n,) on which no cause acts.
-    residual : (n,) array
-    causes : sequence of Cause
-    most : int
-        Places of each cause at most.
+    `model`: of rows (n,) on which no cause acts. `residual` (n,). `most`: places of each cause at most.
     """
     blocks = Blocks(model, residual, causes)
     chosen = _best_places(blocks, blocks.log_factors() + blocks.log_weights, most)

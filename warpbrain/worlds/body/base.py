@@ -46,55 +46,26 @@ _UNSEEN = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """The base state and everything that is linear about it.
-
-    Attributes
-    ----------
-    states : States
-    prior : Gaussian
-        Of the tissues' parameters.
-    declared : SolvedState
-        The case as declared.
-    state : SolvedState
-        The base.
-    at : Linearisation
-    effects : Effects
-    switch_states : dict of str to SolvedState
-        States with a switch that were solved for them, by the mechanism.
-    nuisances : Nuisances
-    unknown : dict of str to (n, k) array
-        Columns of unknown fields, of 1 m.
-    model : GaussianModel
-        Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
-    noises : tuple of GaussianModel
-        The same noise without columns, and with what the mesh does not resolve, of each size of `mesh.unresolved`; of
-        the first alone where all are next to nothing.
-    noise : (n,) array
-        Standard deviation of the independent noise of each row.
-    points : tuple of int arrays
-        Rows of each recorded point.
-    residual : (n,) array
-        Of the linear model with all nuisances at their prior mean.
-    mesh_errors : MeshErrors or None
-        Of the base; None: the mesh is taken for exact.
-    remarks : tuple of str
-    """
+    """The base state and everything that is linear about it."""
 
     states: States
-    prior: Gaussian
-    declared: SolvedState
-    state: SolvedState
+    prior: Gaussian  # of the tissues' parameters
+    declared: SolvedState  # the case as declared
+    state: SolvedState  # the base
     at: Linearisation
     effects: Effects
-    switch_states: dict[str, SolvedState]
+    switch_states: dict[str, SolvedState]  # states with a switch that were solved for them, by the mechanism
     nuisances: Nuisances
-    unknown: dict[str, Floats]
+    unknown: dict[str, Floats]  # (n, k), columns of unknown fields, of 1 m
+    #: Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
     model: GaussianModel
+    #: The same noise without columns, and with what the mesh does not resolve, of each size of `mesh.unresolved`; of
+    #: the first alone where all are next to nothing.
     noises: tuple[GaussianModel, ...]
-    noise: Floats
-    points: tuple[Ints, ...]
-    residual: Floats
-    mesh_errors: MeshErrors | None
+    noise: Floats  # (n,), standard deviation of the independent noise of each row
+    points: tuple[Ints, ...]  # rows of each recorded point
+    residual: Floats  # (n,), of the linear model with all nuisances at their prior mean
+    mesh_errors: MeshErrors | None  # of the base; None: the mesh is taken for exact
     remarks: tuple[str, ...]
 
     @property
@@ -120,16 +91,7 @@ class Base:
 class BaseFinder:
     """Finds the base of a case.
 
-    Parameters
-    ----------
-    states : States
-    spacing : float
-        Between sites [m].
-    mesh_error : bool
-    without_nuisances : bool
-    listener : Listener
-    prior : Gaussian, optional
-        Of the tissues' parameters, if it is not `tissue_prior`.
+    `spacing`: between sites [m]. `prior`: of the tissues' parameters, if it is not `tissue_prior`.
     """
 
     def __init__(
@@ -156,10 +118,7 @@ class BaseFinder:
     def find(self) -> Base:
         """The base state.
 
-        Raises
-        ------
-        SolveError
-            If the case as declared has no equilibrium.
+        `SolveError` if the case as declared has no equilibrium.
         """
         self._listener.stage("the case as declared")
         declared = self.states.solve(self._declared())
@@ -310,14 +269,7 @@ def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats
     It depends on the mesh, the load and the sensors; if it is overestimated it hides what is missing. Its evidence is
     that of models with and without a smooth force, so that a missing cause is not taken for an error of the mesh.
 
-    Parameters
-    ----------
-    nuisances : Nuisances
-    factor : (n, n) array
-        Of the noise.
-    residual : (n,) array
-    smooth : (n, k) array
-        Columns of a smooth force as large as the noise.
+    `factor` (n, n): of the noise. `residual` (n,). `smooth` (n, k): columns of a smooth force as large as the noise.
     """
     from scipy.special import logsumexp, softmax
 

@@ -22,17 +22,10 @@ UNKNOWN = "unknown"
 
 @dataclass(frozen=True, eq=False)
 class BodyCauses:
-    """Causes, and the effects of mechanisms at their places.
-
-    Attributes
-    ----------
-    causes : tuple of Cause
-    effects : mapping of str to tuple of Effect
-        Of each mechanism, by place.
-    """
+    """Causes, and the effects of mechanisms at their places."""
 
     causes: tuple[Cause, ...]
-    effects: Mapping[str, tuple[Effect, ...]]
+    effects: Mapping[str, tuple[Effect, ...]]  # of each mechanism, by place
 
     def named(self, name: str) -> Cause:
         """A cause by its name."""
@@ -62,11 +55,7 @@ def visible(causes: BodyCauses, model: GaussianModel) -> BodyCauses:
     A set with a cause that changes nothing is as probable as without it: many of them would share the probability of
     what acts, and tell of nothing. Their sizes are believed, but no verdict depends on them.
 
-    Parameters
-    ----------
-    causes : BodyCauses
-    model : GaussianModel
-        Of the rows without them.
+    `model`: of the rows without them.
     """
     least = belief("checks.invisible")
     return replace(causes, causes=tuple(cause for cause in causes.causes if _length(cause, model) > least))

@@ -35,19 +35,11 @@ RADII, BETWEEN = (0.154, 0.231, 0.354, 0.538, 0.815), 0.215
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:
-    """Proposals by kind.
-
-    Attributes
-    ----------
-    situation : Situation
-    proposals : dict of str to tuple of Proposal
-    rejected : dict of str to str
-        Kinds that are not tried, and why.
-    """
+    """Proposals by kind."""
 
     situation: Situation
     proposals: dict[str, tuple[Proposal, ...]]
-    rejected: dict[str, str]
+    rejected: dict[str, str]  # kinds that are not tried, and why
 
 
 def situation_of(case: Case, instants: int = 1) -> Situation:
@@ -107,20 +99,8 @@ def dictionary_of(
 ) -> Dictionary:
     """Proposals of all kinds, or of some.
 
-    Parameters
-    ----------
-    case : Case
-    kinds : sequence of str, optional
-    instants : int
-        See `Situation`.
-    times : sequence of float
-        Of states that are looked at [s]: with several, what may change from one to the next is proposed with a course,
-        too.
-
-    Raises
-    ------
-    InputError
-        If there is no such kind.
+    `instants`: see `Situation`. `times`: of states that are looked at [s]: with several, what may change from one to
+    the next is proposed with a course, too. `InputError` if there is no such kind.
     """
     registry = mechanisms()
     requested = list(registry) if kinds is None else list(kinds)
@@ -158,25 +138,13 @@ def _composable(case: Case, mesh: TetMesh, proposals: Sequence[Proposal]) -> tup
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Effects of all proposals at one state.
-
-    Attributes
-    ----------
-    effects : tuple of Effect
-    of_kind : dict of str to int array
-        Numbers of the effects of each kind.
-    alternatives : frozenset of str
-        Kinds that are no physics.
-    rejected : dict of str to str
-    source : Effects or None
-        Which made them at a state; None if they were given.
-    """
+    """Effects of all proposals at one state."""
 
     effects: tuple[Effect, ...]
-    of_kind: dict[str, Ints]
-    alternatives: frozenset[str]
+    of_kind: dict[str, Ints]  # numbers of the effects of each kind
+    alternatives: frozenset[str]  # kinds that are no physics
     rejected: dict[str, str]
-    source: Effects | None = None
+    source: Effects | None = None  # which made them at a state; None if they were given
 
 
 def candidates_at(
@@ -264,14 +232,7 @@ def candidates_about_fit(
     Switches, courses in time and what is no physics keep their columns at the base, as do all at improbable places. A
     kind of which a case has only one is left out if it acts already.
 
-    Parameters
-    ----------
-    state : SolvedState
-    acting : sequence of Effect
-    candidates : Candidates
-        At the base.
-    places : mapping of str to int array
-        Of each kind, numbers of the places whose columns are made anew.
+    `candidates`: at the base. `places`: of each kind, numbers of the places whose columns are made anew.
     """
     mesh_errors = None if candidates.source is None else candidates.source.mesh_errors
     effects = Effects(state.linearised(), mesh_errors=mesh_errors)

@@ -28,16 +28,7 @@ _LOADS = "known loads"
 def displacement_deviation(weighted_set: WeightedSet, base: Base) -> Floats:
     """Standard deviation (N, 3) [m] of each component of the displacement under a set: see the module.
 
-    Parameters
-    ----------
-    weighted_set : WeightedSet
-        Fitted, or without any cause.
-    base : Base
-
-    Raises
-    ------
-    SolveError
-        If a mechanism is not linear about the fit.
+    `weighted_set`: fitted, or without any cause. `SolveError` if a mechanism is not linear about the fit.
     """
     columns = displacement_columns(weighted_set, base)
     refit = weighted_set.refit
@@ -54,10 +45,7 @@ def displacement_deviation(weighted_set: WeightedSet, base: Base) -> Floats:
 def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
     """Displacement (3 N, q + k) [m] of every node by a standard deviation of each coordinate of a fit.
 
-    Raises
-    ------
-    SolveError
-        As `displacement_deviation`.
+    `SolveError`: as `displacement_deviation`.
     """
     refit = weighted_set.refit
     effects: tuple[Effect, ...] = ()

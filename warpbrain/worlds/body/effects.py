@@ -44,23 +44,12 @@ class SwitchEffects(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """A proposal as columns over the sensors: `mean + columns z`, `z ~ N(0, I)`.
+    """A proposal as columns over the sensors: `mean + columns z`, `z ~ N(0, I)`."""
 
-    Attributes
-    ----------
-    proposal : Proposal or None
-        None of what is no physics.
-    mean : (n,) array
-        At the prior mean of the coefficients.
-    columns : (n, k) array
-        Of one standard deviation of each.
-    columns_at : callable, or None
-        Of a course in time: from its coefficients (k,) to the columns (n, k) about them.
-    """
-
-    proposal: Proposal | None
-    mean: Floats
-    columns: Floats
+    proposal: Proposal | None  # None of what is no physics
+    mean: Floats  # (n,), at the prior mean of the coefficients
+    columns: Floats  # (n, k), of one standard deviation of each
+    #: Of a course in time: from its coefficients (k,) to the columns (n, k) about them.
     columns_at: Callable[[Floats], Floats] | None = None
 
     @property
@@ -92,13 +81,8 @@ def column_slices(effects: Sequence[Effect], first: int) -> tuple[slice, ...]:
 class Effects:
     """Makes the columns of proposals at one state.
 
-    Parameters
-    ----------
-    at : Linearisation
-    switches : SwitchEffects, optional
-        Needed for proposals that are switches.
-    mesh_errors : MeshErrors, optional
-        Of the state: less compressible tissue locks more, which is part of the effect of a law.
+    `switches`: needed for proposals that are switches. `mesh_errors`: of the state: less compressible tissue locks
+    more, which is part of the effect of a law.
     """
 
     def __init__(
@@ -116,11 +100,7 @@ class Effects:
     def of(self, proposals: Sequence[Proposal], present: Mechanism | None = None) -> list[Effect]:
         """Columns of each proposal, with what they have in common computed once.
 
-        Parameters
-        ----------
-        proposals : sequence of Proposal
-        present : Mechanism, optional
-            Mechanism of that kind that acts at the state already.
+        `present`: mechanism of that kind that acts at the state already.
         """
         bases = [proposal if proposal.over_time is None else proposal.over_time.base for proposal in proposals]
         if not self.at.moments:

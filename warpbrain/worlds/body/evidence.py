@@ -27,21 +27,9 @@ _NEGLIGIBLE = 1e-2
 def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.0) -> tuple[Floats, Marginal]:
     """Evidence of residuals, and the columns with the most probable size of the smooth part.
 
-    Parameters
-    ----------
-    base : Base
-    columns : (n, q) array
-        Of nuisances and causes.
-    residual : (n,) array
-        Less what is expected of the causes.
-    scale : float
-        A factor on the noise near the most probable one.
-
-    Returns
-    -------
-    columns : (n, q) array
-    marginal : Marginal
-        With these columns and the most probable noise; its log evidence is the mean over all sizes.
+    `columns` (n, q): of nuisances and causes. `residual` (n,): less what is expected of the causes. `scale`: a factor
+    on the noise near the most probable one. Returns the columns (n, q), and the marginal with these columns and the
+    most probable noise; its log evidence is the mean over all sizes.
     """
     nuisances, fractions = base.nuisances, beliefs("mesh.unknown")
     part = nuisances.part(UNKNOWN_MESH)

@@ -54,38 +54,19 @@ class _Grown(Mechanism):
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """Rows that are compared with, or counted from, the state of one time.
+    """Rows that are compared with, or counted from, the state of one time."""
 
-    Attributes
-    ----------
-    number : int
-        Of the time.
-    time : float
-        [s]
-    at : Linearisation
-        About that state, of these rows.
-    rows : (k,) int array
-    sign : float
-        -1 if they are counted from it.
-    """
-
-    number: int
-    time: float
-    at: Linearisation
-    rows: Ints
-    sign: float
+    number: int  # of the time
+    time: float  # [s]
+    at: Linearisation  # about that state, of these rows
+    rows: Ints  # (k,)
+    sign: float  # -1 if they are counted from it
 
 
 class Linearisation:
     """A state of a system, and the response of the sensors to forces there.
 
-    Parameters
-    ----------
-    system : System
-    u, reactions : (N, 3) array
-        An equilibrium of it [m], [N].
-    sensors : Sensors
-        At that state.
+    `u`, `reactions` (N, 3): an equilibrium of it [m], [N]. `sensors`: at that state.
     """
 
     def __init__(self, system: System, u: Floats, reactions: Floats, sensors: Sensors) -> None:
@@ -107,10 +88,8 @@ class Linearisation:
     def in_time(self, states: Sequence[tuple[float, Linearisation, float]]) -> Linearisation:
         """The same, where rows are of states at several times or are counted from one.
 
-        Parameters
-        ----------
-        states : sequence of (float, Linearisation, float)
-            Of each time [s] that time, the linear model about its state, and the part of the last state that it is.
+        `states`: of each time [s] that time, the linear model about its state, and the part of the last state that it
+        is.
         """
         other = copy.copy(self)
         other._states = tuple(states)
@@ -133,10 +112,7 @@ class Linearisation:
     def summed(self, answer: Callable[[Linearisation], Floats]) -> Floats:
         """What something changes of each row (n, ...): at its time, less at that from which it is counted.
 
-        Parameters
-        ----------
-        answer : callable
-            From the linear model about one state to what it changes of the rows of that.
+        `answer`: from the linear model about one state to what it changes of the rows of that.
         """
         if not self.moments:
             return answer(self)
@@ -198,17 +174,8 @@ class Linearisation:
 
         They slide along the surface; where they are under tension they also leave it, if they can.
 
-        Parameters
-        ----------
-        patch : (N,) bool array
-        held : (N,) bool array
-            The surface that the patch is a part of, all of whose components are held.
-        lifts : bool
-
-        Raises
-        ------
-        SolveError
-            If too little holds the body without the patch.
+        `patch` (N,). `held` (N,): the surface that the patch is a part of, all of whose components are held.
+        `SolveError` if too little holds the body without the patch.
         """
         key = held.tobytes()
         with self._surface_lock:

@@ -30,13 +30,7 @@ _MOVES, _STEP, _BETTER = 3, 0.25, 1.0
 def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:
     """A fitted set, fitted again where its mechanisms are better placed.
 
-    Parameters
-    ----------
-    base : Base
-    fitter : Fitter
-    fitted : WeightedSet
-    spacing : float
-        Between the places of a scan [m].
+    `spacing`: between the places of a scan [m].
     """
     for _ in range(_MOVES):
         assert fitted.refit is not None

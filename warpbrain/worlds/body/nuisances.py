@@ -43,42 +43,21 @@ _STEP = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Nuisances of one kind.
-
-    Attributes
-    ----------
-    name : str
-    columns : (n, k) array
-        Change of what is recorded by one standard deviation of each.
-    """
+    """Nuisances of one kind."""
 
     name: str
-    columns: Floats
+    columns: Floats  # (n, k), change of what is recorded by one standard deviation of each
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisances:
-    """All of them.
+    """All of them."""
 
-    Attributes
-    ----------
-    families : tuple of Family
-        The first is the tissue's parameters, the second the stiffness field.
-    anchors : (a, 3) array
-        Points [m] of the kernel functions of the unknown part of the mesh's error.
-    fraction : float
-        That part, relative to the displacement.
-    displacement : (n,) array
-        Of the state at each row [m]; zero of forces.
-    relative : (n, k) array
-        Columns of that part if it were as large as a displacement of 1 m.
-    """
-
-    families: tuple[Family, ...]
-    anchors: Floats
-    fraction: float
-    displacement: Floats
-    relative: Floats
+    families: tuple[Family, ...]  # the first is the tissue's parameters, the second the stiffness field
+    anchors: Floats  # (a, 3), points [m] of the kernel functions of the unknown part of the mesh's error
+    fraction: float  # that part, relative to the displacement
+    displacement: Floats  # (n,), of the state at each row [m]; zero of forces
+    relative: Floats  # (n, k), columns of that part if it were as large as a displacement of 1 m
 
     @property
     def columns(self) -> Floats:

@@ -14,16 +14,7 @@ from warpbrain.worlds.body.states import States
 class RigidMotion:
     """The motion that recordings are taken to have been moved by, as coordinates of a fit.
 
-    Parameters
-    ----------
-    states : States
-        By whose motion sensors are realigned.
-    nuisances : Nuisances
-
-    Attributes
-    ----------
-    part : slice
-        Of the coordinates.
+    `states`: by whose motion sensors are realigned. `part`: of the coordinates.
     """
 
     def __init__(self, states: States, nuisances: Nuisances) -> None:

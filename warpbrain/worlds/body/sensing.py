@@ -16,14 +16,7 @@ from warpbrain.worlds.body.sensors import Sensors
 def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Floats) -> Floats:
     """Standard deviation (n,) of each row.
 
-    Parameters
-    ----------
-    sensors : Sensors
-    residual : (n,) array
-    nuisances : (n, k) array
-        Columns of one standard deviation.
-    field : (n, k) array
-        Of a smooth force of 1 m.
+    `residual` (n,). `nuisances` (n, k): columns of one standard deviation. `field` (n, k): of a smooth force of 1 m.
     """
     undeclared = np.isnan(sensors.sigma)
     if not undeclared.any():

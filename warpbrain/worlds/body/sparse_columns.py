@@ -12,15 +12,7 @@ from warpbrain.arrays import Floats, Ints
 class SparseColumns:
     """Collects columns of one length; those that are zero are left out.
 
-    Parameters
-    ----------
-    size : int
-        Rows.
-
-    Attributes
-    ----------
-    numbers : list of int
-        Under which those that are not zero were added.
+    `size`: rows. `numbers`: under which those that are not zero were added.
     """
 
     def __init__(self, size: int) -> None:

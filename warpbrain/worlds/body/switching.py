@@ -14,17 +14,8 @@ from warpbrain.worlds.body.states import SolvedState, States
 class SolvedSwitches:
     """Effects of mechanisms on the sensors by solving the state with each.
 
-    Parameters
-    ----------
-    states : States
-    state : SolvedState
-        Without the mechanisms.
-    sensors : Sensors
-        Whose response is computed.
-    solved_states : dict of str to SolvedState
-        States that were solved already, by the mechanism; further ones are added.
-    instant : int
-        Number of the time of the states.
+    `state`: without the mechanisms. `sensors`: whose response is computed. `solved_states`: states that were solved
+    already, by the mechanism; further ones are added. `instant`: number of the time of the states.
     """
 
     def __init__(

@@ -29,22 +29,13 @@ _SHAPES: dict[str, Callable[[Floats], Floats]] = {
 
 @dataclass(frozen=True)
 class TimeCourse:
-    """An interval of onset and a shape.
+    """An interval of onset and a shape."""
 
-    Attributes
-    ----------
-    interval : int
-        Number of the interval in which it begins.
-    begin, end : float
-        The first time of that interval, and the last recorded one [s].
-    shape : str
-        In words.
-    """
-
-    interval: int
+    interval: int  # number of the interval in which it begins
+    #: The first time of that interval, and the last recorded one [s].
     begin: float
     end: float
-    shape: str
+    shape: str  # in words
 
     def factor(self, times: Floats) -> Floats:
         """Part (n,) of its full size at times (n,) [s]."""

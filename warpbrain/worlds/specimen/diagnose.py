@@ -39,19 +39,8 @@ Ordered = Sequence[tuple[CauseSet, float]]
 class DiagnosingSpecimen:
     """Diagnoses the tests of one case.
 
-    Parameters
-    ----------
-    case : Case
-        With a specimen.
-    options : DiagnosisOptions, optional
-    device : str, optional
-        Of the finite elements that glued ends need.
-    listener : Listener, optional
-
-    Raises
-    ------
-    InputError
-        If the case has no tests, too few rows for any conclusion, or assumes what a homogeneous state has not.
+    `case`: with a specimen. `device`: of the finite elements that glued ends need. `InputError` if the case has no
+    tests, too few rows for any conclusion, or assumes what a homogeneous state has not.
     """
 
     def __init__(
@@ -72,10 +61,7 @@ class DiagnosingSpecimen:
     def run(self) -> SpecimenDiagnosis:
         """Every stage.
 
-        Raises
-        ------
-        InputError
-            If the declared law finds no state in the tests.
+        `InputError` if the declared law finds no state in the tests.
         """
         with one_thread_of_blas():
             return self._run()

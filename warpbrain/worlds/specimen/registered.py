@@ -39,10 +39,7 @@ def effects_of(
 ) -> tuple[tuple[Effect, ...], dict[str, str]]:
     """Causes that are looked for, the unknown last, and why others are not; all unless some are wanted by name.
 
-    Raises
-    ------
-    InputError
-        If one is wanted that nobody knows.
+    `InputError` if one is wanted that nobody knows.
     """
     shown, situation = _shown(protocol), _situation(case, 2 if _tells_time(protocol) else 1)
     found: dict[str, Effect] = {}
