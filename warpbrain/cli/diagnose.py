@@ -49,7 +49,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from warpbrain.worlds.listener import Listener
+    from warpbrain.estimation.options import Listener
     from warpbrain.worlds.options import DiagnosisOptions
 
     kinds = None if options.candidates == "all" else tuple(options.candidates.split(","))
@@ -88,7 +88,7 @@ def _run(options: argparse.Namespace) -> None:
         say(f"  {text}")
 
     with Progress("diagnosis", options.quiet) as progress:
-        diagnosing = run(case, asked, device, Listener(on_stage, progress.show))
+        diagnosing = run(case, asked, device, Listener(on_stage))
         out = choose_folder(options.out, f"warpbrain-diagnose-{safe_name(case.name)}", options.overwrite)
         note_case(record, case, device)
         say(case.title)

@@ -15,8 +15,9 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.options import Listener
 from warpbrain.estimation.parameters import Gaussian
-from warpbrain.estimation.prior import declared
+from warpbrain.estimation.prior import declared, tissue_prior
 from warpbrain.estimation.registration import registration_of
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
@@ -24,17 +25,14 @@ from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_er
 from warpbrain.inference.noise import outliers, scales
 from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
-from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.effects import Effects, SolvedSwitches
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
 from warpbrain.worlds.body.sensing import factor_of_noise, noise_of
 from warpbrain.worlds.body.sensors import Sensors, rows_of_points, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
-from warpbrain.worlds.body.switching import SolvedSwitches
-from warpbrain.worlds.body.tissue_prior import tissue_prior
 from warpbrain.worlds.body.unknown import body_forces, fields
-from warpbrain.worlds.listener import Listener
 
 #: Gauss-Newton steps at most; the last one moves tissue and field by less than this [standard deviations].
 _STEPS, _CONVERGED = 6, 0.5

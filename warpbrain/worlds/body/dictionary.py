@@ -19,12 +19,12 @@ from warpbrain.physics.load import Load
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.threads import in_threads
-from warpbrain.worlds.body.courses import over_time
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.states import SolvedState
 from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, named_triangles, with_free_surfaces
+from warpbrain.worlds.body.time_courses import over_time
 
 #: About how many sites a scan has in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 480

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
 from warpbrain.physics.proposal import Proposal, Varying
+from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.model import substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
@@ -22,6 +23,7 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.sparse_columns import SparseColumns
+from warpbrain.worlds.body.states import SolvedState, States
 
 #: Part of a standard deviation by which a smooth or a fading proposal is differentiated.
 _STEP = 1e-3
@@ -32,14 +34,37 @@ _PUSHING: frozenset[type] = frozenset((Load, Following, Substituting))
 _ACTING = _PUSHING | {Weakening, Growing}
 
 
-class SwitchEffects(Protocol):
-    """Effects of switches, which are solved, not differentiated: `warpbrain.worlds.body.switching.SolvedSwitches`."""
+class SolvedSwitches:
+    """Effects of switches, such as contact, that have no derivative: states with each are solved, and kept.
 
-    def at(self, instant: int, sensors: Sensors) -> SwitchEffects:
-        """The same of other sensors, at the time of a number."""
+    `state`: without the mechanisms. `sensors`: whose response is computed. `solved_states`: states that were solved
+    already, by the mechanism; further ones are added. `instant`: number of the time of the states.
+    """
+
+    def __init__(
+        self,
+        states: States,
+        state: SolvedState,
+        sensors: Sensors,
+        solved_states: dict[str, SolvedState],
+        instant: int = -1,
+    ) -> None:
+        self._states, self._state, self._sensors = states, state, sensors
+        self._solved_states, self._instant = solved_states, instant
+
+    def at(self, instant: int, sensors: Sensors) -> SolvedSwitches:
+        """The same of other sensors at the time of a number."""
+        return SolvedSwitches(self._states, self._state, sensors, self._solved_states, instant)
 
     def effect_of(self, mechanism: Mechanism) -> Floats:
         """What sensors (n,) record in the state with a mechanism, less that without it."""
+        key, state = repr(mechanism), self._state
+        if key not in self._solved_states:
+            hypothesis = replace(state.hypothesis, mechanisms=(mechanism,))
+            # the loads act already: one load step, or the state is taken not to exist
+            self._solved_states[key] = self._states.solve(hypothesis, state.u, iterations=EquilibriumOptions.max_newton)
+        solved, without = self._solved_states[key].instants[self._instant], state.instants[self._instant]
+        return self._sensors.answer(solved.u - without.u, solved.reactions - without.reactions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +111,7 @@ class Effects:
     """
 
     def __init__(
-        self, at: Linearisation, switches: SwitchEffects | None = None, mesh_errors: MeshErrors | None = None
+        self, at: Linearisation, switches: SolvedSwitches | None = None, mesh_errors: MeshErrors | None = None
     ) -> None:
         self.at = at
         self.mesh_errors = mesh_errors

@@ -15,6 +15,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.options import Listener
 from warpbrain.inference import GaussianModel, Posterior, Search, posterior
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
@@ -34,7 +35,6 @@ from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighing import weigh, with_refined_places
 from warpbrain.worlds.body.weighted_set import WeightedSet
-from warpbrain.worlds.listener import Listener
 
 #: Places of each cause of which pairs are made, and sets that are weighed with gross errors of their own.
 _PLACES, _SETS = 20, 12

@@ -9,6 +9,7 @@ import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
+from warpbrain.estimation.options import Listener
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import after_checks
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
@@ -17,7 +18,6 @@ from warpbrain.recordings.recording import TestRecording
 from warpbrain.seconds import Seconds
 from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.threads import one_thread_of_blas
-from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import Checker, grown_errors, score
 from warpbrain.worlds.specimen.fit import Fit, fit

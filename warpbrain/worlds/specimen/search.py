@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.hypothesis import Configuration, Hypothesis, Posterior
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import Search, posterior
-from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.specimen.effects import Effect
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit, fit
 from warpbrain.worlds.specimen.forward import Component
