@@ -202,6 +202,5 @@ def assumptions_of(case: Case, base: Base, best: WeightedSet) -> tuple[str, ...]
             f"{len(gross)} points contradict all that surrounds them{f', with {acting},' if acting else ''} and are "
             f"taken for gross errors: {sorted(gross)}."
         )
-    families = ", ".join(family.name for family in base.nuisances.families)
-    assumptions.append(f"Allowed to explain residuals first: {families}.")
+    assumptions.append(f"Allowed to explain residuals first: {', '.join(base.nuisances.families)}.")
     return tuple(assumptions)

@@ -23,6 +23,7 @@ from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
 from warpbrain.estimation.within_element import change_over_element
+from warpbrain.inference.noise import noise_covariance
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import feature_normals
 from warpbrain.recordings.closest import closest_points
@@ -86,6 +87,10 @@ class Sensors:
         rows = np.flatnonzero(self.is_displacement)
         ends = np.flatnonzero(np.diff(self.groups[rows])) + 1
         return tuple(np.split(rows, ends)) if len(rows) else ()
+
+    def noise_covariance(self, sigma: Floats, unresolved: Floats | None = None) -> Floats:
+        """Covariance (n, n) of the noise at a scale of 1; `unresolved` (n, 3) as of `warpbrain.inference.noise`."""
+        return noise_covariance(self.positions, self.directions, self.times, sigma, self.radius, unresolved)
 
     def of_rows(self, rows: Ints | Bools, time: float | None = None) -> Sensors:
         """Some of the rows (k,), or (n,) bool; with `time` [s] as if recorded then, and counted from rest."""

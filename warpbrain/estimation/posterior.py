@@ -125,14 +125,6 @@ class Posterior(Shown):
         ends = [50.0 - 50.0 * probability, 50.0 + 50.0 * probability]
         return np.asarray(np.percentile(self.chain.theta, ends, axis=0).T)
 
-    def probability_below(self, theta: Floats) -> Floats:
-        """Of each parameter, shape (p,), that it is less than that of a vector (p,)."""
-        from scipy.special import ndtr
-
-        if self.chain is None:
-            return np.asarray(ndtr((theta - self.theta) / self.best.laplace.standard_deviations))
-        return np.asarray(np.mean(self.chain.theta < theta, axis=0))
-
     @cached_property
     def marginals(self) -> tuple[Marginal, ...]:
         """Each parameter."""

@@ -1,12 +1,9 @@
-"""Sets of causes as hypotheses, and their posterior probabilities."""
+"""Sets of causes as hypotheses."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from warpbrain.arrays import Floats
 from warpbrain.inference.causes import Kind
 
 
@@ -45,17 +42,3 @@ class Hypothesis:
     def of_kind(self, kind: Kind) -> tuple[str, ...]:
         """Its causes of a kind."""
         return tuple(cause for cause, other in zip(self.causes, self.kinds, strict=True) if other is kind)
-
-
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """Sets of causes, the most probable first."""
-
-    hypotheses: tuple[Hypothesis, ...]
-
-    @property
-    def probabilities(self) -> Floats:
-        """Of each hypothesis."""
-        from scipy.special import softmax
-
-        return np.asarray(softmax([hypothesis.log_evidence + hypothesis.log_prior for hypothesis in self.hypotheses]))

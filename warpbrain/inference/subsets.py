@@ -15,7 +15,7 @@ from warpbrain.arrays import Floats, Ints
 from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.hypothesis import Configuration, Hypothesis, Member, Posterior
+from warpbrain.inference.hypothesis import Configuration, Hypothesis, Member
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +108,10 @@ class _Sums:
         return tuple(sorted(others, key=lambda configuration: -configuration.log_density)[: self._places - 1])
 
 
-def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], search: Search) -> Posterior:
-    """Probabilities of sets of at most three causes.
+def posterior(
+    model: GaussianModel, residual: Floats, causes: Sequence[Cause], search: Search
+) -> tuple[Hypothesis, ...]:
+    """Evidence of sets of at most three causes, the most probable first.
 
     `model`: of rows (n,) on which no cause acts. `residual` (n,).
     """
@@ -142,9 +144,7 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
         )
         for members, log in sums.logs.items()
     ]
-    return Posterior(
-        tuple(sorted(hypotheses, key=lambda hypothesis: -(hypothesis.log_evidence + hypothesis.log_prior)))
-    )
+    return tuple(sorted(hypotheses, key=lambda hypothesis: -(hypothesis.log_evidence + hypothesis.log_prior)))
 
 
 def likely_places(model: GaussianModel, residual: Floats, causes: Sequence[Cause], most: int) -> dict[str, Ints]:

@@ -22,15 +22,14 @@ from warpbrain.estimation.registration import registration_of
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
-from warpbrain.inference.noise import outliers, scales
+from warpbrain.inference.noise import noise_factor, outliers, scales
 from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
 from warpbrain.worlds.body.effects import Effects, SolvedSwitches
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
-from warpbrain.worlds.body.sensing import factor_of_noise, noise_of
-from warpbrain.worlds.body.sensors import Sensors, rows_of_points, tracked_points
+from warpbrain.worlds.body.sensors import Sensors, noise_of, rows_of_points, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
 from warpbrain.worlds.body.unknown import body_forces, fields
 
@@ -232,7 +231,7 @@ class _LinearModel:
         #: Columns of smooth forces as large as the residuals.
         self.smooth_force = size * smooth
         self.noise = noise_of(sensors, self.residual, self.nuisances.columns, smooth)
-        self.noise_factor = factor_of_noise(sensors, self.noise)
+        self.noise_factor = noise_factor(sensors.noise_covariance(self.noise), self.noise)
         self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
         self.points = tuple(rows for group in rows_of_points(sensors) for rows in group)
 
@@ -256,8 +255,8 @@ def _noises(linear: _LinearModel, resolved: bool) -> tuple[GaussianModel, ...]:
     visible = sizes.max() * np.linalg.norm(sensors.over_element, axis=1) > _UNSEEN * linear.noise
     factors = [linear.noise_factor]
     for size in sizes[1:].tolist() if visible.any() and not resolved else []:
-        beyond = size * sensors.over_element
-        factors.append(factor_of_noise(sensors, linear.noise, beyond))
+        covariance = sensors.noise_covariance(linear.noise, size * sensors.over_element)
+        factors.append(noise_factor(covariance, linear.noise))
     return tuple(GaussianModel(factor, nothing) for factor in factors)
 
 

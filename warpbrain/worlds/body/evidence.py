@@ -34,7 +34,7 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
     nuisances, fractions = base.nuisances, beliefs("mesh.unknown")
     part = nuisances.part(UNKNOWN_MESH)
     # of nothing that moves, or where no displacement was recorded, there is one size
-    moving = nuisances.families[-1].columns.any()
+    moving = nuisances.families[UNKNOWN_MESH].any()
     fractions = fractions if moving else np.ones(1)
     others = np.delete(columns, np.r_[part], axis=1) if moving else columns
     models, relative = [noise.of_noise(others) for noise in base.noises], None

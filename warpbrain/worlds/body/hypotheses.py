@@ -16,7 +16,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.options import Listener
-from warpbrain.inference import GaussianModel, Posterior, Search, posterior
+from warpbrain.inference import GaussianModel, Search, posterior
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.hypothesis import Hypothesis
@@ -362,8 +362,8 @@ def _search(most: int) -> Search:
     return Search(values, log_prior, places=_PLACES, beam=0, most=most, elsewhere=_ELSEWHERE)
 
 
-def _most_probable(screened: Posterior, singles: bool = True) -> list[Hypothesis]:
+def _most_probable(screened: Sequence[Hypothesis], singles: bool = True) -> list[Hypothesis]:
     """The most probable sets, that without any cause, and every single cause if `singles`."""
-    others = screened.hypotheses[_SETS:]
+    others = screened[_SETS:]
     kept = [other for other in others if not other.causes or (singles and len(other.causes) == 1)]
-    return [*screened.hypotheses[:_SETS], *kept]
+    return [*screened[:_SETS], *kept]

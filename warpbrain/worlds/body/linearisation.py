@@ -209,7 +209,7 @@ class Linearisation:
     def answers(self, forces: Floats) -> Floats:
         """Response (n, ...) of the sensors to nodal forces (..., N, 3) [N]."""
         flat = np.asarray(forces).reshape(-1, len(self._free))
-        return self._answers(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
+        return self.answers_of_columns(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
 
     def answers_of_patches(self, weights: Floats) -> Floats:
         """Response (n, s, 3) to forces of 1 N in each direction, spread over nodes with weights (N, s)."""
@@ -225,11 +225,10 @@ class Linearisation:
         return np.asarray(answers.transpose(2, 1, 0)[which])
 
     def answers_of_columns(self, forces: Any) -> Floats:
-        """Response (n, k) to sparse forces, SciPy CSC (3 N, k)."""
-        return self._answers(forces)
+        """Response (n, k) to forces (3 N, k), an array or SciPy CSC.
 
-    def _answers(self, forces: Any) -> Floats:
-        """Response to forces (3 N, k): by equilibria until these are as many as the compliance takes, then by that."""
+        By equilibria until these are as many as the compliance takes, then by that.
+        """
         from scipy.sparse import issparse
 
         count = forces.shape[1]
@@ -271,7 +270,7 @@ class Linearisation:
             element_forces = _gathered(
                 self.system.tetrahedra, element_forces, np.arange(len(element_forces)), self.system
             )
-        return -self._answers(element_forces @ weights)
+        return -self.answers_of_columns(element_forces @ weights)
 
     @cached_property
     def element_forces(self) -> Any:

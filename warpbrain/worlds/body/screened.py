@@ -20,10 +20,6 @@ from warpbrain.worlds.body.not_physics import not_physics_at
 from warpbrain.worlds.body.states import States, instants_of
 
 
-def _untimed(_stage: str) -> AbstractContextManager[Any]:
-    return nullcontext()
-
-
 def require_observable(case: Case) -> None:
     """Raise `InputError` if there are too few recordings."""
     if case.specimen is not None:
@@ -42,7 +38,7 @@ def screened(
     mesh_error: bool = True,
     without_nuisances: bool = False,
     mechanisms: Sequence[str] | None = None,
-    timed: Callable[[str], AbstractContextManager[Any]] = _untimed,
+    timed: Callable[[str], AbstractContextManager[Any]] = nullcontext,
 ) -> HypothesisSearch:
     """Sets of causes of a case.
 

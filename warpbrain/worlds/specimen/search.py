@@ -19,7 +19,7 @@ from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Cause, Kind, Place
-from warpbrain.inference.hypothesis import Configuration, Hypothesis, Posterior
+from warpbrain.inference.hypothesis import Configuration, Hypothesis
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import Search, posterior
 from warpbrain.worlds.specimen.effects import Effect
@@ -49,7 +49,7 @@ class Linear:
     causes: tuple[Cause, ...]
     components: tuple[tuple[Component, ...], ...]
 
-    def posterior(self, beam: int) -> Posterior:
+    def posterior(self, beam: int) -> tuple[Hypothesis, ...]:
         """Over sets of these causes beside those of the fit."""
         values, logs = scales()
         residual = self.fit.residual[self.fit.rows]
@@ -201,7 +201,7 @@ class Sets:
         """Sets with the causes of a fit and others: those that were not fitted take their evidence from here."""
         linear = self.about(fit)
         kinds = {one.effect.name: one.effect.kind for one in fit.assumed}
-        hypotheses = linear.posterior(0 if kinds else _BEAM).hypotheses
+        hypotheses = linear.posterior(0 if kinds else _BEAM)
         nothing = next(one for one in hypotheses if not one.causes)
         of_scale = nothing.log_evidence - nothing.best.log_density
         for one in hypotheses:
