@@ -145,17 +145,17 @@ def size_over_time(effect: Effect, z: Floats, covariance: Floats) -> SizeOverTim
     varying = effect.proposed.over_time
     if varying is None:
         return None
-    found = _numbers(varying, effect.coefficients(z))
+    numbers = _numbers(varying, effect.coefficients(z))
     # of a vector its length
     spans = {
         name: float(np.ptp(values) / max(np.abs(values).max(), 1e-300))
-        for name, (values, _) in found.items()
+        for name, (values, _) in numbers.items()
         if not name.endswith(("_x", "_y", "_z"))
     }
     if not spans:
         return None
-    name = max(spans, key=lambda one: spans[one])
-    values, unit = found[name]
+    name = max(spans, key=lambda parameter: spans[parameter])
+    values, unit = numbers[name]
     spread, along = np.linalg.eigh(covariance)
     factor = along * np.sqrt(np.maximum(spread, 0.0))
     changes = [(_values(varying, effect.coefficients(z + 0.1 * column), name) - values) / 0.1 for column in factor.T]

@@ -85,17 +85,17 @@ def traits_of(
     functionals = unit * np.concatenate([_summed(sites), _turned(sites - centre)])
     covariance = model.scale**2 * (model.noise_factor @ model.noise_factor.T) + model.columns @ model.columns.T
     resultant = partial(_Resultant.of, unit * A, functionals, covariance, residual)
-    plain, beside = resultant(None), resultant(noise * stress_beside_held(at, length))
+    plain, with_hiding = resultant(None), resultant(noise * stress_beside_held(at, length))
     force, moment = slice(0, 3), slice(3, 6)
-    sd = np.sqrt(np.maximum(np.diag(beside.covariance), 0.0))
-    outside = beside.is_significant(force)
+    sd = np.sqrt(np.maximum(np.diag(with_hiding.covariance), 0.0))
+    outside = with_hiding.is_significant(force)
     return Traits(
-        beside.mean[force],
+        with_hiding.mean[force],
         sd[force],
-        beside.mean[moment],
+        with_hiding.mean[moment],
         sd[moment],
         outside,
-        beside.is_significant(moment),
+        with_hiding.is_significant(moment),
         plain.is_significant(force) and not outside,
         _surface_nats(at, sites, answers, model, plain.size * unit, residual, length),
         centre,
@@ -118,12 +118,12 @@ class _Resultant:
         from scipy.linalg import cho_factor, cho_solve
 
         sizes = beliefs("unknown.sizes").tolist()
-        own, of_hiding = patches @ patches.T, None if hiding is None else hiding @ hiding.T
+        of_patches, of_hiding = patches @ patches.T, None if hiding is None else hiding @ hiding.T
         best: tuple[float, float, Any] | None = None
         # metres and newtons have one size
         units = np.sqrt(np.diag(covariance))
         for size, other in itertools.product(sizes, (0.0,) if of_hiding is None else sizes):
-            total = covariance + size**2 * own + (0.0 if of_hiding is None else other**2 * of_hiding)
+            total = covariance + size**2 * of_patches + (0.0 if of_hiding is None else other**2 * of_hiding)
             factor = cho_factor(total / np.outer(units, units))
             log_density = -0.5 * float(residual / units @ cho_solve(factor, residual / units))
             log_density -= float(np.log(np.diag(factor[0])).sum())

@@ -143,7 +143,7 @@ class Estimation:
         """
         estimates, failures = [], []
         begun: list[tuple[PriorMode, Estimate | None]]
-        begun = [(one.problem.mode, one) for one in starts] or [(mode, None) for mode in self.prior_modes]
+        begun = [(start.problem.mode, start) for start in starts] or [(mode, None) for mode in self.prior_modes]
         for prior_mode, start in begun:
             try:
                 estimates.append(self._fit_one(prior_mode, nuisances, start))

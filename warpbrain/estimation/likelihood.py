@@ -199,7 +199,7 @@ class Likelihood:
         start = Noise(rows, sigma, 1.0, np.ones(len(rows.points)), self.outliers)
         # gross errors first, and all points sound first
         starts = [start] if self.outliers is None else [start, start.with_likely_scale(expected, columns)]
-        best = max((settled(one) for one in starts), key=lambda noise: noise.log_evidence(expected, columns))
+        best = max((settled(begun) for begun in starts), key=lambda noise: noise.log_evidence(expected, columns))
         if not rows.over_element.any() or self.outliers is None:
             return best
         for part in beliefs("mesh.unresolved")[1:].tolist():

@@ -134,8 +134,8 @@ class Posterior(Shown):
         columns = self.theta, mean, deviations, self.interval(0.95), self.prior.mean, of_prior, prior
         each = zip(self.parameters, *(column.tolist() for column in columns), strict=True)
         return tuple(
-            Marginal(one, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most))
-            for one, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most) in each
+            Marginal(parameter, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most))
+            for parameter, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most) in each
         )
 
     @cached_property
@@ -165,7 +165,7 @@ class Posterior(Shown):
         problem, about = self.best.problem, (self.case, self.best)
         unseen = Observations.to_check(self.case, problem.forward.moments)
         both = (("fit", problem.observations), ("check", unseen))
-        return tuple(one for pair in both for one in predictions(*about, *pair, self.joint_covariance))
+        return tuple(each for pair in both for each in predictions(*about, *pair, self.joint_covariance))
 
     @property
     def overall_errors(self) -> tuple[OverallErrors, ...]:

@@ -97,10 +97,10 @@ def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed:
         return _declared_prior(case, parameters, count, seed)
     from warpbrain.gp.trained import trained
 
-    asked = trained() if model is None else model
-    require_groups(case, [label for labels in parameters.labels for label in labels], asked)
+    process = trained() if model is None else model
+    require_groups(case, [label for labels in parameters.labels for label in labels], process)
     return Prior.of(
-        asked, parameters.groups, parameters.laws_of, parameters.poisson, parameters.formulations, count, seed
+        process, parameters.groups, parameters.laws_of, parameters.poisson, parameters.formulations, count, seed
     )
 
 

@@ -112,8 +112,8 @@ def dictionary_of(
     rejected: dict[str, str] = {}
     for kind in requested:
         try:
-            found = over_time(registry[kind].proposals(situation), times)
-            proposals[kind] = _composable(case, situation.mesh, found)
+            proposed = over_time(registry[kind].proposals(situation), times)
+            proposals[kind] = _composable(case, situation.mesh, proposed)
         except NotTestableError as error:
             rejected[kind] = f"not testable with these data: {error}"
     return Dictionary(situation, proposals, rejected)

@@ -37,8 +37,8 @@ def displacement_deviation(weighted_set: WeightedSet, base: Base) -> Floats:
     else:
         covariance = refit.marginal.model.coefficients(refit.linear)[1]
     # the model has columns of gross errors behind them
-    own = covariance[: columns.shape[1], : columns.shape[1]]
-    variance = np.einsum("ij,jk,ik->i", columns, own, columns, optimize=True)
+    of_coordinates = covariance[: columns.shape[1], : columns.shape[1]]
+    variance = np.einsum("ij,jk,ik->i", columns, of_coordinates, columns, optimize=True)
     return np.sqrt(np.maximum(variance, 0.0)).reshape(-1, 3)
 
 
@@ -60,10 +60,10 @@ def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
     nodes = tracked_points(mesh, mesh.points, base.states.centre)
     nuisances, made = base.for_sensors(nodes)
     columns = np.zeros((len(nodes), len(z)))
-    own, loads = base.nuisances.part(_LOADS), nuisances.part(_LOADS)
+    part, loads = base.nuisances.part(_LOADS), nuisances.part(_LOADS)
     # those that no recording sees have no coordinate
-    if own.stop - own.start == loads.stop - loads.start:
-        columns[:, own] = nuisances.columns[:, loads]
+    if part.stop - part.start == loads.stop - loads.start:
+        columns[:, part] = nuisances.columns[:, loads]
     # a switch is there: its size is not in question
     moving = [number for number, effect in enumerate(effects) if not effect.proposed.is_there_or_not]
     over_nodes = list(effects)

@@ -128,26 +128,43 @@ class Effects:
         `present`: mechanism of that kind that acts at the state already.
         """
         bases = [proposal if proposal.over_time is None else proposal.over_time.base for proposal in proposals]
-        if not self.at.moments:
-            constant = self._at_one_time(_each_once(bases), present)
-            effects = [constant[id(base)] for base in bases]
-            times = self.at.sensors.times
-            return [
-                _over_time(proposal, [(effect, slice(None), 1.0, times)])
-                for proposal, effect in zip(proposals, effects, strict=True)
-            ]
-        by_moment = []
+        # of each state: effects there, its rows among all, with which sign, and their times
+        parts: list[tuple[Effects, Any, float, Floats]] = []
         for moment in self.at.moments:
             switches = None if self._switches is None else self._switches.at(moment.number, moment.at.sensors)
             here = Effects(moment.at, switches, self.mesh_errors)
-            by_moment.append((here._at_one_time(_each_once(bases), present), moment))
+            parts.append((here, moment.rows, moment.sign, np.full(len(moment.rows), moment.time)))
+        parts = parts or [(self, slice(None), 1.0, self.at.sensors.times)]
+        by_part = [(here._at_one_time(_each_once(bases), present), *where) for here, *where in parts]
         return [
-            _over_time(
-                proposal,
-                [(effects[id(base)], m.rows, m.sign, np.full(len(m.rows), m.time)) for effects, m in by_moment],
-            )
+            self._over_time(proposal, [(effects[id(base)], *where) for effects, *where in by_part])
             for proposal, base in zip(proposals, bases, strict=True)
         ]
+
+    def _over_time(self, proposal: Proposal, parts: Sequence[tuple[Effect, Any, float, Floats]]) -> Effect:
+        """The effect over all rows: of each state at its time, less at that from which it is counted."""
+        varying = proposal.over_time
+        effect = parts[0][0]
+        if varying is None and not self.at.moments:
+            return effect
+
+        def total(of: Callable[[Effect], Floats], expanded: bool = False) -> Floats:
+            changes = [
+                _expanded(of(effect), varying, times) if expanded and varying is not None else of(effect)
+                for effect, _, _, times in parts
+            ]
+            summed = np.zeros((len(self.at.sensors), *changes[0].shape[1:]))
+            for (_, rows, sign, _), change in zip(parts, changes, strict=True):
+                summed[rows] += sign * change
+            return summed
+
+        columns_at = None
+        if effect.columns_at is not None:
+
+            def columns_at(c: Floats) -> Floats:
+                return total(lambda e: e.columns if e.columns_at is None else e.columns_at(c))
+
+        return Effect(proposal, total(lambda e: e.mean), total(lambda e: e.columns, True), columns_at)
 
     def _at_one_time(self, proposals: Sequence[Proposal], present: Mechanism | None) -> dict[int, Effect]:
         """Effects at one state by the identity of their proposals."""
@@ -314,36 +331,6 @@ def _each_once(proposals: Sequence[Proposal]) -> list[Proposal]:
     return list({id(proposal): proposal for proposal in proposals}.values())
 
 
-#: An effect at one state, rows of its sensors among all, 1 or -1, and the time of each of these rows [s].
-AtTime = tuple[Effect, Any, float, Floats]
-
-
-def _over_time(proposal: Proposal, parts: Sequence[AtTime]) -> Effect:
-    """The effect over all rows: of each at its time, less at that from which it is counted."""
-    varying = proposal.over_time
-    effect, rows, _, _ = parts[0]
-    if varying is None and isinstance(rows, slice):
-        return effect
-    count = max(int(np.max(rows)) + 1 for _, rows, _, _ in parts) if not isinstance(rows, slice) else len(effect.mean)
-
-    def total(of: Callable[[Effect], Floats], expanded: bool) -> Floats:
-        summed: Floats | None = None
-        for effect, rows, sign, times in parts:
-            change = _expanded(of(effect), varying, times) if expanded and varying is not None else of(effect)
-            summed = np.zeros((count, *change.shape[1:])) if summed is None else summed
-            summed[rows] += sign * change
-        assert summed is not None
-        return summed
-
-    columns_at = None
-    if effect.columns_at is not None:
-
-        def columns_at(c: Floats) -> Floats:
-            return total(lambda e: e.columns if e.columns_at is None else e.columns_at(c), False)
-
-    return Effect(proposal, total(lambda e: e.mean, False), total(lambda e: e.columns, True), columns_at)
-
-
 def _expanded(columns: Floats, varying: Varying, times: Floats) -> Floats:
     """Columns (n, k) of what acts at one time as those of modes, for rows at times (n,)."""
     modes = varying.modes_at(times)
@@ -356,10 +343,10 @@ def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats, mesh_err
     varying = proposal.over_time
     assert varying is not None
 
-    def about(one: Linearisation, time: float) -> Floats:
+    def about(state: Linearisation, time: float) -> Floats:
         here = varying.at(c, time)
         smooth = replace(varying.base, follows="smooth", start=here, sd=_sd_of(proposal, varying))
-        return Effects(one, mesh_errors=mesh_errors).of([smooth], varying.base.make(here))[0].columns
+        return Effects(state, mesh_errors=mesh_errors).of([smooth], varying.base.make(here))[0].columns
 
     if not at.moments:
         return _expanded(about(at, float(varying.times[-1])), varying, at.sensors.times)

@@ -70,9 +70,9 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
     # as if the evidence were a product of what depends on one size, and on the other
     if relative is not None:
         columns = nuisances.with_family(UNKNOWN_MESH, columns, fractions[best] * relative)
-    found = marginal_of(base.noises[noise].of_noise(columns), base.points, summed[best, noise])
+    marginal = marginal_of(base.noises[noise].of_noise(columns), base.points, summed[best, noise])
     means = [float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs.max()) for logs in (by_fraction, by_noise)]
-    return columns, replace(found, log_evidence=found.log_evidence + sum(means))
+    return columns, replace(marginal, log_evidence=marginal.log_evidence + sum(means))
 
 
 def _displacement(base: Base, left: Floats) -> Floats:

@@ -99,15 +99,15 @@ class Linearisation:
     @cached_property
     def moments(self) -> tuple[Moment, ...]:
         """By the time of the state; none where all rows are of one state, counted from rest."""
-        sensors, found = self.sensors, []
+        sensors, moments = self.sensors, []
         for number, (time, about, share) in enumerate(self._states):
             last = number == len(self._states) - 1
             for sign, of_rows in ((1.0, sensors.after), (-1.0, sensors.before)):
                 rows = np.flatnonzero((of_rows == number) | (last and sign > 0.0 and of_rows < 0))
                 if len(rows):
-                    own = about.with_sensors(replace(sensors.of_rows(rows, time), share=share))
-                    found.append(Moment(number, time, own.in_time(()), rows, sign))
-        return tuple(found)
+                    model = about.with_sensors(replace(sensors.of_rows(rows, time), share=share))
+                    moments.append(Moment(number, time, model.in_time(()), rows, sign))
+        return tuple(moments)
 
     def summed(self, answer: Callable[[Linearisation], Floats]) -> Floats:
         """What something changes of each row (n, ...): at its time, less at that from which it is counted.

@@ -145,7 +145,7 @@ def nuisances_at(
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
     """What one standard deviation of each parameter of the tissues changes of what is recorded: (n, p)."""
-    return at.summed(lambda one: _tissue_columns(one, states, theta, prior))
+    return at.summed(lambda state: _tissue_columns(state, states, theta, prior))
 
 
 def _tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
@@ -169,7 +169,7 @@ def _materials(system: System, states: States, theta: Floats) -> Mapping[int, Ma
 
 def field_columns(at: Linearisation, states: States) -> Floats:
     """What one standard deviation of each mode of the stiffness field changes of what is recorded: (n, k)."""
-    return at.summed(lambda one: one.answers_of_elements(one.element_forces, states.modes))
+    return at.summed(lambda state: state.answers_of_elements(state.element_forces, states.modes))
 
 
 def law_columns(effects: Effects, states: States) -> Floats:

@@ -51,9 +51,9 @@ class RigidMotion:
         return np.asarray(turned + self._centre + self._realigned[:3])
 
     @staticmethod
-    def _along(sensors: Sensors, ways: Floats) -> Floats:
+    def _along(sensors: Sensors, vectors: Floats) -> Floats:
         """Components (n, k) of ways (n, 3, k) in the directions of the sensors; zero of forces."""
         rows = sensors.is_displacement
-        found = np.zeros((len(sensors), ways.shape[2]))
-        found[rows] = np.einsum("nj,njk->nk", sensors.directions[rows], ways[rows])
-        return found
+        components = np.zeros((len(sensors), vectors.shape[2]))
+        components[rows] = np.einsum("nj,njk->nk", sensors.directions[rows], vectors[rows])
+        return components

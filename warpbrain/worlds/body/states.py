@@ -220,27 +220,29 @@ class States:
         """The equilibrium at each time, under what acts then."""
         case = self.case_of(hypothesis)
         moments = Moments.of(case, self.times)
-        found: dict[int, Instant] = {}
+        instants: dict[int, Instant] = {}
         # the last first: it is what others begin at
         for time, number in sorted(zip(moments.times, moments.numbers, strict=True), reverse=True):
-            if number in found:
+            if number in instants:
                 continue
-            own = system if moments.cases[number] is case else self._system(hypothesis, moments.cases[number])
-            near = start if not found else self._near.get(time, start)
-            external = own.model.external_forces()
-            solver = EquilibriumSolver(own, options, factors=self._factors_of(own))
-            if nearby is not None and near is not None and not found:
-                near = nearby.toward_equilibrium(own, external, near, TOLERANCE)
+            system_then = system if moments.cases[number] is case else self._system(hypothesis, moments.cases[number])
+            near = start if not instants else self._near.get(time, start)
+            external = system_then.model.external_forces()
+            solver = EquilibriumSolver(system_then, options, factors=self._factors_of(system_then))
+            if nearby is not None and near is not None and not instants:
+                near = nearby.toward_equilibrium(system_then, external, near, TOLERANCE)
             try:
                 state = solver.solve(external, near)
             except SolveError:
-                if not found or near is None:
+                if not instants or near is None:
                     raise
                 state = solver.solve(external)
-            found[number] = self._instant(time, own, state, external)
+            instants[number] = self._instant(time, system_then, state, external)
             if len(moments.cases) > 1:
                 self._near[time] = state.u
-        return [replace(found[number], time=time) for time, number in zip(moments.times, moments.numbers, strict=True)]
+        return [
+            replace(instants[number], time=time) for time, number in zip(moments.times, moments.numbers, strict=True)
+        ]
 
     def _flowing(self, hypothesis: Hypothesis, system: System) -> Mechanism | None:
         """The mechanism of a hypothesis whose fluid flows while recordings are made.

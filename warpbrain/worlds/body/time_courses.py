@@ -101,4 +101,4 @@ def over_time(proposals: Sequence[Proposal], times: Sequence[float]) -> list[Pro
     if len(times) < 2:
         return constant
     ends, modes = finite_times(np.array(times)), modes_of(len(times))
-    return constant + [Varying(one, ends, modes).proposal() for one in proposals if one.varying]
+    return constant + [Varying(proposal, ends, modes).proposal() for proposal in proposals if proposal.varying]

@@ -58,8 +58,8 @@ class HomogeneousMaterial:
         """
         [(label, tissue)] = case.tissues.items()
         material = cls(tissue.known_law, case.poisson, tissue.formulation)
-        for given in (*case.mechanisms, *mechanisms):
-            mechanism = given if turn is None else given.turned(turn)
+        for declared in (*case.mechanisms, *mechanisms):
+            mechanism = declared if turn is None else declared.turned(turn)
             if isinstance(mechanism, Substituting):
                 law, poisson, formulation = mechanism.substitute(
                     label, material.law, material.poisson, material.formulation
