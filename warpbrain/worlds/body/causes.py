@@ -25,7 +25,7 @@ class BodyCauses:
     """Causes, and the effects of mechanisms at their places."""
 
     causes: tuple[Cause, ...]
-    effects: Mapping[str, tuple[Effect, ...]]  # of each mechanism, by place
+    effects: Mapping[str, tuple[Effect, ...]]  # of each kind, by place
 
     def named(self, name: str) -> Cause:
         """A cause by its name."""
@@ -84,11 +84,9 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
     sizes, not_physics_sizes = beliefs("causes.sizes"), beliefs("causes.not_physics_sizes")
     unit_sizes = np.ones(len(sizes))
     causes: list[Cause] = []
-    effects: dict[str, tuple[Effect, ...]] = {}
-    for kind, numbers in candidates.of_kind.items():
-        of_kind = tuple(candidates.effects[number] for number in numbers.tolist())
+    for kind, of_kind in candidates.effects.items():
         places = tuple(Place(effect.columns, effect.mean if effect.mean.any() else None) for effect in of_kind)
-        if kind in candidates.alternatives:
+        if of_kind[0].proposal is None:
             causes.append(
                 Cause(kind, places, math.log(belief("causes.not_physics")), not_physics_sizes, Kind.NOT_PHYSICS)
             )
@@ -96,12 +94,11 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
         # a mechanism with an expected size, such as a weight, has that one
         has_mean = any(place.mean is not None for place in places)
         causes.append(Cause(kind, places, math.log(belief("causes.mechanism")), unit_sizes if has_mean else sizes))
-        effects[kind] = of_kind
     # setting in at any recorded time
     courses = main_courses(base.states.times)
     factors = [factor_of_rows(course, base.at.sensors) for course in courses]
     causes.append(unknown_cause(base, [factor for factor in factors if factor.any()]))
-    return BodyCauses(tuple(causes), effects)
+    return BodyCauses(tuple(causes), candidates.effects)
 
 
 def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:

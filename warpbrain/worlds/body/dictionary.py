@@ -140,11 +140,9 @@ def _composable(case: Case, mesh: TetMesh, proposals: Sequence[Proposal]) -> tup
 class Candidates:
     """Effects of all proposals at one state."""
 
-    effects: tuple[Effect, ...]
-    of_kind: dict[str, Ints]  # numbers of the effects of each kind
-    alternatives: frozenset[str]  # kinds that are no physics
+    effects: dict[str, tuple[Effect, ...]]  # of each kind
     rejected: dict[str, str]
-    source: Effects | None = None  # which made them at a state; None if they were given
+    source: Effects  # which made them at a state
 
 
 def candidates_at(
@@ -157,8 +155,7 @@ def candidates_at(
 
     Kinds that cannot be simulated are rejected with a reason.
     """
-    all_effects: list[Effect] = []
-    of_kind: dict[str, Ints] = {}
+    by_kind: dict[str, tuple[Effect, ...]] = {}
     rejected = dict(dictionary.rejected)
     for kind, proposals in dictionary.proposals.items():
         if on_kind is not None:
@@ -180,15 +177,10 @@ def candidates_at(
         within = [effect for effect in of_this_kind if is_linear(effect, effects.at)]
         if of_this_kind and not within:
             rejected[kind] = "its effect is not linear here: its usual size would move the body by more than its own"
-        of_this_kind = within
-        if of_this_kind:
-            of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
+        if within:
+            by_kind[kind] = tuple(within)
             rejected.pop(kind, None)
-            all_effects.extend(of_this_kind)
-    for name, effect in alternatives.items():
-        of_kind[name] = np.array([len(all_effects)])
-        all_effects.append(effect)
-    return Candidates(tuple(all_effects), of_kind, frozenset(alternatives), rejected, effects)
+    return Candidates(by_kind | {name: (effect,) for name, effect in alternatives.items()}, rejected, effects)
 
 
 def is_linear(effect: Effect, at: Linearisation) -> bool:
@@ -234,23 +226,20 @@ def candidates_about_fit(
 
     `candidates`: at the base. `places`: of each kind, numbers of the places whose columns are made anew.
     """
-    mesh_errors = None if candidates.source is None else candidates.source.mesh_errors
-    effects = Effects(state.linearised(), mesh_errors=mesh_errors)
+    effects = Effects(state.linearised(), mesh_errors=candidates.source.mesh_errors)
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
-    all_effects: list[Effect] = []
-    of_kind: dict[str, Ints] = {}
-    for kind, numbers in candidates.of_kind.items():
+    by_kind: dict[str, tuple[Effect, ...]] = {}
+    for kind, at_base in candidates.effects.items():
         if kind in acting_kinds:
             continue
-        of_this_kind = [candidates.effects[k] for k in numbers.tolist()]
+        of_this_kind = list(at_base)
         smooth = [k for k in places[kind].tolist() if _is_smooth(of_this_kind[k])]
         for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
             if is_linear(effect, effects.at):
                 of_this_kind[k] = effect
-        of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
-        all_effects.extend(of_this_kind)
-    return replace(candidates, effects=tuple(all_effects), of_kind=of_kind, source=effects)
+        by_kind[kind] = tuple(of_this_kind)
+    return replace(candidates, effects=by_kind, source=effects)
 
 
 def _is_smooth(effect: Effect) -> bool:

@@ -310,7 +310,6 @@ class HypothesisSearch:
         model = GaussianModel(noise_factor, fitted.columns)
         places = likely_places(model, fitted.residual, self.causes.causes, _PLACES_ABOUT_FIT)
         candidates = candidates_about_fit(refit.state, fitted.effects, self.candidates, places)
-        assert candidates.source is not None
         self._expanded[fitted.names] = candidates.source
         causes = causes_of(self.base, candidates)
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
