@@ -9,7 +9,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
 from warpbrain.diagnosis.checking import check_errors
-from warpbrain.diagnosis.confirming import Confirming, HeldOutErrors
+from warpbrain.diagnosis.confirming import Confirming
 from warpbrain.diagnosis.held_out import distance
 from warpbrain.diagnosis.locating import ScoreMap, map_of_search
 from warpbrain.diagnosis.measuring import next_measurements
@@ -34,6 +34,7 @@ from warpbrain.inference.decide import (
     Decision,
     decide,
 )
+from warpbrain.inference.predict import Prediction
 from warpbrain.physics.words import Measurement
 from warpbrain.seconds import Seconds
 from warpbrain.threads import one_thread_of_blas
@@ -123,7 +124,10 @@ class Diagnosing:
         with self.seconds.of("checks"):
             checked = self._checked(search, confirming, by_posterior)
             best, named = checked.best, checked.named
-            held_out = confirming.held_out(nothing, best) if named else None
+            weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
+            blocks = confirming.held_out_for(best)
+            predictions = {name: confirming.predict(candidate, blocks) for name, candidate in weighted_sets.items()}
+            fit = self._fit(confirming, weighted_sets, predictions, checked.confirmations)
             ranking = Ranking(search, confirming)
             ranked = ranking.all()
         with self.seconds.of("where"):
@@ -135,10 +139,6 @@ class Diagnosing:
         self.listener.stage("what to measure next")
         with self.seconds.of("next measurement"):
             measurements = _next(search, ranked)
-        weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
-        predictions = {REFITTED: confirming.predict(nothing, confirming.held_out_for(best))}
-        if held_out is not None:
-            predictions = {REFITTED: held_out.without, EXPLAINED: held_out.explained}
         return Diagnosis(
             case=self.case,
             decision=checked.decision,
@@ -159,7 +159,7 @@ class Diagnosing:
             smallest=seen,
             confusion=confusion,
             next_measurement=measurements,
-            fit=self._fit(confirming, weighted_sets, held_out, checked.confirmations),
+            fit=fit,
             confirmations=checked.confirmations,
             assumptions=assumptions_of(self.case, search.base, best),
             remarks=search.base.remarks,
@@ -213,25 +213,27 @@ class Diagnosing:
         self,
         confirming: Confirming,
         weighted_sets: dict[str, WeightedSet],
-        held_out: HeldOutErrors | None,
+        held_out: dict[str, Prediction],
         confirmations: tuple[Confirmation, ...],
     ) -> Fit:
         nothing, base = weighted_sets[REFITTED], confirming.search.base
+        best = weighted_sets.get(EXPLAINED, nothing)
         sensors = base.at.sensors
         declared = distance(base.declared.sensors, base.declared.sensors.residual)
-        blocks = confirming.held_out_for(weighted_sets.get(EXPLAINED, nothing))
-        without = confirming.predict(nothing, blocks) if held_out is None else held_out.without
-        in_sample = {name: distance(sensors, s.best_residual) for name, s in weighted_sets.items()}
-        explained = None if held_out is None else (in_sample[EXPLAINED], blocks.error(held_out.explained))
-        refits = [weighted_set.refit for weighted_set in weighted_sets.values() if weighted_set.refit is not None]
+        errors = {
+            name: (distance(sensors, candidate.best_residual), distance(sensors, held_out[name].errors))
+            for name, candidate in weighted_sets.items()
+        }
+        patterns, improvement = (None, None) if best is nothing else confirming.improvement(nothing, best)
+        refits = [candidate.refit for candidate in weighted_sets.values() if candidate.refit is not None]
         return Fit(
             (declared, declared),
-            (in_sample[REFITTED], blocks.error(without)),
-            explained,
-            None if held_out is None else held_out.improvement,
-            None if held_out is None else max(confirmation.placebo_p for confirmation in confirmations),
-            None if held_out is None else held_out.patterns,
-            confirming.ceiling(nothing, blocks),
+            errors[REFITTED],
+            errors.get(EXPLAINED),
+            improvement,
+            None if best is nothing else max(confirmation.placebo_p for confirmation in confirmations),
+            patterns,
+            confirming.ceiling(nothing, confirming.held_out_for(best)),
             check_errors(self.case, base, refits),
         )
 

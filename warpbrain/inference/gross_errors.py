@@ -149,16 +149,9 @@ class FurtherColumns:
         self.products = [products_of_rows(self.dual, group.rows) for group in rows.groups]
 
 
-def with_gross_errors(
-    model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers, start: Floats | None = None
-) -> GrossErrors:
-    """Density of residuals where some points may be gross errors; see `PointRows` and its method of this name.
-
-    `model`: of the rows (n,) under the hypothesis, its causes among the columns. `residual` (n,): less what is expected
-    of the causes. `points`: rows of each point; rows of none are never gross errors. `start` (g,): the most probable
-    inflation of each point under a hypothesis that is nearly the same; all are sound by default.
-    """
-    return PointRows(model, residual, points).with_gross_errors(prior, start)
+def with_gross_errors(model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> GrossErrors:
+    """Density of rows where some points may be gross errors: `PointRows`, with the causes among the columns."""
+    return PointRows(model, residual, points).with_gross_errors(prior)
 
 
 def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation: Floats) -> Floats:

@@ -122,11 +122,6 @@ class RowsAtScales:
         return rows.with_gross_errors(outliers(), start, further, length)
 
 
-def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], scale: float = 1.0) -> Marginal:
-    """Evidence of residuals (n,) under a model; see `RowsAtScales`."""
-    return marginal_of(model, points, RowsAtScales(model, residual, points).summed(scale=scale))
-
-
 def marginal_of(model: GaussianModel, points: Sequence[Ints], summed: Summed) -> Marginal:
     """Evidence and most probable model of a sum; `model` has the columns of the hypothesis, at a scale of one."""
     at_best = model.of_noise(model.columns, summed.scale)

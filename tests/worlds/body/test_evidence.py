@@ -8,7 +8,7 @@ import pytest
 
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import beliefs
-from warpbrain.inference.marginal import marginal
+from warpbrain.inference.marginal import RowsAtScales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH, Nuisances
@@ -65,7 +65,7 @@ def test_it_is_the_mean_over_all_sizes(base, seed):
     residual = rows_of(base, 0.028, seed)
     columns, result = evidence_of(base, base.model.columns, residual)
     logs = [
-        marginal(base.model.of_noise(columns_at(base, fraction)), residual, base.points).log_evidence
+        RowsAtScales(base.model.of_noise(columns_at(base, fraction)), residual, base.points).summed().log_evidence
         for fraction in beliefs("mesh.unknown").tolist()
     ]
     # terms below a hundredth of the largest are left out
@@ -128,4 +128,4 @@ def test_a_body_that_does_not_move_has_none(base):
     residual = np.random.default_rng(3).normal(size=120)
     columns, result = evidence_of(base, still.columns, residual)
     np.testing.assert_array_equal(columns, still.columns)
-    assert result.log_evidence == marginal(base.model, residual, base.points).log_evidence
+    assert result.log_evidence == RowsAtScales(base.model, residual, base.points).summed().log_evidence
