@@ -75,6 +75,17 @@ class WeightedSet:
         """The same with another log evidence."""
         return replace(self, hypothesis=replace(self.hypothesis, log_evidence=log_evidence))
 
+    def fitted(self, refit: Refit) -> WeightedSet:
+        """The set linear about its fit."""
+        return replace(
+            self,
+            effects=refit.effects,
+            residual=refit.linear,
+            columns=refit.columns,
+            marginal=refit.marginal,
+            refit=refit,
+        )
+
     def without(self, mechanism: str, base: Base) -> WeightedSet:
         """The set less one of its mechanisms, linear about the same point, with an evidence to be compared with its."""
         number = self.mechanisms.index(mechanism)
