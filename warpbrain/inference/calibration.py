@@ -11,8 +11,7 @@ from importlib.resources import files
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.inference.causes import Kind
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Hypothesis, Kind
 
 
 @dataclass(frozen=True)

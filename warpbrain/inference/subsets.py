@@ -13,9 +13,8 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.inference.blocks import Blocks
-from warpbrain.inference.causes import Cause
+from warpbrain.inference.causes import Cause, Configuration, Hypothesis, Member
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.hypothesis import Configuration, Hypothesis, Member
 
 
 @dataclass(frozen=True, eq=False)

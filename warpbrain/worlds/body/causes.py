@@ -11,7 +11,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.inference import Cause, GaussianModel, Kind, Place
 from warpbrain.inference.beliefs import belief, beliefs
-from warpbrain.inference.hypothesis import Member
+from warpbrain.inference.causes import Member
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import Candidates
 from warpbrain.worlds.body.effects import Effect

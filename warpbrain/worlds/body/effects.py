@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
@@ -22,7 +22,6 @@ from warpbrain.worlds.body.consolidation import Course, bound_term, consolidatio
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
 from warpbrain.worlds.body.sensors import Sensors
-from warpbrain.worlds.body.sparse_columns import SparseColumns
 from warpbrain.worlds.body.states import SolvedState, States
 
 #: Part of a standard deviation by which a smooth or a fading proposal is differentiated.
@@ -32,6 +31,36 @@ _STEP_OF_COURSE = 0.05
 #: Interfaces of mechanisms that act by nodal forces, and of all mechanisms.
 _PUSHING: frozenset[type] = frozenset((Load, Following, Substituting))
 _ACTING = _PUSHING | {Weakening, Growing}
+
+
+class SparseColumns:
+    """Columns of one length, such as the forces of thousands of patches, collected; those that are zero are left out.
+
+    `size`: rows. `numbers`: under which those that are not zero were added.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.numbers: list[int] = []
+        self._size = size
+        self._rows: list[Ints] = []
+        self._values: list[Floats] = []
+
+    def add(self, number: int, column: Floats) -> None:
+        """Add a column (size,)."""
+        # `flatnonzero` of booleans is eight times as fast as of numbers
+        rows = np.flatnonzero(column != 0.0)
+        if len(rows):
+            self.numbers.append(number)
+            self._rows.append(rows)
+            self._values.append(column[rows])
+
+    def matrix(self) -> Any:
+        """Those that are not zero: SciPy CSC (size, k), in the order of `numbers`."""
+        from scipy.sparse import csc_matrix
+
+        first = np.cumsum([0, *(len(rows) for rows in self._rows)])
+        shape = self._size, len(self.numbers)
+        return csc_matrix((np.concatenate(self._values), np.concatenate(self._rows), first), shape)
 
 
 class SolvedSwitches:

@@ -9,7 +9,6 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
-from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import is_linear
 from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, parts_of, width_of
@@ -84,7 +83,8 @@ def columns_about(
         elif effect.proposed.over_time is not None:
             columns[:, part] = columns_over_time(at, effect.proposed, c, mesh_errors)
         elif not effect.proposed.is_there_or_not:
-            about = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0]
+            there = {"mean": c} if effect.proposed.changes_in_time else {"follows": "smooth", "start": c}
+            about = made.of([replace(effect.proposed, **there)], effect.proposed.make(c))[0]
             if not is_linear(about, at):
                 raise SolveError(f"{effect.proposed.region or 'it'}: its effect is not linear here")
             columns[:, part] = about.columns
@@ -114,10 +114,3 @@ def _relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats]
         if effect.proposed.history is not None:
             stiffness += np.maximum(parts_of(effect.proposed, effect.coefficients(z), sensors), 0.0)
     return np.where(sensors.is_displacement, 1.0 / stiffness, stiffness)[:, None]
-
-
-def _proposal_about(proposal: Proposal, c: Floats) -> Proposal:
-    """The proposal whose columns are those about some coefficients (k,)."""
-    if proposal.changes_in_time:
-        return replace(proposal, mean=c)
-    return replace(proposal, follows="smooth", start=c)

@@ -19,7 +19,7 @@ from warpbrain.estimation.options import Listener
 from warpbrain.inference import GaussianModel, Search, posterior
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads

@@ -14,8 +14,8 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
+from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.decide import Decision, decide
-from warpbrain.inference.hypothesis import Hypothesis
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.weighted_set import WeightedSet
 

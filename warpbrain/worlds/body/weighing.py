@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpbrain.inference import GaussianModel
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.noise import scales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses

@@ -8,7 +8,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference import Kind
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.marginal import Marginal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of

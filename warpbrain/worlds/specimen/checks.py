@@ -43,9 +43,8 @@ class CheckResults:
 
 @dataclass(frozen=True, eq=False)
 class _Predicted:
-    """A fit, its stress and held-out stress at all recorded rows (n,) [Pa], and its held-out log density."""
+    """Stress and held-out stress of a fit at all recorded rows (n,) [Pa], and its held-out log density."""
 
-    fit: Fit
     stress: Floats
     held: Floats
     log_density: float
@@ -57,7 +56,7 @@ class Checker:
     def __init__(self, sets: Sets, protocol: Protocol, draws: int, random: np.random.Generator) -> None:
         self.sets, self.protocol, self._draws, self._random = sets, protocol, draws, random
         self.folds = folds_of(protocol.thinned)
-        self._predictions: dict[int, _Predicted] = {}
+        self._predictions: dict[Fit, _Predicted] = {}
 
     def p_left(self, fit: Fit) -> float:
         """Posterior predictive probability of rows that other causes explain as well, if a fit has all that acts.
@@ -88,7 +87,7 @@ class Checker:
         return root_mean_square((self.protocol.observed - self._predicted(fit).held)[self.protocol.fitted])
 
     def _predicted(self, fit: Fit) -> _Predicted:
-        if id(fit) not in self._predictions:
+        if fit not in self._predictions:
             # what has no name is known at thinned rows alone, and explains nothing of others
             assumed, z = fit.only(lambda effect: effect.kind is not Kind.UNKNOWN)
             everywhere, z = fit.forward.of(protocol=self.protocol), np.concatenate([fit.z[: len(fit.forward)], z])
@@ -96,8 +95,8 @@ class Checker:
             predicted, log_density = held_out(fit, self.folds)
             # of thinned rows it is known by how much it differs from the fit: smoothly
             held = stress + self.protocol.spread(predicted - fit.forward.stress(assumed, z))
-            self._predictions[id(fit)] = _Predicted(fit, stress, held, log_density)
-        return self._predictions[id(fit)]
+            self._predictions[fit] = _Predicted(stress, held, log_density)
+        return self._predictions[fit]
 
     def _improvement(self, before: Fit, after: Fit) -> tuple[float, float, float]:
         """Of held-out errors relative to the largest stress of each test."""

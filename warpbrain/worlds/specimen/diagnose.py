@@ -98,6 +98,7 @@ class DiagnosingSpecimen:
             explained = _explained_case(best) if names else None
         declared = forward.of(protocol=protocol).stress((), np.zeros(len(forward)))
         ranking = _ranking(sets, ordered, checker)
+        ranked = {cause.name: cause for cause in ranking}
         nothing = sets.nothing.hypothesis.log_evidence
         shows = None
         if best is not base:
@@ -110,7 +111,7 @@ class DiagnosingSpecimen:
             doubts=doubts,
             p_value=p_value,
             p_left=checked.p_left,
-            named=tuple(replace(_of_name(ranking, name), values=values_of(best, name)) for name in names),
+            named=tuple(replace(ranked[name], values=values_of(best, name)) for name in names),
             ranking=ranking,
             rejected=rejected,
             combinations=tuple(
@@ -228,7 +229,3 @@ def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ..
             )
         )
     return tuple(sorted(ranked, key=lambda cause: (-cause.probability, -cause.log_evidence)))
-
-
-def _of_name(ranking: Sequence[Ranked], name: str) -> Ranked:
-    return next(cause for cause in ranking if cause.name == name)

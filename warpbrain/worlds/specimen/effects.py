@@ -268,9 +268,5 @@ def unknown(protocol: Protocol) -> Effect:
         columns = smooth_patterns(protocol, reach)
         columns = columns[:, np.any(columns[protocol.fitted] != 0.0, axis=0)]
         size = belief("specimen.largest_unknown")
-        variants.append(Variant.of_added(partial(_fixed, columns), size, columns.shape[1]))
+        variants.append(Variant.of_added(partial(lambda fixed, _protocol: fixed, columns), size, columns.shape[1]))
     return Effect(UNKNOWN, Kind.UNKNOWN, "Something acts that is none of the known mechanisms.", tuple(variants))
-
-
-def _fixed(columns: Floats, protocol: Protocol) -> Floats:
-    return columns

@@ -18,8 +18,7 @@ from warpbrain.arrays import Floats
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.causes import Cause, Kind, Place
-from warpbrain.inference.hypothesis import Configuration, Hypothesis
+from warpbrain.inference.causes import Cause, Configuration, Hypothesis, Kind, Place
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import Search, posterior
 from warpbrain.worlds.specimen.effects import Effect
@@ -130,7 +129,7 @@ class Sets:
     def __init__(self, effects: Sequence[Effect], base: Fit, listener: Listener) -> None:
         self.effects, self.base, self._listener = tuple(effects), base, listener
         self.by_names: dict[frozenset[str], CauseSet] = {}
-        self._about: dict[int, Linear] = {}
+        self._about: dict[Fit, Linear] = {}
         self._propose(base, 0.0)
         self.by_names[frozenset()] = replace(self.nothing, fit=base, spread=0.0)
         self._search()
@@ -148,9 +147,9 @@ class Sets:
 
     def about(self, fit: Fit) -> Linear:
         """All other causes, linearised about a fit."""
-        if id(fit) not in self._about:
-            self._about[id(fit)] = linearise(fit, self.effects)
-        return self._about[id(fit)]
+        if fit not in self._about:
+            self._about[fit] = linearise(fit, self.effects)
+        return self._about[fit]
 
     def fitted(self, names: frozenset[str]) -> Fit | None:
         """The fit of a set, made if it was not; None if none stands."""
