@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.diagnosis.held_out import HeldOut, share_of_patterns, tries_of
+from warpbrain.diagnosis.held_out import HeldOut, tries_of
 from warpbrain.inference import GaussianModel, Kind
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation
-from warpbrain.inference.predict import Prediction, predictive_p
+from warpbrain.inference.predict import Prediction, p_value, predictive_p
 from warpbrain.worlds.body.effects import width_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.weighted_set import WeightedSet
@@ -102,7 +102,7 @@ class Confirming:
             weighted_set.hypothesis.log_evidence - others.hypothesis.log_evidence,
             full.gain(reduced),
             held_out.improvement(full, reduced, self._random),
-            share_of_patterns(full, patterns),
+            p_value(full.log_density, [pattern.log_density for pattern in patterns]),
         )
 
     def _patterns(self, others: WeightedSet, held_out: HeldOut, freedom: int, places: int) -> tuple[Prediction, ...]:

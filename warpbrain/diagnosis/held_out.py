@@ -104,12 +104,6 @@ class HeldOut:
         return self.error(max(predictions, key=lambda prediction: prediction.log_density))
 
 
-def share_of_patterns(prediction: Prediction, patterns: Sequence[Prediction]) -> float:
-    """p-value of a prediction among those with random patterns."""
-    better = sum(pattern.log_density >= prediction.log_density for pattern in patterns)
-    return float((1 + better) / (1 + len(patterns)))
-
-
 def tries_of(places: int) -> int:
     """How many patterns a scan of so many places is worth, which are far from independent of each other."""
     return int(min(places, belief("checks.tries")))

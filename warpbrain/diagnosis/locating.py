@@ -16,6 +16,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief
+from warpbrain.inference.predict import p_value
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.unknown import force_patches
@@ -143,7 +144,7 @@ def score_map(
         length,
         observed,
         threshold,
-        float((1 + np.sum(largest >= observed.max())) / (1 + len(largest))),
+        p_value(observed.max(), largest),
         float(chdtrc(3, observed.max())),
         np.sqrt(needed / np.maximum(weakest, 1e-300)),
         observed.max() - observed <= float(chdtri(3, 0.05)),

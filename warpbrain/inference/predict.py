@@ -115,4 +115,9 @@ def predictive_p(
     """Probability that the Bayes factor of `log_factors_of_fields` is as large in rows drawn from the model."""
     drawn = np.column_stack([residual, model.draws(draws, random)])
     statistic = log_factors_of_fields(model, fields, sizes, drawn, weights)
-    return float((1 + np.sum(statistic[1:] >= statistic[0])) / (1 + draws))
+    return p_value(statistic[0], statistic[1:])
+
+
+def p_value(observed: float, drawn: Sequence[float] | Floats) -> float:
+    """Share of values as large as an observed one, itself among them; those drawn (d,) are of the hypothesis."""
+    return float((1 + np.sum(np.asarray(drawn) >= observed)) / (1 + len(drawn)))

@@ -16,7 +16,7 @@ from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.predict import Prediction, predictive_p
+from warpbrain.inference.predict import Prediction, p_value, predictive_p
 from warpbrain.physics.words import pascals
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.specimen.fit import Fit
@@ -210,7 +210,7 @@ def _placebo_p(about: Linear, name: str, folds: Folds, random: np.random.Generat
             for each in causes
         ]
         total += of_all_rows - _log_densities(fit.model.rows(observed), residual[observed], kept)
-    return float((1 + np.sum(total[1:] >= total[0])) / (1 + _PLACEBOS))
+    return p_value(total[0], total[1:])
 
 
 def _log_densities(model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> Floats:
