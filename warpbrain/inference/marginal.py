@@ -23,12 +23,18 @@ _NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Marginal:
-    """Rows under one hypothesis."""
+class Summed:
+    """Evidence summed over scales of the noise and over gross errors."""
 
-    log_evidence: float
+    log_evidence: float  # [nats]
     scale: float  # the most probable factor on the noise
     inflation: Floats  # (g,), most probable factor on the noise of each point at that scale, 1 of sound ones
+
+
+@dataclass(frozen=True, eq=False)
+class Marginal(Summed):
+    """The same with the most probable model of the rows under one hypothesis."""
+
     model: GaussianModel  # at that scale; the excess noise of these points is columns after those of the hypothesis
     excess_columns: int  # how many columns the excess noise has
 
@@ -58,15 +64,6 @@ class Marginal:
     def _own_columns(self) -> int:
         """How many columns the hypothesis has."""
         return self.model.columns.shape[1] - self.excess_columns
-
-
-@dataclass(frozen=True, eq=False)
-class Summed:
-    """Evidence summed over scales of the noise and over gross errors."""
-
-    log_evidence: float  # [nats]
-    scale: float  # the most probable factor on the noise
-    inflation: Floats  # (g,), the most probable inflation of each point at that scale
 
 
 class RowsAtScales:

@@ -165,7 +165,8 @@ def _explaining(ordered: Ordered, decision: Decision) -> Fit:
     spoken = decision.verdict in (NAMED, NAMED_AND_REST)
     wanted = {name for name in decision.causes if name != UNKNOWN} if spoken else set()
     fits = [candidate.fit for candidate, _ in ordered if candidate.fit is not None]
-    return next((one for one in fits if one.names and wanted <= one.names), next(one for one in fits if not one.names))
+    explaining = (each for each in fits if each.names and wanted <= each.names)
+    return next(explaining, next(each for each in fits if not each.names))
 
 
 def _explained_case(best: Fit) -> Case | None:
