@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rigid_motions import moved as moved_rigidly
 from scipy.spatial.transform import Rotation
+from scipy.special import ndtr
 from shapes import box
 
 from warpbrain.cases.boundary import Fixed
@@ -21,8 +22,9 @@ from warpbrain.estimation.estimate import estimate
 from warpbrain.estimation.finer_mesh import Discretisation
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.estimation.options import EstimationOptions
+from warpbrain.estimation.posterior import Posterior
 from warpbrain.gp.prior import Prior
-from warpbrain.inference.noise import noise_factor, outliers, scales
+from warpbrain.inference.noise import noise_covariance, noise_factor, outliers, scales
 from warpbrain.mesh import TetMesh, nodes_of
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.mechanisms.gravity import Gravity
@@ -165,15 +167,23 @@ def ranks(setting: Setting, count: int, seed: int = 0) -> Floats:
             posterior = estimate(seen, prior(setting.tissues), options, "cpu")
         except SolveError:
             continue
-        found[number] = posterior.probability_below(truth.theta)
+        found[number] = probability_below(posterior, truth.theta)
     return found
+
+
+def probability_below(posterior: Posterior, theta: Floats) -> Floats:
+    """Of each parameter (p,) that it is less than that of a vector (p,)."""
+    if posterior.chain is None:
+        return np.asarray(ndtr((theta - posterior.theta) / posterior.best.laplace.standard_deviations))
+    return np.asarray(np.mean(posterior.chain.theta < theta, axis=0))
 
 
 def noise_of(points: Floats, sigma: float, radius: float, rng: np.random.Generator) -> Floats:
     """Noise (n, 3) as it is believed to be where `sigma` is declared: its size, what neighbours share, gross errors."""
     count, (values, log_probability) = len(points), scales()
     along, times = np.tile(np.eye(3), (count, 1)), np.full(3 * count, np.inf)
-    factor = noise_factor(np.repeat(points, 3, axis=0), along, times, np.full(3 * count, sigma), radius)
+    sigmas = np.full(3 * count, sigma)
+    factor = noise_factor(noise_covariance(np.repeat(points, 3, axis=0), along, times, sigmas, radius), sigmas)
     believed = outliers()
     inflation = rng.choice(believed.inflations, count, p=np.exp(believed.log_probabilities))
     found = factor @ rng.normal(size=3 * count)

@@ -16,6 +16,7 @@ from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.cases.writing import write_case
+from warpbrain.estimation.options import Listener
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.recording import TestRecording
@@ -25,7 +26,6 @@ from warpbrain.report.diagnosis.page import write_page
 from warpbrain.report.diagnosis.text import diagnosis_lines
 from warpbrain.report.files import write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
-from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from warpbrain.diagnosis.held_out import HeldOut, blocks_of, distance, share_of_patterns
+from warpbrain.diagnosis.held_out import HeldOut, blocks_of, distance
 from warpbrain.inference import GaussianModel
-from warpbrain.inference.predict import predict, predict_with
+from warpbrain.inference.predict import p_value, predict, predict_with
 
 N = 30
 
@@ -71,7 +71,7 @@ def test_patterns_that_mean_nothing_do_not_predict() -> None:
     way = HeldOut(sensors(), True)
     own = way.predict(given.with_columns(5.0 * truth), residual)
     patterns = way.with_patterns(given, residual, rng.normal(size=(N, 8)), 1, 2, rng)
-    assert share_of_patterns(own, patterns) < 0.02
+    assert p_value(own.log_density, [pattern.log_density for pattern in patterns]) < 0.02
     assert min(way.error(pattern) for pattern in patterns) > way.error(own)
 
 

@@ -122,7 +122,7 @@ def relaxing(diagnosed: tuple[str, Diagnosis]) -> tuple[Base, Candidates]:
 @pytest.mark.parametrize("c", [(0.1, np.log(30.0)), (0.1, np.log(10.0), np.log(100.0), 0.5)])
 def test_what_relaxes_moves_less_as_its_times_say(relaxing: tuple[Base, Candidates], c: tuple[float, ...]) -> None:
     base, candidates = relaxing
-    own = [candidates.effects[k].proposed for k in candidates.of_kind["viscoelasticity"]]
+    own = [effect.proposed for effect in candidates.effects["viscoelasticity"]]
     proposal = replace(next(one for one in own if len(one) == len(c)), mean=np.array(c))
     [effect] = base.effects.of([proposal])
     without, acting = (

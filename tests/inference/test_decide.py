@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.causes import Kind
+from warpbrain.inference.causes import Configuration, Hypothesis, Kind
 from warpbrain.inference.decide import (
     CANNOT_SAY,
     GROUP,
@@ -18,7 +18,6 @@ from warpbrain.inference.decide import (
     decide,
     loss,
 )
-from warpbrain.inference.hypothesis import Configuration, Hypothesis
 
 KINDS = {"unknown": Kind.UNKNOWN, "registration": Kind.NOT_PHYSICS, "mesh": Kind.NOT_PHYSICS}
 LOSSES = calibration().losses

@@ -8,7 +8,7 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import Outliers, columns_of_inflation, with_gross_errors
+from warpbrain.inference.gross_errors import Outliers, PointRows, columns_of_inflation, with_gross_errors
 
 PRIOR = Outliers(0.03, 15.0)
 #: Two kinds of gross errors.
@@ -128,6 +128,6 @@ def test_begun_with_gross_errors_of_a_similar_hypothesis_it_ends_at_the_same(pri
     residual[POINTS[1]] += 40.0 * random.normal(size=3)
     cold = with_gross_errors(one, residual, POINTS, prior)
     for sound in (cold.inflation, np.where(np.arange(6) == 3, prior.inflation, 1.0)):
-        warm = with_gross_errors(one, residual, POINTS, prior, start=sound)
+        warm = PointRows(one, residual, POINTS).with_gross_errors(prior, sound)
         np.testing.assert_array_equal(warm.inflation, cold.inflation)
         assert warm.log_density == pytest.approx(cold.log_density, abs=1e-9)

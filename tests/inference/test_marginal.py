@@ -4,7 +4,7 @@ import numpy as np
 
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import with_gross_errors
-from warpbrain.inference.marginal import marginal
+from warpbrain.inference.marginal import Marginal, RowsAtScales, marginal_of
 from warpbrain.inference.noise import outliers, scales
 
 N = 30
@@ -19,6 +19,10 @@ def drawn(random: np.random.Generator, bad: tuple[int, ...]) -> tuple[GaussianMo
     return model, residual
 
 
+def marginal(model: GaussianModel, residual: np.ndarray, scale: float = 1.0) -> Marginal:
+    return marginal_of(model, POINTS, RowsAtScales(model, residual, POINTS).summed(scale=scale))
+
+
 def test_evidence_is_the_sum_over_scales():
     model, residual = drawn(np.random.default_rng(0), (4,))
     values, log_prior = scales()
@@ -27,12 +31,12 @@ def test_evidence_is_the_sum_over_scales():
         for scale, prior in zip(values.tolist(), log_prior.tolist(), strict=True)
     ]
     for near in (0.7, 1.0, 3.0):
-        assert abs(marginal(model, residual, POINTS, near).log_evidence - np.logaddexp.reduce(logs)) < 2e-3
+        assert abs(marginal(model, residual, near).log_evidence - np.logaddexp.reduce(logs)) < 2e-3
 
 
 def test_gross_errors_are_louder_in_its_noise():
     model, residual = drawn(np.random.default_rng(1), (2, 7))
-    found = marginal(model, residual, POINTS)
+    found = marginal(model, residual)
     assert np.flatnonzero(found.gross).tolist() == [2, 7]
     own = found.scale**2 * model.noise_factor @ model.noise_factor.T
     louder = np.diag(found.noise.noise_factor @ found.noise.noise_factor.T) / np.diag(own)
@@ -43,6 +47,6 @@ def test_gross_errors_are_louder_in_its_noise():
 
 def test_coordinates_are_of_the_columns_of_the_hypothesis():
     model, residual = drawn(np.random.default_rng(2), (0,))
-    found = marginal(model, residual, POINTS)
+    found = marginal(model, residual)
     same = GaussianModel(found.noise.noise_factor, model.columns)
     np.testing.assert_allclose(found.coordinates(residual), same.coefficients(residual)[0], atol=1e-9)

@@ -40,7 +40,7 @@ def test_covariance_is_its_definition() -> None:
                 expected[i, j] += sigma[i] * sigma[j] * alike
     found = noise_covariance(positions, directions, times, sigma, RADIUS)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-20)
-    factor = noise_factor(positions, directions, times, sigma, RADIUS)
+    factor = noise_factor(found, sigma)
     np.testing.assert_allclose(factor @ factor.T, expected, rtol=1e-12, atol=1e-20)
     np.testing.assert_array_equal(factor, np.tril(factor))
 

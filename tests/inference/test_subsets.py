@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from scipy import stats
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from warpbrain.inference.causes import Cause, Place
 from warpbrain.inference.gaussian import GaussianModel
@@ -68,7 +68,7 @@ def test_evidence_is_the_sum_of_the_densities_written_out() -> None:
     random = np.random.default_rng(0)
     one, causes = model(random), some_causes(random)
     residual = one.draws(1, random)[:, 0] + 2.0 * causes[0].places[1].columns @ [1.0, 0.3, -0.5]
-    found = {hypothesis.causes: hypothesis for hypothesis in posterior(one, residual, causes, SCALES).hypotheses}
+    found = {hypothesis.causes: hypothesis for hypothesis in posterior(one, residual, causes, SCALES)}
     for count in range(3):
         for members in combinations(range(4), count):
             expected = by_hand(one, residual, causes, members)
@@ -85,7 +85,7 @@ def test_a_place_has_its_share_of_the_evidence() -> None:
     random = np.random.default_rng(6)
     one, causes = model(random), some_causes(random)
     residual = one.draws(1, random)[:, 0] + 0.5 * causes[0].places[2].columns @ [1.0, -0.4, 0.2]
-    for hypothesis in posterior(one, residual, causes, SCALES).hypotheses:
+    for hypothesis in posterior(one, residual, causes, SCALES):
         if len(hypothesis.causes) != 1:
             assert hypothesis.best.log_share == 0.0
             continue
@@ -101,7 +101,7 @@ def test_best_configuration_has_the_greatest_density() -> None:
     random = np.random.default_rng(1)
     one, causes = model(random), some_causes(random)
     residual = one.draws(1, random)[:, 0] + 4.0 * causes[0].places[2].columns @ [1.0, 1.0, -0.5]
-    best = posterior(one, residual, causes, SCALES).hypotheses[0]
+    best = posterior(one, residual, causes, SCALES)[0]
     assert "patch" in best.causes
     assert next(member.place for member in best.best.members if member.cause == 0) == 2
 
@@ -125,7 +125,9 @@ def test_probabilities_are_calibrated_over_draws_of_the_model(verify) -> None:
             rows += size * place.columns @ random.normal(size=place.columns.shape[1])
             rows += 0.0 if place.mean is None else place.mean
         found = posterior(one, rows, causes, search)
-        for p, names in zip(found.probabilities, (hypothesis.causes for hypothesis in found.hypotheses), strict=True):
+        for p, names in zip(
+            softmax([h.log_evidence + h.log_prior for h in found]), (h.causes for h in found), strict=True
+        ):
             if names == ("patch",) or names == ("patch", "level"):
                 scores += float(tuple(causes[c].name for c in members) == names) - p
                 variance += p * (1.0 - p)
@@ -164,7 +166,7 @@ def test_a_single_cause_keeps_its_next_best_places():
     given, causes = model(random), some_causes(random)
     residual = given.draws(1, random)[:, 0] + causes[0].places[2].columns @ random.normal(size=3)
     found = posterior(given, residual, causes, Search(SCALES.scales, SCALES.log_scale_prior, elsewhere=2))
-    for hypothesis in found.hypotheses:
+    for hypothesis in found:
         if len(hypothesis.causes) != 1:
             assert hypothesis.elsewhere == ()
             continue
@@ -179,7 +181,7 @@ def test_a_single_cause_keeps_its_next_best_places():
             [member] = configuration.members
             only = Cause(cause.name, (cause.places[member.place],), cause.log_prior, cause.sizes)
             alone = posterior(given, residual, [only], SCALES)
-            best = next(h.best for h in alone.hypotheses if h.causes)
+            best = next(h.best for h in alone if h.causes)
             total = sum(place.weight for place in cause.places)
             weight = np.log(cause.places[member.place].weight / total)
             assert configuration.log_density == pytest.approx(best.log_density + weight)

@@ -13,11 +13,11 @@ from warpbrain.atomic import output_folder, safe_name
 from warpbrain.bench import command
 from warpbrain.cases.shipped import find_case
 from warpbrain.diagnosis.diagnose import Diagnosing
+from warpbrain.estimation.options import Listener
 from warpbrain.report.summary import machine
 from warpbrain.simulation.system import find_device
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.quiet import start_warp_quietly
-from warpbrain.worlds.listener import Listener
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from warpbrain.cli import warp
 from warpbrain.cli.options import WARPED, add_results, add_to, note_case
-from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.terminal.record import Record
@@ -49,7 +48,7 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
 
 
 def _run(options: argparse.Namespace) -> None:
-    from warpbrain.worlds.listener import Listener
+    from warpbrain.estimation.options import Listener
     from warpbrain.worlds.options import DiagnosisOptions
 
     kinds = None if options.candidates == "all" else tuple(options.candidates.split(","))
@@ -83,16 +82,11 @@ def _run(options: argparse.Namespace) -> None:
     warp.check_place(images, case)
     run, tables = _of_a_body() if case.specimen is None else _of_a_specimen()
 
-    def on_stage(text: str) -> None:
-        progress.clear()
-        say(f"  {text}")
-
-    with Progress("diagnosis", options.quiet) as progress:
-        diagnosing = run(case, asked, device, Listener(on_stage, progress.show))
-        out = choose_folder(options.out, f"warpbrain-diagnose-{safe_name(case.name)}", options.overwrite)
-        note_case(record, case, device)
-        say(case.title)
-        found = diagnosing.run()
+    diagnosing = run(case, asked, device, Listener(lambda text: say(f"  {text}")))
+    out = choose_folder(options.out, f"warpbrain-diagnose-{safe_name(case.name)}", options.overwrite)
+    note_case(record, case, device)
+    say(case.title)
+    found = diagnosing.run()
     said = describe(found, asked, device)
     say("", *diagnosis_lines(said), sep="\n")
     with results_in(out, record, options.overwrite):

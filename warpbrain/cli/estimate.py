@@ -147,8 +147,9 @@ def _options(options: argparse.Namespace) -> EstimationOptions:
 def _estimate(
     options: argparse.Namespace, settings: EstimationOptions, case: Case, images: Asked | None, out: Path
 ) -> None:
-    from warpbrain.estimation.estimate import Estimation, Listener
+    from warpbrain.estimation.estimate import Estimation
     from warpbrain.estimation.fit import GaussNewtonStep
+    from warpbrain.estimation.options import Listener
     from warpbrain.gp.trained import find_model
     from warpbrain.report import estimate_picture
     from warpbrain.report.estimate import describe_estimate, estimate_lines, write_predictions
@@ -221,9 +222,9 @@ def _what_else(
     from numpy.linalg import LinAlgError
 
     from warpbrain.diagnosis.locating import map_of_search
+    from warpbrain.estimation.options import Listener
     from warpbrain.worlds.body.averaged_tissue import averaged_tissue
     from warpbrain.worlds.body.screened import screened
-    from warpbrain.worlds.listener import Listener
     from warpbrain.worlds.options import DiagnosisOptions
 
     prior, mesh_error = posterior.best.problem.mode.gaussian, posterior.options.discretisation is not None

@@ -2,50 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.diagnosis.held_out import HeldOut, share_of_patterns, tries_of
+from warpbrain.diagnosis.held_out import HeldOut, tries_of
 from warpbrain.inference import GaussianModel, Kind
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation
-from warpbrain.inference.predict import Prediction, predictive_p
+from warpbrain.inference.predict import Prediction, p_value, predictive_p
 from warpbrain.worlds.body.effects import width_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOutErrors:
-    """Held-out rows with a set of causes and with none.
-
-    Attributes
-    ----------
-    without, explained : Prediction
-    improvement : (part, low, high)
-        Part of the error that is removed, and its 95 % interval.
-    patterns : (low, high)
-        Quantiles of 5 and 95 % of the error [m] with random patterns in the place of mechanisms.
-    """
-
-    without: Prediction
-    explained: Prediction
-    improvement: tuple[float, float, float]
-    patterns: tuple[float, float]
-
-
 class Confirming:
     """Checks the sets of one search.
 
-    Parameters
-    ----------
-    search : HypothesisSearch
-    draws : int
-        Of rows from each model.
-    random : Generator
+    `draws`: of rows from each model.
     """
 
     def __init__(self, search: HypothesisSearch, draws: int, random: np.random.Generator) -> None:
@@ -128,28 +102,27 @@ class Confirming:
             weighted_set.hypothesis.log_evidence - others.hypothesis.log_evidence,
             full.gain(reduced),
             held_out.improvement(full, reduced, self._random),
-            share_of_patterns(full, patterns),
+            p_value(full.log_density, [pattern.log_density for pattern in patterns]),
         )
 
     def _patterns(self, others: WeightedSet, held_out: HeldOut, freedom: int, places: int) -> tuple[Prediction, ...]:
         model = others.marginal.model
         return held_out.with_patterns(model, others.residual, self.modes, freedom, tries_of(places), self._random)
 
-    def held_out(self, nothing: WeightedSet, weighted_set: WeightedSet) -> HeldOutErrors:
-        """Held-out rows with a set and without any cause."""
+    def improvement(
+        self, nothing: WeightedSet, weighted_set: WeightedSet
+    ) -> tuple[tuple[float, float], tuple[float, float, float]]:
+        """Held-out errors with random patterns in the place of the mechanisms of a set, and what these improve.
+
+        Quantiles of 5 and 95 % of the former [m]; the part of the error without any cause that is removed, and its 95 %
+        interval.
+        """
         held_out = self.held_out_for(weighted_set)
+        places = max(len(self.search.causes.named(name).places) for name in weighted_set.mechanisms)
+        patterns = self._patterns(nothing, held_out, width_of(weighted_set.effects), places)
+        low, high = np.quantile([held_out.error(pattern) for pattern in patterns], [0.05, 0.95]).tolist()
         without, explained = self.predict(nothing, held_out), self.predict(weighted_set, held_out)
-        freedom = width_of(weighted_set.effects)
-        places = max((len(self.search.causes.named(name).places) for name in weighted_set.mechanisms), default=1)
-        patterns = self._patterns(nothing, held_out, max(freedom, 1), places)
-        errors = [held_out.error(pattern) for pattern in patterns]
-        low, high = np.quantile(errors, [0.05, 0.95]).tolist()
-        return HeldOutErrors(
-            without,
-            explained,
-            held_out.improvement(explained, without, self._random),
-            (low, high),
-        )
+        return (low, high), held_out.improvement(explained, without, self._random)
 
     def ceiling(self, nothing: WeightedSet, held_out: HeldOut) -> float:
         """Least held-out error [m] with an unknown field."""

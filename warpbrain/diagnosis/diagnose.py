@@ -9,18 +9,18 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
 from warpbrain.diagnosis.checking import check_errors
-from warpbrain.diagnosis.confirming import Confirming, HeldOutErrors
-from warpbrain.diagnosis.course import size_over_time
+from warpbrain.diagnosis.confirming import Confirming
 from warpbrain.diagnosis.held_out import distance
 from warpbrain.diagnosis.locating import ScoreMap, map_of_search
 from warpbrain.diagnosis.measuring import next_measurements
-from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of
+from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time
 from warpbrain.diagnosis.ranking import Ranking, about_base
 from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked
 from warpbrain.diagnosis.sentences import assumptions_of
 from warpbrain.diagnosis.telling_apart import imitations, smallest
 from warpbrain.diagnosis.traits import Traits, traits_of
 from warpbrain.errors import require_kind
+from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import Confirmation, after_checks
@@ -34,15 +34,14 @@ from warpbrain.inference.decide import (
     Decision,
     decide,
 )
+from warpbrain.inference.predict import Prediction
 from warpbrain.physics.words import Measurement
 from warpbrain.seconds import Seconds
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.observable import require_observable
-from warpbrain.worlds.body.screened import screened
+from warpbrain.worlds.body.screened import require_observable, screened
 from warpbrain.worlds.body.surfaces import with_sets_that_act
 from warpbrain.worlds.body.weighted_set import WeightedSet
-from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
@@ -72,17 +71,7 @@ class _Checked:
 class Diagnosing:
     """Diagnoses one case.
 
-    Parameters
-    ----------
-    case : Case
-    options : DiagnosisOptions, optional
-    device : str, optional
-    listener : Listener, optional
-
-    Raises
-    ------
-    InputError
-        If the case has too few recordings for any conclusion, or is a specimen.
+    `InputError` if the case has too few recordings for any conclusion, or is a specimen.
     """
 
     def __init__(
@@ -101,10 +90,7 @@ class Diagnosing:
     def run(self) -> Diagnosis:
         """Run every stage.
 
-        Raises
-        ------
-        SolveError
-            If the case as declared has no equilibrium.
+        `SolveError` if the case as declared has no equilibrium.
         """
         with one_thread_of_blas():
             diagnosis = self._run()
@@ -138,7 +124,10 @@ class Diagnosing:
         with self.seconds.of("checks"):
             checked = self._checked(search, confirming, by_posterior)
             best, named = checked.best, checked.named
-            held_out = confirming.held_out(nothing, best) if named else None
+            weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
+            blocks = confirming.held_out_for(best)
+            predictions = {name: confirming.predict(candidate, blocks) for name, candidate in weighted_sets.items()}
+            fit = self._fit(confirming, weighted_sets, predictions, checked.confirmations)
             ranking = Ranking(search, confirming)
             ranked = ranking.all()
         with self.seconds.of("where"):
@@ -150,10 +139,6 @@ class Diagnosing:
         self.listener.stage("what to measure next")
         with self.seconds.of("next measurement"):
             measurements = _next(search, ranked)
-        weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
-        predictions = {REFITTED: confirming.predict(nothing, confirming.held_out_for(best))}
-        if held_out is not None:
-            predictions = {REFITTED: held_out.without, EXPLAINED: held_out.explained}
         return Diagnosis(
             case=self.case,
             decision=checked.decision,
@@ -174,7 +159,7 @@ class Diagnosing:
             smallest=seen,
             confusion=confusion,
             next_measurement=measurements,
-            fit=self._fit(confirming, weighted_sets, held_out, checked.confirmations),
+            fit=fit,
             confirmations=checked.confirmations,
             assumptions=assumptions_of(self.case, search.base, best),
             remarks=search.base.remarks,
@@ -228,25 +213,27 @@ class Diagnosing:
         self,
         confirming: Confirming,
         weighted_sets: dict[str, WeightedSet],
-        held_out: HeldOutErrors | None,
+        held_out: dict[str, Prediction],
         confirmations: tuple[Confirmation, ...],
     ) -> Fit:
         nothing, base = weighted_sets[REFITTED], confirming.search.base
+        best = weighted_sets.get(EXPLAINED, nothing)
         sensors = base.at.sensors
         declared = distance(base.declared.sensors, base.declared.sensors.residual)
-        blocks = confirming.held_out_for(weighted_sets.get(EXPLAINED, nothing))
-        without = confirming.predict(nothing, blocks) if held_out is None else held_out.without
-        in_sample = {name: distance(sensors, s.best_residual) for name, s in weighted_sets.items()}
-        explained = None if held_out is None else (in_sample[EXPLAINED], blocks.error(held_out.explained))
-        refits = [weighted_set.refit for weighted_set in weighted_sets.values() if weighted_set.refit is not None]
+        errors = {
+            name: (distance(sensors, candidate.best_residual), distance(sensors, held_out[name].errors))
+            for name, candidate in weighted_sets.items()
+        }
+        patterns, improvement = (None, None) if best is nothing else confirming.improvement(nothing, best)
+        refits = [candidate.refit for candidate in weighted_sets.values() if candidate.refit is not None]
         return Fit(
             (declared, declared),
-            (in_sample[REFITTED], blocks.error(without)),
-            explained,
-            None if held_out is None else held_out.improvement,
-            None if held_out is None else max(confirmation.placebo_p for confirmation in confirmations),
-            None if held_out is None else held_out.patterns,
-            confirming.ceiling(nothing, blocks),
+            errors[REFITTED],
+            errors.get(EXPLAINED),
+            improvement,
+            None if best is nothing else max(confirmation.placebo_p for confirmation in confirmations),
+            patterns,
+            confirming.ceiling(nothing, confirming.held_out_for(best)),
             check_errors(self.case, base, refits),
         )
 

@@ -49,11 +49,7 @@ def distance(sensors: Sensors, errors: Floats) -> float:
 class HeldOut:
     """Predicts the rows of one case.
 
-    Parameters
-    ----------
-    sensors : Sensors
-    local : bool
-        Whether all that acts is local.
+    `local`: whether all that acts is local.
     """
 
     def __init__(self, sensors: Sensors, local: bool) -> None:
@@ -87,17 +83,8 @@ class HeldOut:
         A pattern is a random mixture of the modes of a smooth force with the size that fits best. The best of `tries`
         patterns is taken, as the mechanism is the best of its places.
 
-        Parameters
-        ----------
-        without : GaussianModel
-            Of all else that acts.
-        residual : (n,) array
-        modes : (n, m) array
-            As large as the noise.
-        freedom : int
-            Coefficients of the mechanism.
-        tries : int
-        random : Generator
+        `without`: of all else that acts. `residual` (n,). `modes` (n, m): as large as the noise. `freedom`:
+        coefficients of the mechanism.
         """
         sizes = beliefs("unknown.sizes")
         chosen = []
@@ -115,12 +102,6 @@ class HeldOut:
         column_sets = [size * columns for columns in fields for size in beliefs("unknown.sizes")]
         predictions = predict_with(model, residual, self.blocks, column_sets)
         return self.error(max(predictions, key=lambda prediction: prediction.log_density))
-
-
-def share_of_patterns(prediction: Prediction, patterns: Sequence[Prediction]) -> float:
-    """p-value of a prediction among those with random patterns."""
-    better = sum(pattern.log_density >= prediction.log_density for pattern in patterns)
-    return float((1 + better) / (1 + len(patterns)))
 
 
 def tries_of(places: int) -> int:

@@ -16,6 +16,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief
+from warpbrain.inference.predict import p_value
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.unknown import force_patches
@@ -96,13 +97,7 @@ def ball_of(sites: Floats, weights: Floats) -> tuple[Floats, float]:
 def map_of_search(search: HypothesisSearch, draws: int, random: np.random.Generator, alpha: float = 0.05) -> ScoreMap:
     """The map of what is left of the recordings of a case if nothing acts but what it declares, its tissue fitted.
 
-    Parameters
-    ----------
-    search : HypothesisSearch
-    draws : int
-        Of recordings if nothing else acts.
-    random : Generator
-    alpha : float
+    `draws`: of recordings if nothing else acts.
     """
     nothing = search.nothing
     model = nothing.marginal.model
@@ -122,17 +117,8 @@ def score_map(
 ) -> ScoreMap:
     """The map of residuals (n,).
 
-    Parameters
-    ----------
-    at : Linearisation
-    model : GaussianModel
-        Of noise and nuisances.
-    residual : (n,) array
-    draws : (n, b) array
-        Of rows if no cause acts.
-    length, spacing : float
-        Of patches and between them [m].
-    alpha : float
+    `model`: of noise and nuisances. `residual` (n,). `draws` (n, b): of rows if no cause acts. `length`, `spacing`: of
+    patches and between them [m].
     """
     from scipy.special import chdtrc, chdtri
 
@@ -158,7 +144,7 @@ def score_map(
         length,
         observed,
         threshold,
-        float((1 + np.sum(largest >= observed.max())) / (1 + len(largest))),
+        p_value(observed.max(), largest),
         float(chdtrc(3, observed.max())),
         np.sqrt(needed / np.maximum(weakest, 1e-300)),
         observed.max() - observed <= float(chdtri(3, 0.05)),

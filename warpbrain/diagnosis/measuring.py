@@ -33,12 +33,7 @@ def next_measurements(
 ) -> tuple[Measurement, ...]:
     """Measurements in the order of how they discriminate between two mechanisms, the first of which is taken for true.
 
-    Parameters
-    ----------
-    base : Base
-    first, second : WeightedSet
-        Sets with the first and with the second mechanism.
-    names : (str, str)
+    `first`, `second`: sets with the first and with the second mechanism. `names` (str, str).
     """
     pairs = zip((first, second), names, strict=True)
     effects = tuple(weighted_set.effects[weighted_set.mechanisms.index(name)] for weighted_set, name in pairs)
@@ -119,7 +114,7 @@ class _Discrimination:
         from scipy.spatial.transform import Rotation
 
         part, columns = self._base.nuisances.part("registration"), self._base.nuisances.columns
-        own, factor = columns[:, part], self._base.model.noise_factor
+        registration, factor = columns[:, part], self._base.model.noise_factor
         common = columns.copy()
         common[:, part] = 0.0
         measurements = []
@@ -128,8 +123,8 @@ class _Discrimination:
             effects = [_turned(self._base, effect, rotation) for effect in self._effects]
             if all(turned is effect for turned, effect in zip(effects, self._effects, strict=True)):
                 return []
-            first = np.column_stack([self._rows, np.zeros_like(own)])
-            second = np.column_stack([self._rows_of(effects[0], effects[1], common), own])
+            first = np.column_stack([self._rows, np.zeros_like(registration)])
+            second = np.column_stack([self._rows_of(effects[0], effects[1], common), registration])
             expected_nats = self._expected_nats(np.concatenate([first, second]), factor, factor)
             measurements.append((f"by {_TURN:g} degrees about its {words} axis", expected_nats))
         return [max(measurements, key=lambda measurement: measurement[1])]

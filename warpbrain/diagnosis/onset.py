@@ -14,18 +14,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.diagnosis.course import SizeOverTime
 from warpbrain.inference import Cause, GaussianModel, Place
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.blocks import Blocks
+from warpbrain.physics.proposal import Varying
+from warpbrain.physics.words import label
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses, unknown_cause
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.parameters import mechanism_numbers
 from warpbrain.worlds.body.time_courses import TimeCourse, factor_of_rows, finite_times, time_courses
 
 #: Course of a mechanism that changes in time by itself.
 OF_ITS_OWN = "as its own law says, since the load came"
 #: Course of one whose size was found as a function of time.
 AS_IT_CHANGES = "its size changes with time"
+
+
+@dataclass(frozen=True)
+class SizeOverTime:
+    """One parameter of a mechanism at the recorded times."""
+
+    #: Its name, and what it is in words.
+    parameter: str
+    says: str
+    unit: str
+    #: Times [s], and the parameter with its standard deviation in `unit`.
+    seconds: tuple[float, ...]
+    values: tuple[float, ...]
+    deviations: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -57,17 +74,8 @@ class Onset:
 def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianModel, residual: Floats) -> Onset | None:
     """When a cause set in; None where nothing was recorded at several times.
 
-    Parameters
-    ----------
-    base : Base
-    cause : Cause or None
-        The best explanation, as if it acted all the time; None: an unknown force.
-    in_time : bool
-        Whether it changes in time under constant loads.
-    model : GaussianModel
-        Of all else that acts.
-    residual : (n,) array
-        Less what is expected of all else.
+    `cause`: the best explanation, as if it acted all the time; None: an unknown force. `in_time`: whether it changes in
+    time under constant loads. `model`: of all else that acts. `residual` (n,): less what is expected of all else.
     """
     times = np.array(base.states.times)
     if len(times) < 2:
@@ -127,3 +135,47 @@ def _summary(edges: list[float], courses: list[TimeCourse], evidence: Floats) ->
         likeliest if of_shape[likeliest] >= belief("checks.sure") else "",
         tuple((a, b, float(p)) for a, b, p in zip(edges[:-1], edges[1:], of_interval, strict=True)),
     )
+
+
+def size_over_time(effect: Effect, z: Floats, covariance: Floats) -> SizeOverTime | None:
+    """The parameter that changes most, to first order; None if the size of an effect is no function of time.
+
+    `z` (k,): its coordinates. `covariance` (k, k): of these.
+    """
+    varying = effect.proposed.over_time
+    if varying is None:
+        return None
+    numbers = _numbers(varying, effect.coefficients(z))
+    # of a vector its length
+    spans = {
+        name: float(np.ptp(values) / max(np.abs(values).max(), 1e-300))
+        for name, (values, _) in numbers.items()
+        if not name.endswith(("_x", "_y", "_z"))
+    }
+    if not spans:
+        return None
+    name = max(spans, key=lambda parameter: spans[parameter])
+    values, unit = numbers[name]
+    spread, along = np.linalg.eigh(covariance)
+    factor = along * np.sqrt(np.maximum(spread, 0.0))
+    changes = [(_values(varying, effect.coefficients(z + 0.1 * column), name) - values) / 0.1 for column in factor.T]
+    says = varying.base.make(varying.base.mean).parameters()[name.removesuffix("_size")].doc
+    return SizeOverTime(
+        name,
+        label(says),
+        unit,
+        tuple(varying.times.tolist()),
+        tuple(values.tolist()),
+        tuple(np.linalg.norm(changes, axis=0).tolist()),
+    )
+
+
+def _numbers(varying: Varying, c: Floats) -> dict[str, tuple[Floats, str]]:
+    """Parameters over time (m,) with units, by name."""
+    by_time = [mechanism_numbers(varying.base.make(varying.at(c, time))) for time in varying.times.tolist()]
+    names = [name for name in by_time[0] if name != "share" and all(name in numbers for numbers in by_time)]
+    return {name: (np.array([numbers[name][0] for numbers in by_time]), by_time[0][name][1]) for name in names}
+
+
+def _values(varying: Varying, c: Floats, name: str) -> Floats:
+    return _numbers(varying, c)[name][0]

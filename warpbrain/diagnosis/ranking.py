@@ -17,13 +17,7 @@ from warpbrain.worlds.body.weighted_set import WeightedSet
 
 
 class Ranking:
-    """Ranks the causes of one search.
-
-    Parameters
-    ----------
-    search : HypothesisSearch
-    confirming : Confirming
-    """
+    """Ranks the causes of one search."""
 
     def __init__(self, search: HypothesisSearch, confirming: Confirming) -> None:
         self._search, self._confirming = search, confirming

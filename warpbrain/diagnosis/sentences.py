@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,93 +9,40 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.traits import Traits
 from warpbrain.inference.beliefs import belief
-from warpbrain.inference.decide import (
-    CANNOT_SAY,
-    GROUP,
-    NAMED,
-    NAMED_AND_REST,
-    NOT_PHYSICS,
-    NOTHING,
-    UNKNOWN,
-)
+from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.probability import percent
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.physics.sizes import size_in_words, smallest_in_words
+from warpbrain.physics.sizes import size_in_words
 from warpbrain.physics.words import length, measured, number, place
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.not_physics import SENTENCES
 from warpbrain.worlds.body.weighted_set import WeightedSet
+from warpbrain.worlds.sentences import Words, clause, grounds, verdict_in_words
 
 if TYPE_CHECKING:
-    from warpbrain.diagnosis.result import Confusion, Diagnosis, Fit, Ranked
+    from warpbrain.diagnosis.result import Confusion, Diagnosis, Ranked
 
 
 def sentence_of(diagnosis: Diagnosis) -> str:
     """The verdict for people: whole sentences, in millimetres, pascals, percent and degrees."""
-    doubts = f" {' '.join(diagnosis.doubts)}" if diagnosis.doubts else ""
-    return f"{_SENTENCES[diagnosis.verdict](diagnosis)}{doubts}"
-
-
-def _nothing(diagnosis: Diagnosis) -> str:
-    detectable = "; ".join(
-        f"{kind} {smallest_in_words(kind, smallest)}" for kind, smallest in diagnosis.smallest.items()
+    fit, ranking, named = diagnosis.fit, diagnosis.ranking, diagnosis.named
+    chances = {ranked.kind: ranked.probability for ranked in ranking}
+    least = belief("checks.perhaps")
+    likely = [ranked for ranked in ranking if ranked.kind != UNKNOWN and ranked.probability > least][:2]
+    errors = None if fit.explained is None else (length(fit.explained[1]), length(fit.refitted[1]))
+    words = Words(
+        data="these data",
+        nothing="nothing was looked for",
+        unnamed="a force without a name",
+        named=[effect_sentence(ranked, diagnosis.case.gravity_axis) for ranked in named],
+        grounds=grounds([ranked.probability for ranked in named], "points", errors),
+        members=[(sentence_of_kind(kind), chances.get(kind, 0.0)) for kind in diagnosis.group if kind != UNKNOWN],
+        perhaps=[clause(sentence_of_kind(ranked.kind)) for ranked in likely],
+        missing=f"Something is {'' if all(ranked.physics for ranked in likely) else 'wrong or '}missing",
+        rest=_traits(diagnosis),
     )
-    return (
-        f"No missing physics is detected ({_chance(diagnosis)}). What these data would have shown: "
-        f"{detectable or 'nothing was looked for'}."
-    )
-
-
-def _named(diagnosis: Diagnosis) -> str:
-    sentences = [effect_sentence(ranked, diagnosis.case.gravity_axis) for ranked in diagnosis.named]
-    further = [f"Beside it: {sentence[0].lower()}{sentence[1:]}" for sentence in sentences[1:]]
-    text = f"{' '.join([sentences[0], *further])} {_grounds(diagnosis.named, diagnosis.fit)}"
-    if diagnosis.verdict == NAMED:
-        return text
-    return f"{text} Something else is left, which this does not explain.{_traits(diagnosis)}"
-
-
-def _group(diagnosis: Diagnosis) -> str:
-    chances = {ranked.kind: ranked.probability for ranked in diagnosis.ranking}
-    members = [kind for kind in diagnosis.group if kind != UNKNOWN]
-    which = "; or ".join(f"{_clause(kind)} ({percent(chances.get(kind, 0.0))})" for kind in members)
-    other = "; or something without a name" if UNKNOWN in diagnosis.group else ""
-    missing = f"Something is missing ({_chance(diagnosis)})"
-    return f"{missing}, and these data do not tell which of these it is: {which}{other}."
-
-
-def _unknown(diagnosis: Diagnosis) -> str:
-    return (
-        f"Something is missing ({_chance(diagnosis)}) that none of the known mechanisms explains: a force without a "
-        f"name fits better than all of them.{_traits(diagnosis)}"
-    )
-
-
-def _not_physics(diagnosis: Diagnosis) -> str:
-    sentence = SENTENCES[diagnosis.decision.causes[0]]
-    return f"It is not physics that is missing ({_chance(diagnosis)}). {sentence} That explains the mismatch better."
-
-
-def _cannot_say(diagnosis: Diagnosis) -> str:
-    likely = [
-        ranked
-        for ranked in diagnosis.ranking
-        if ranked.kind != UNKNOWN and ranked.probability > belief("checks.perhaps")
-    ][:2]
-    perhaps = f" Perhaps: {'; or '.join(_clause(ranked.kind) for ranked in likely)}." if likely else ""
-    missing = "Something is missing" if all(ranked.physics for ranked in likely) else "Something is wrong or missing"
-    return f"{missing} ({_chance(diagnosis)}), but these data cannot say what.{perhaps}"
-
-
-_SENTENCES: dict[str, Callable[[Diagnosis], str]] = {
-    NOTHING: _nothing,
-    NAMED: _named,
-    NAMED_AND_REST: _named,
-    GROUP: _group,
-    UNKNOWN: _unknown,
-    NOT_PHYSICS: _not_physics,
-    CANNOT_SAY: _cannot_say,
-}
+    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.smallest, words)
+    return " ".join([sentence, *diagnosis.doubts])
 
 
 def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | None = None) -> str:
@@ -129,12 +75,6 @@ def sentence_of_kind(kind: str) -> str:
     return SENTENCES.get(kind, "Something acts that is none of the known mechanisms.")
 
 
-def _clause(kind: str) -> str:
-    """The sentence of a kind as a clause."""
-    sentence = sentence_of_kind(kind)
-    return f"{sentence[0].lower()}{sentence[1:].rstrip('.')}"
-
-
 def _where(ranked: Ranked) -> str:
     if ranked.centre is None:
         return f" Where: {ranked.region}." if ranked.region else ""
@@ -142,21 +82,6 @@ def _where(ranked: Ranked) -> str:
     radius = f", within {number(1e3 * ranked.radius, 1)} mm" if ranked.radius else ""
     surface = f", on the {ranked.region}" if ranked.region else ""
     return f" It lies about {place(ranked.centre, 10.0 * (ranked.radius or 1.0))}{radius}{surface}."
-
-
-def _grounds(named: Sequence[Ranked], fit: Fit) -> str:
-    before = length(fit.refitted[1])
-    chances = " and ".join(percent(ranked.probability) for ranked in named)
-    probable = f"Its probability is {chances}" if len(named) == 1 else f"Their probabilities are {chances}"
-    if fit.explained is None:
-        return f"{probable}."
-    after = length(fit.explained[1])
-    these = "it" if len(named) == 1 else "them"
-    return f"{probable}; points that were held out are predicted to {after} with {these}, to {before} without {these}."
-
-
-def _chance(diagnosis: Diagnosis) -> str:
-    return f"p = {diagnosis.p_value:.2g}"
 
 
 def _traits(diagnosis: Diagnosis) -> str:
@@ -202,6 +127,5 @@ def assumptions_of(case: Case, base: Base, best: WeightedSet) -> tuple[str, ...]
             f"{len(gross)} points contradict all that surrounds them{f', with {acting},' if acting else ''} and are "
             f"taken for gross errors: {sorted(gross)}."
         )
-    families = ", ".join(family.name for family in base.nuisances.families)
-    assumptions.append(f"Allowed to explain residuals first: {families}.")
+    assumptions.append(f"Allowed to explain residuals first: {', '.join(base.nuisances.families)}.")
     return tuple(assumptions)

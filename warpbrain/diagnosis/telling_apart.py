@@ -30,9 +30,9 @@ def imitations(causes: BodyCauses, model: GaussianModel) -> Confusion:
             continue
         place, _ = _median_place(causes, cause, model)
         effect = model.standardised(_pattern(cause, place))
-        whole = max(float(effect @ effect), 1e-300)
+        square = max(float(effect @ effect), 1e-300)
         rows[cause.name] = {
-            other: max(float(np.sum((Q.T @ effect) ** 2)) for Q in place_bases) / whole
+            other: max(float(np.sum((Q.T @ effect) ** 2)) for Q in place_bases) / square
             for other, place_bases in bases.items()
             if other != cause.name
         }

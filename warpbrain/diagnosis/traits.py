@@ -72,18 +72,8 @@ def traits_of(
 ) -> Traits:
     """Traits of what residuals (n,) show beside noise and nuisances.
 
-    Parameters
-    ----------
-    at : Linearisation
-    model : GaussianModel
-        Of noise and nuisances.
-    residual : (n,) array
-    noise : float
-        Typical noise of displacements [m].
-    length : float
-        Of patches [m].
-    centre : (3,) array
-        About which moments are taken [m].
+    `model`: of noise and nuisances. `residual` (n,). `noise`: typical noise of displacements [m]. `length`: of patches
+    [m]. `centre` (3,): about which moments are taken [m].
     """
     sites, answers = force_patches(at, length)
     # patches on held nodes have no effect
@@ -95,17 +85,17 @@ def traits_of(
     functionals = unit * np.concatenate([_summed(sites), _turned(sites - centre)])
     covariance = model.scale**2 * (model.noise_factor @ model.noise_factor.T) + model.columns @ model.columns.T
     resultant = partial(_Resultant.of, unit * A, functionals, covariance, residual)
-    plain, beside = resultant(None), resultant(noise * stress_beside_held(at, length))
+    plain, with_hiding = resultant(None), resultant(noise * stress_beside_held(at, length))
     force, moment = slice(0, 3), slice(3, 6)
-    sd = np.sqrt(np.maximum(np.diag(beside.covariance), 0.0))
-    outside = beside.is_significant(force)
+    sd = np.sqrt(np.maximum(np.diag(with_hiding.covariance), 0.0))
+    outside = with_hiding.is_significant(force)
     return Traits(
-        beside.mean[force],
+        with_hiding.mean[force],
         sd[force],
-        beside.mean[moment],
+        with_hiding.mean[moment],
         sd[moment],
         outside,
-        beside.is_significant(moment),
+        with_hiding.is_significant(moment),
         plain.is_significant(force) and not outside,
         _surface_nats(at, sites, answers, model, plain.size * unit, residual, length),
         centre,
@@ -114,18 +104,11 @@ def traits_of(
 
 @dataclass(frozen=True, eq=False)
 class _Resultant:
-    """Posterior of net force and moment.
+    """Posterior of net force and moment."""
 
-    Attributes
-    ----------
-    mean, covariance : (6,) and (6, 6) array
-    size : float
-        Of the patches, relative to those that move as much as the noise: the likeliest.
-    """
-
-    mean: Floats
-    covariance: Floats
-    size: float
+    mean: Floats  # (6,)
+    covariance: Floats  # (6, 6)
+    size: float  # of the patches, relative to those that move as much as the noise: the likeliest
 
     @classmethod
     def of(
@@ -135,12 +118,12 @@ class _Resultant:
         from scipy.linalg import cho_factor, cho_solve
 
         sizes = beliefs("unknown.sizes").tolist()
-        own, of_hiding = patches @ patches.T, None if hiding is None else hiding @ hiding.T
+        of_patches, of_hiding = patches @ patches.T, None if hiding is None else hiding @ hiding.T
         best: tuple[float, float, Any] | None = None
         # metres and newtons have one size
         units = np.sqrt(np.diag(covariance))
         for size, other in itertools.product(sizes, (0.0,) if of_hiding is None else sizes):
-            total = covariance + size**2 * own + (0.0 if of_hiding is None else other**2 * of_hiding)
+            total = covariance + size**2 * of_patches + (0.0 if of_hiding is None else other**2 * of_hiding)
             factor = cho_factor(total / np.outer(units, units))
             log_density = -0.5 * float(residual / units @ cho_solve(factor, residual / units))
             log_density -= float(np.log(np.diag(factor[0])).sum())

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,10 +12,10 @@ from warpbrain.cases.moments import Moments
 from warpbrain.cases.shipped import as_case
 from warpbrain.errors import SolveError, require_kind
 from warpbrain.estimation.finer_mesh import Discretisation, DiscretisationError, FinerMesh, discretisation_error
-from warpbrain.estimation.fit import Estimate, GaussNewton, GaussNewtonStep
+from warpbrain.estimation.fit import Estimate, GaussNewton
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.observations import Observations
-from warpbrain.estimation.options import EstimationOptions
+from warpbrain.estimation.options import EstimationOptions, Listener
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.prior import PriorMode, prior_modes, prior_of
@@ -37,19 +36,6 @@ _BEFORE = 0.1
 _TOO_COARSE = 0.15
 #: And no more often than this.
 _MOST_ERRORS = 4
-
-
-@dataclass(frozen=True)
-class Listener:
-    """Who wants to know how an estimation gets on.
-
-    Called with a few words when a stage begins, with each step of Gauss-Newton, and with the part that is done of a
-    stage of known length, from 0 to 1.
-    """
-
-    stage: Callable[[str], None] = lambda _text: None
-    step: Callable[[GaussNewtonStep], None] = lambda _step: None
-    progress: Callable[[float], None] = lambda _part: None
 
 
 def estimate(
@@ -157,7 +143,7 @@ class Estimation:
         """
         estimates, failures = [], []
         begun: list[tuple[PriorMode, Estimate | None]]
-        begun = [(one.problem.mode, one) for one in starts] or [(mode, None) for mode in self.prior_modes]
+        begun = [(start.problem.mode, start) for start in starts] or [(mode, None) for mode in self.prior_modes]
         for prior_mode, start in begun:
             try:
                 estimates.append(self._fit_one(prior_mode, nuisances, start))

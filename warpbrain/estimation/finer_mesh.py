@@ -292,15 +292,15 @@ def discretisation_error(
     errors, by_theta = [], []
     pairs = zip(np.split(state.u, count), np.split(state.reactions, count), strict=True)
     try:
-        for mesh, one, (u, R) in zip(finer, forward.states, pairs, strict=True):
-            errors.append(mesh.difference(parameters.applied(one.case, theta), theta, one.system, u, R))
+        for mesh, solver, (u, R) in zip(finer, forward.states, pairs, strict=True):
+            errors.append(mesh.difference(parameters.applied(solver.case, theta), theta, solver.system, u, R))
             by_theta.append(mesh.derivatives(theta, parameters.materials))
     except SolveError as failure:
         raise SolveError(
             f"the error of the mesh is not known: on elements of half the size {failure}; it can be left out, and "
             "then the estimate holds for this mesh only"
         ) from None
-    u, reactions = (np.concatenate([getattr(one, name) for one in errors]) for name in ("u", "reactions"))
+    u, reactions = (np.concatenate([getattr(error, name) for error in errors]) for name in ("u", "reactions"))
     du, dR = (np.concatenate(parts, axis=1) for parts in zip(*by_theta, strict=True))
     there = state.u + u
     part = float(np.vdot(u, there)) / max(float(np.vdot(there, there)), 1e-300)

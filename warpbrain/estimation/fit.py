@@ -165,7 +165,7 @@ class Estimate:
         gross = self.point.noise.gross
         explained = int(np.count_nonzero(~gross))
         if explained < _FEWEST_EXPLAINED * len(gross):
-            names = ", ".join(f"'{one.name}'" for one in self.problem.observations.recordings if one.unit == "m")
+            names = ", ".join(f"'{each.name}'" for each in self.problem.observations.recordings if each.unit == "m")
             raise SolveError(
                 f"no estimate: {len(gross) - explained} of {len(gross)} rows recorded in {names} are gross errors, "
                 "farther from what any parameters found make of them than their sigma allows; is the unit, the axes or "

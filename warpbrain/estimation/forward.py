@@ -58,7 +58,7 @@ class Forward:
         self.parameters = Parameters.of(case)
         self.case = case
         self.moments = Moments.of(case, ()) if moments is None else moments
-        self.states = tuple(OneState(one, self.parameters, theta, device, elements) for one in self.moments.cases)
+        self.states = tuple(OneState(each, self.parameters, theta, device, elements) for each in self.moments.cases)
         #: Equilibria that were asked for.
         self.solves = 0
 
@@ -79,10 +79,10 @@ class Forward:
             solved.append(state.solve(theta, solved[-1].u if near is None and solved else near, tolerance))
         return State(
             theta.copy(),
-            np.concatenate([one.u for one in solved]),
-            np.concatenate([one.reactions for one in solved]),
-            sum(one.newton_iterations for one in solved),
-            any(one.passed_unstable for one in solved),
+            np.concatenate([each.u for each in solved]),
+            np.concatenate([each.reactions for each in solved]),
+            sum(each.newton_iterations for each in solved),
+            any(each.passed_unstable for each in solved),
         )
 
     def solve_from(self, theta: Floats, starts: Sequence[Floats | None], tolerance: float = EXACT) -> State:
@@ -97,7 +97,7 @@ class Forward:
     def differentiate(self, state: State) -> tuple[Floats, Floats]:
         """Derivatives (p, s n, 3) of displacement and reactions by the parameters; `SolveError` if one is unstable."""
         displacements = np.split(state.u, len(self.states))
-        each = [one.differentiate(state.theta, u) for one, u in zip(self.states, displacements, strict=True)]
+        each = [model.differentiate(state.theta, u) for model, u in zip(self.states, displacements, strict=True)]
         du, dR = (np.concatenate(parts, axis=1) for parts in zip(*each, strict=True))
         return du, dR
 

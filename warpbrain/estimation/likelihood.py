@@ -24,7 +24,7 @@ from warpbrain.estimation.observations import Sensors
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import Outliers, with_gross_errors
-from warpbrain.inference.noise import log_scale_density, noise_covariance, outliers, scales
+from warpbrain.inference.noise import log_scale_density, noise_factor, outliers, scales
 from warpbrain.recordings.agreement import root_mean_square
 
 #: An undeclared noise is no smaller [m] or [N]: below this it is rounding of the computation.
@@ -63,9 +63,7 @@ class Noise:
     @cached_property
     def _covariance(self) -> Floats:
         """Of the noise at a scale of 1 (n, n), without gross errors."""
-        rows = self.rows
-        beyond = self.unresolved * rows.over_element
-        return noise_covariance(rows.positions, rows.directions, rows.times, self.sigma, rows.radius, beyond)
+        return self.rows.noise_covariance(self.sigma, self.unresolved * self.rows.over_element)
 
     @cached_property
     def factor(self) -> Floats:
@@ -74,10 +72,7 @@ class Noise:
         for number in np.flatnonzero(self.gross).tolist():
             numbers = self.rows.points[number]
             covariance[np.ix_(numbers, numbers)] *= self.inflation[number] ** 2
-        # metres beside newtons: one size for all
-        return np.asarray(
-            self.sigma[:, None] * np.linalg.cholesky(covariance / np.outer(self.sigma, self.sigma)), dtype=np.float64
-        )
+        return noise_factor(covariance, self.sigma)
 
     @cached_property
     def log_prior(self) -> float:
@@ -204,7 +199,7 @@ class Likelihood:
         start = Noise(rows, sigma, 1.0, np.ones(len(rows.points)), self.outliers)
         # gross errors first, and all points sound first
         starts = [start] if self.outliers is None else [start, start.with_likely_scale(expected, columns)]
-        best = max((settled(one) for one in starts), key=lambda noise: noise.log_evidence(expected, columns))
+        best = max((settled(begun) for begun in starts), key=lambda noise: noise.log_evidence(expected, columns))
         if not rows.over_element.any() or self.outliers is None:
             return best
         for part in beliefs("mesh.unresolved")[1:].tolist():

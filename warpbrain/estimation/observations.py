@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
 from warpbrain.estimation.within_element import change_over_element
+from warpbrain.inference.noise import noise_covariance
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import feature_normals
 from warpbrain.recordings.closest import closest_points
@@ -86,6 +88,10 @@ class Sensors:
         rows = np.flatnonzero(self.is_displacement)
         ends = np.flatnonzero(np.diff(self.groups[rows])) + 1
         return tuple(np.split(rows, ends)) if len(rows) else ()
+
+    def noise_covariance(self, sigma: Floats, unresolved: Floats | None = None) -> Floats:
+        """Covariance (n, n) of the noise at a scale of 1; `unresolved` (n, 3) as of `warpbrain.inference.noise`."""
+        return noise_covariance(self.positions, self.directions, self.times, sigma, self.radius, unresolved)
 
     def of_rows(self, rows: Ints | Bools, time: float | None = None) -> Sensors:
         """Some of the rows (k,), or (n,) bool; with `time` [s] as if recorded then, and counted from rest."""
@@ -188,13 +194,13 @@ class Observations:
                     "by itself is looked at in the end alone"
                 )
             else:
-                each += [(recording, one) for one in _observations(case, recording, moments)]
+                each += [(recording, observation) for observation in _observations(case, recording, moments)]
         return cls(_with_changes(each), tuple(remarks), len(case.remaining[0].points), case.mesh.radius)
 
     @cached_property
     def centre(self) -> Floats:
         """Mean of all positions that were recorded [m], zero if there are none."""
-        positions = np.concatenate([one.positions for one in self.recordings])
+        positions = np.concatenate([observation.positions for observation in self.recordings])
         positions = positions[np.isfinite(positions).all(axis=1)]
         return positions.mean(axis=0) if len(positions) else np.zeros(3)
 
@@ -212,7 +218,8 @@ class Observations:
         rest = np.zeros((1, self.nodes, 3))
         U, R = (np.concatenate([field.reshape(-1, self.nodes, 3), rest]) for field in (u, reactions))
         parts = [
-            one.at(U[one.after] - U[one.before], R[one.after] - R[one.before], about, by) for one in self.recordings
+            seen.at(U[seen.after] - U[seen.before], R[seen.after] - R[seen.before], about, by)
+            for seen in self.recordings
         ]
         residual, rigid = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
         by_u, by_R = (vstack([part[k] for part in parts]).tocsr() for k in (2, 3))
@@ -222,27 +229,29 @@ class Observations:
     @cached_property
     def _rows(self) -> dict[str, Any]:
         """What of the rows is the same at all states."""
-        recordings = self.recordings
+        names = tuple(dict.fromkeys(observation.name for observation in self.recordings))
 
-        def each(values: Sequence[Floats | Ints]) -> Any:
-            return np.concatenate([np.repeat(v, one.size, axis=0) for v, one in zip(values, recordings, strict=True)])
+        def each(value_of: Callable[[Observation], Any]) -> Any:
+            """A value of each observation, or of each of its rows, for every component of these."""
+            parts = []
+            for observation in self.recordings:
+                value = np.asarray(value_of(observation))
+                values = value if value.ndim else np.full(len(observation.rows), value)
+                parts.append(np.repeat(values, observation.size, axis=0))
+            return np.concatenate(parts)
 
-        names = tuple(dict.fromkeys(one.name for one in recordings))
-        groups = np.split(
-            np.arange(sum(len(one.rows) for one in recordings)), np.cumsum([len(one.rows) for one in recordings])
-        )
-        return {
-            "sigma": each([np.full(len(one.rows), np.nan) if one.sigma is None else one.sigma for one in recordings]),
-            "positions": each([one.positions for one in recordings]),
-            "over_element": np.concatenate([one.over_element.reshape(-1, 3) for one in recordings]),
-            "groups": each(groups[:-1]),
-            "recordings": each([np.full(len(one.rows), names.index(one.name)) for one in recordings]),
-            "times": each([one.times for one in recordings]),
+        same = ("positions", "times", "after", "before", "weights")
+        sizes = [np.full(len(observation.rows), observation.size) for observation in self.recordings]
+        count = sum(map(len, sizes))
+        return {name: each(attrgetter(name)) for name in same} | {
+            "sigma": each(lambda observation: np.nan if observation.sigma is None else observation.sigma),
+            "over_element": np.concatenate(
+                [observation.over_element.reshape(-1, 3) for observation in self.recordings]
+            ),
+            "groups": np.repeat(np.arange(count), np.concatenate(sizes)),
+            "recordings": each(lambda observation: names.index(observation.name)),
             "names": names,
-            "after": each([np.full(len(one.rows), one.after) for one in recordings]),
-            "before": each([np.full(len(one.rows), one.before) for one in recordings]),
-            "references": each([np.full(len(one.rows), one.reference) for one in recordings]),
-            "weights": each([one.weights for one in recordings]),
+            "references": each(attrgetter("reference")),
             "radius": self.radius,
         }
 
@@ -379,11 +388,11 @@ def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observ
     changes = [observation.over_element.copy() for _, observation in each]
     for members in alike.values():
         rows = [(each[number][0], each[number][1].rows[row]) for number, row in members]
-        points, moved = (np.array([getattr(one, name)[k] for one, k in rows]) for name in ("points", "displacement"))
+        points, moved = (np.array([getattr(r, name)[k] for r, k in rows]) for name in ("points", "displacement"))
         edges = np.array([each[number][1].edges[row] for number, row in members])
         for (number, row), change in zip(members, change_over_element(points, moved, edges), strict=True):
             changes[number][row] = change
-    return tuple(replace(one, over_element=change) for (_, one), change in zip(each, changes, strict=True))
+    return tuple(replace(seen, over_element=change) for (_, seen), change in zip(each, changes, strict=True))
 
 
 def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:

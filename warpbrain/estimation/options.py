@@ -1,12 +1,23 @@
-"""How to estimate."""
+"""How to estimate, and who is told how it gets on."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from warpbrain.errors import InputError
 from warpbrain.estimation.finer_mesh import Discretisation
+from warpbrain.estimation.fit import GaussNewtonStep
 from warpbrain.estimation.likelihood import Likelihood
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Who is told how an estimation or a diagnosis gets on."""
+
+    stage: Callable[[str], None] = lambda _text: None  # in a few words, when something new begins
+    step: Callable[[GaussNewtonStep], None] = lambda _step: None  # of an estimation's Gauss-Newton
+    progress: Callable[[float], None] = lambda _part: None  # part that is done of an estimation's stage, from 0 to 1
 
 
 @dataclass(frozen=True)

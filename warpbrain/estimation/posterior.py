@@ -125,14 +125,6 @@ class Posterior(Shown):
         ends = [50.0 - 50.0 * probability, 50.0 + 50.0 * probability]
         return np.asarray(np.percentile(self.chain.theta, ends, axis=0).T)
 
-    def probability_below(self, theta: Floats) -> Floats:
-        """Of each parameter, shape (p,), that it is less than that of a vector (p,)."""
-        from scipy.special import ndtr
-
-        if self.chain is None:
-            return np.asarray(ndtr((theta - self.theta) / self.best.laplace.standard_deviations))
-        return np.asarray(np.mean(self.chain.theta < theta, axis=0))
-
     @cached_property
     def marginals(self) -> tuple[Marginal, ...]:
         """Each parameter."""
@@ -142,8 +134,8 @@ class Posterior(Shown):
         columns = self.theta, mean, deviations, self.interval(0.95), self.prior.mean, of_prior, prior
         each = zip(self.parameters, *(column.tolist() for column in columns), strict=True)
         return tuple(
-            Marginal(one, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most))
-            for one, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most) in each
+            Marginal(parameter, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most))
+            for parameter, top, middle, sd, (low, high), prior_mean, prior_sd, (least, most) in each
         )
 
     @cached_property
@@ -173,7 +165,7 @@ class Posterior(Shown):
         problem, about = self.best.problem, (self.case, self.best)
         unseen = Observations.to_check(self.case, problem.forward.moments)
         both = (("fit", problem.observations), ("check", unseen))
-        return tuple(one for pair in both for one in predictions(*about, *pair, self.joint_covariance))
+        return tuple(each for pair in both for each in predictions(*about, *pair, self.joint_covariance))
 
     @property
     def overall_errors(self) -> tuple[OverallErrors, ...]:

@@ -69,15 +69,15 @@ class OverallErrors:
     def of(cls, each: Sequence[Prediction]) -> tuple[OverallErrors, ...]:
         """Of each role that has any."""
         overall = []
-        for role in dict.fromkeys(one.role for one in each if one.unit == "m"):
-            lengths = [one for one in each if one.role == role and one.unit == "m"]
+        for role in dict.fromkeys(prediction.role for prediction in each if prediction.unit == "m"):
+            lengths = [prediction for prediction in each if prediction.role == role and prediction.unit == "m"]
             residuals = (
-                [one.run.residuals_before for one in lengths],
-                [one.fitted.residuals_after for one in lengths],
-                [one.run.residuals_after for one in lengths],
+                [prediction.run.residuals_before for prediction in lengths],
+                [prediction.fitted.residuals_after for prediction in lengths],
+                [prediction.run.residuals_after for prediction in lengths],
             )
-            errors = (by_unit(("m", one) for one in values)["m"] for values in residuals)
-            overall.append(cls(role, sum(one.fitted.count for one in lengths), *errors))
+            errors = (by_unit(("m", residual) for residual in values)["m"] for values in residuals)
+            overall.append(cls(role, sum(prediction.fitted.count for prediction in lengths), *errors))
         return tuple(overall)
 
 
@@ -103,8 +103,8 @@ def predictions(
     results = []
     for number, name in enumerate(after.names):
         members = np.flatnonzero(after.recordings == number)
-        parts = [one for one in observations.recordings if one.name == name]
-        rows, first = np.concatenate([one.rows for one in parts]), parts[0]
+        parts = [observation for observation in observations.recordings if observation.name == name]
+        rows, first = np.concatenate([observation.rows for observation in parts]), parts[0]
         shape = len(rows), first.size
         seen_rows, noise = after.of_rows(members), point.noise
         if role != "fit":
@@ -140,7 +140,7 @@ def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapp
     pairs = zip(np.split(u, count), np.split(reactions, count), strict=True)
     states = [NodalState(case.remaining[0], *state) for state in pairs]
     others = {time: states[number] for time, number in zip(moments.times, moments.numbers, strict=True)}
-    return {one.name: one for one in observe(case, states[-1], others=others).comparisons}
+    return {comparison.name: comparison for comparison in observe(case, states[-1], others=others).comparisons}
 
 
 def coverage(residuals: Floats, deviation: Floats, gross: Bools) -> tuple[float, ...] | None:

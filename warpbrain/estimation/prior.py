@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.parameters import Gaussian, Parameters
 from warpbrain.gp.coordinates import coordinates
 from warpbrain.gp.literature.study import Study
@@ -97,10 +97,10 @@ def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed:
         return _declared_prior(case, parameters, count, seed)
     from warpbrain.gp.trained import trained
 
-    asked = trained() if model is None else model
-    require_groups(case, [label for labels in parameters.labels for label in labels], asked)
+    process = trained() if model is None else model
+    require_groups(case, [label for labels in parameters.labels for label in labels], process)
     return Prior.of(
-        asked, parameters.groups, parameters.laws_of, parameters.poisson, parameters.formulations, count, seed
+        process, parameters.groups, parameters.laws_of, parameters.poisson, parameters.formulations, count, seed
     )
 
 
@@ -143,3 +143,23 @@ def prior_modes(prior: Prior, parameters: Parameters) -> tuple[PriorMode, ...]:
         covariance += np.diag(np.maximum(least - np.diag(covariance), 0.0))
         modes.append(PriorMode(float(counts[number] / total), Gaussian(members.mean(axis=0), covariance), low, high))
     return tuple(modes)
+
+
+def tissue_prior(case: Case, parameters: Parameters) -> Gaussian:
+    """The prior of a diagnosis: one normal distribution of `theta`.
+
+    Tissues with groups of the generative model have its prior, of Ogden's exponents the part with the signs of the
+    case's own laws; the others are around what the case says.
+    """
+    try:
+        modes = prior_modes(prior_of(case), parameters) if any(parameters.groups) else ()
+    except (InputError, SolveError):
+        modes = ()
+    if not modes:
+        return Gaussian(declared(case, parameters), np.diag(declared_deviations(case, parameters) ** 2))
+    try:
+        theta = declared(case, parameters)
+    except InputError:
+        return modes[0].gaussian
+    matching = [mode for mode in modes if np.all((theta >= mode.low) & (theta <= mode.high))]
+    return (matching or list(modes))[0].gaussian

@@ -134,8 +134,9 @@ class Problem:
         """Of parameters and nuisances together."""
         from scipy.linalg import block_diag
 
-        both = self.mode.gaussian, self.nuisances.prior
-        return Gaussian(np.concatenate([one.mean for one in both]), block_diag(*(one.covariance for one in both)))
+        tissue, nuisances = self.mode.gaussian, self.nuisances.prior
+        mean = np.concatenate([tissue.mean, nuisances.mean])
+        return Gaussian(mean, block_diag(tissue.covariance, nuisances.covariance))
 
     def at(self, state: State, nuisances: Floats, noise: Noise | None = None) -> Point:
         """The objective at a state; noise that is as large as the residuals are, unless it is known."""

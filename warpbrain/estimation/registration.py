@@ -61,7 +61,7 @@ def realigned(case: Case, motion: Floats, centre: Floats) -> Case:
     """
     if not motion.any():
         return case
-    return replace(case, recordings=tuple(realigned_recording(one, motion, centre) for one in case.recordings))
+    return replace(case, recordings=tuple(realigned_recording(each, motion, centre) for each in case.recordings))
 
 
 def realigned_recording(recording: Recording, motion: Floats, centre: Floats) -> Recording:

@@ -101,7 +101,9 @@ def sweep(
             if not state.passed_unstable:
                 near = state.u
             comparisons = compared(case, state.u, state.reactions, moments)
-            error = by_unit((one.unit, comparisons[one.name].residuals_after) for one in observations.recordings)[unit]
+            error = by_unit((each.unit, comparisons[each.name].residuals_after) for each in observations.recordings)[
+                unit
+            ]
         except (InputError, SolveError) as failure:
             reason = str(failure)
         points[k] = SweepPoint(k, tuple(theta.tolist()), error, reason)

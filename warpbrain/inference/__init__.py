@@ -5,7 +5,7 @@ columns of what is always uncertain (nuisances), and `Cause`s, each with the col
 
     GaussianModel       marginal, conditional and posterior distributions of rows and coefficients
     with_gross_errors   the density of rows where some points may be mispaired, for each hypothesis by itself
-    posterior           probabilities of no cause, of every cause, every pair, and of triples
+    posterior           evidence of no cause, of every cause, every pair, and of triples
 
 Nothing here knows Warp, a mesh or the name of a mechanism.
 """
@@ -13,7 +13,6 @@ Nothing here knows Warp, a mesh or the name of a mechanism.
 from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import GrossErrors, Outliers, with_gross_errors
-from warpbrain.inference.hypothesis import Posterior
 from warpbrain.inference.subsets import Search, posterior
 
 __all__ = [
@@ -23,7 +22,6 @@ __all__ = [
     "Kind",
     "Outliers",
     "Place",
-    "Posterior",
     "Search",
     "posterior",
     "with_gross_errors",

@@ -43,10 +43,7 @@ def _values(key: str) -> tuple[float, ...]:
 def belief(key: str) -> float:
     """One number [SI] by `table.name`.
 
-    Raises
-    ------
-    KeyError
-        If the file has no such entry.
+    `KeyError` if the file has no such entry.
     """
     [value] = _values(key)
     return value

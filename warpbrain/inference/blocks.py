@@ -34,18 +34,8 @@ class ActingColumns:
 class Blocks:
     """Blocks of columns, one a place, those of a cause one after the other, wide causes first.
 
-    Parameters
-    ----------
-    model : GaussianModel
-        Of the rows without a cause.
-    residual : (n,) array
-    causes : sequence of Cause
-        All with equally many sizes.
-
-    Attributes
-    ----------
-    cause, place : (p,) int arrays
-        Which cause and which of its places each block is.
+    `model`: of the rows without a cause. `residual` (n,). `causes`: all with equally many sizes. `cause`, `place` (p,):
+    which cause and which of its places each block is.
     """
 
     def __init__(self, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> None:
@@ -118,12 +108,8 @@ class Blocks:
     def log_factors(self, acting: ActingColumns | None = None, start: int = 0) -> Floats:
         """Log Bayes factors (p - start, s) of blocks from `start` on, with every size.
 
-        Parameters
-        ----------
-        acting : ActingColumns, optional
-            Columns that act together with each block: factors are then of both together, against neither.
-        start : int
-            Number of the first block.
+        `acting`: columns that act together with each block: factors are then of both together, against neither.
+        `start`: number of the first block.
         """
         logs = np.empty((len(self) - start, self._sizes.shape[1]))
         widths = self._width[start:]

@@ -11,32 +11,21 @@ from importlib.resources import files
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.inference.causes import Kind
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Hypothesis, Kind
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Numbers of `calibration.json`.
+    """Numbers of `calibration.json`."""
 
-    Attributes
-    ----------
-    temperature : float
-        Divisor of log probabilities: the evidence is overconfident where noise, mesh and tissue are only nearly as the
-        model has them.
-    log_weights : mapping of str to float
-        Added to the log prior of sets: of no cause (`nothing`), for each physical cause beyond the first (`another`),
-        of sets with the unknown, and of sets with what is no physics.
-    losses : mapping of str to float
-        What each kind of wrong verdict costs, in units of silence where something is missing.
-    most_said : float
-        Share of names that were right among scored cases: no higher probability is reported.
-    """
-
+    #: Divisor of log probabilities: the evidence is overconfident where noise, mesh and tissue are only nearly as the
+    #: model has them.
     temperature: float
+    #: Added to the log prior of sets: of no cause (`nothing`), for each physical cause beyond the first (`another`), of
+    #: sets with the unknown, and of sets with what is no physics.
     log_weights: Mapping[str, float]
-    losses: Mapping[str, float]
-    most_said: float
+    losses: Mapping[str, float]  # what each kind of wrong verdict costs, in units of silence where something is missing
+    most_said: float  # share of names that were right among scored cases: no higher probability is reported
 
     def probabilities(self, hypotheses: Sequence[Hypothesis]) -> Floats:
         """Of each hypothesis, (h,)."""

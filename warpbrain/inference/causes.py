@@ -1,4 +1,4 @@
-"""What may have caused residuals: mechanisms, unknown fields, or what is no physics, all with the same interface."""
+"""What may have caused residuals: mechanisms, unknown fields, or what is no physics, alike; and sets of causes."""
 
 from __future__ import annotations
 
@@ -20,21 +20,13 @@ class Kind(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """A cause at one place, level, node set or course.
+    """A cause at one place, level, node set or course."""
 
-    Parameters
-    ----------
-    columns : (n, k) array
-        What a unit of size of each coefficient changes of each row.
-    mean : (n,) array, optional
-        Expected change of each row, whatever the size, such as the weight at a level of the fluid; zero if not given.
-    weight : float
-        Probability among the places of its cause.
-    """
-
-    columns: Floats
+    columns: Floats  # (n, k), what a unit of size of each coefficient changes of each row
+    #: (n,): expected change of each row, whatever the size, such as the weight at a level of the fluid; zero if not
+    #: given.
     mean: Floats | None = None
-    weight: float = 1.0
+    weight: float = 1.0  # probability among the places of its cause
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,21 +35,12 @@ class Cause:
 
     Coefficients are normal with the standard deviation `s`, which is one of a few sizes: a scale mixture, by which the
     prior penalises a small cause no more than a large one.
-
-    Parameters
-    ----------
-    name : str
-    places : tuple of Place
-    log_prior : float
-        Logarithm of the odds that it acts, before anything was recorded.
-    sizes : (s,) array
-        Standard deviations of the coefficients, in units of the columns.
-    kind : Kind
     """
 
     name: str
     places: tuple[Place, ...]
-    log_prior: float
+    log_prior: float  # logarithm of the odds that it acts, before anything was recorded
+    #: (s,): standard deviations of the coefficients, in units of the columns.
     sizes: Floats = field(default_factory=lambda: np.ones(1))
     kind: Kind = Kind.PHYSICS
 
@@ -66,3 +49,40 @@ class Cause:
         """Logarithm of the probability of each place and size, (p, s): all sizes are equally probable."""
         weights = np.array([place.weight for place in self.places])
         return np.log(weights / weights.sum())[:, None] - np.log(len(self.sizes)) + np.zeros(len(self.sizes))
+
+
+@dataclass(frozen=True)
+class Member:
+    """A cause of a hypothesis by its number, the number of its place and that of its size."""
+
+    cause: int
+    place: int
+    size: int
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Causes with places and sizes at a scale of the noise."""
+
+    members: tuple[Member, ...]
+    scale: float
+    log_density: float  # of it and the rows
+    #: Of a single cause, the log of the part that its place has in the evidence, all sizes and scales together.
+    log_share: float = 0.0
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of causes."""
+
+    causes: tuple[str, ...]
+    kinds: tuple[Kind, ...]  # of each of them
+    log_evidence: float  # log density of the rows, summed over places, sizes and scales
+    log_prior: float  # sum of the log odds of its causes
+    best: Configuration  # the most probable one
+    #: Of a single cause, the most probable ones at other places, the best first.
+    elsewhere: tuple[Configuration, ...] = ()
+
+    def of_kind(self, kind: Kind) -> tuple[str, ...]:
+        """Its causes of a kind."""
+        return tuple(cause for cause, other in zip(self.causes, self.kinds, strict=True) if other is kind)

@@ -10,26 +10,14 @@ from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decisi
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What a cause of a fit explains that those of it that explain more do not.
-
-    Attributes
-    ----------
-    name : str
-    log_evidence : float
-        Log Bayes factor of a set with these over that without the cause.
-    heldout_log_density : float
-        By how much held-out rows are more probable with it [nats].
-    gain : (part, low, high)
-        Part of the held-out error of all rows that it removes, and its 95 % interval.
-    placebo_p : float
-        p-value among random patterns in its place, by what they predict of held-out rows.
-    """
+    """What a cause of a fit explains that those of it that explain more do not."""
 
     name: str
-    log_evidence: float
-    heldout_log_density: float
+    log_evidence: float  # log Bayes factor of a set with these over that without the cause
+    heldout_log_density: float  # by how much held-out rows are more probable with it [nats]
+    #: (part, low, high): part of the held-out error of all rows that it removes, and its 95 % interval.
     gain: tuple[float, float, float]
-    placebo_p: float
+    placebo_p: float  # p-value among random patterns in its place, by what they predict of held-out rows
 
     def why_not(self, alpha: float) -> str:
         """Why it is not named; empty if it is."""
@@ -54,17 +42,9 @@ def after_checks(
     Causes that fail are not named. Without any other name, or where the held-out error grows, nothing can be said.
     Where a check shows that something is left the verdict says so.
 
-    Parameters
-    ----------
-    decision : Decision
-        Of the posterior alone.
-    confirmations : sequence of Confirmation
-        Of each mechanism of the fit.
-    p_left : float or None
-        p-value of the rows under the model of the fit.
-    alpha : float
-    grown, doubts : sequence of str
-        In words: errors that are larger with the causes than without and forbid any name, and further doubts.
+    `decision`: of the posterior alone. `confirmations`: of each mechanism of the fit. `p_left`: p-value of the rows
+    under the model of the fit. `grown`, `doubts`: in words: errors that are larger with the causes than without and
+    forbid any name, and further doubts.
     """
     remarks = list(doubts)
     if decision.verdict not in (NAMED, NAMED_AND_REST):

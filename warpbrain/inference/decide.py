@@ -11,8 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from warpbrain.arrays import Floats
-from warpbrain.inference.causes import Kind
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Hypothesis, Kind
 
 #: The seven verdicts.
 NOTHING, NAMED, GROUP, NAMED_AND_REST, UNKNOWN, NOT_PHYSICS, CANNOT_SAY = VERDICTS = (
@@ -62,12 +61,7 @@ def decide(
 ) -> tuple[Decision, dict[Decision, float]]:
     """The best verdict, and the expected loss of all that were compared.
 
-    Parameters
-    ----------
-    hypotheses : sequence of Hypothesis
-    probabilities : (h,) array
-    losses : mapping of str to float
-        See `Calibration`.
+    `probabilities` (h,). `losses`: see `Calibration`.
     """
     truths = [Truth.of(hypothesis) for hypothesis in hypotheses]
     expected = {

@@ -43,12 +43,7 @@ class _Noise:
 class _Spectrum:
     """Eigenvalues (q,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, q): the same at all scales.
 
-    Parameters
-    ----------
-    factor : (n, n) array
-        `L`.
-    whitened : (n, q) array
-        `W`.
+    `factor` (n, n): `L`. `whitened` (n, q): `W`.
     """
 
     def __init__(self, factor: Floats, whitened: Floats) -> None:
@@ -84,21 +79,11 @@ def products_of_rows(columns: Floats, rows: Ints) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class GaussianModel:
-    """Rows with noise and normal coefficients.
+    """Rows with noise and normal coefficients."""
 
-    Parameters
-    ----------
-    noise_factor : (n, n) array
-        Lower triangular factor `L` of the covariance of the noise.
-    columns : (n, q) array
-        `U`: what one standard deviation of each coefficient changes of each row.
-    scale : float
-        `kappa`, factor on the standard deviation of the noise.
-    """
-
-    noise_factor: Floats
-    columns: Floats
-    scale: float = 1.0
+    noise_factor: Floats  # (n, n), lower triangular factor `L` of the covariance of the noise
+    columns: Floats  # (n, q), `U`: what one standard deviation of each coefficient changes of each row
+    scale: float = 1.0  # `kappa`, factor on the standard deviation of the noise
 
     def __len__(self) -> int:
         return len(self.noise_factor)
@@ -231,16 +216,8 @@ class GaussianModel:
     def conditional(self, rows: Floats, observed: Bools) -> tuple[Floats, Floats]:
         """Distribution of the rows that were not observed given those that were.
 
-        Parameters
-        ----------
-        rows : (n,) array
-            Only the observed ones count.
-        observed : (n,) bool array
-
-        Returns
-        -------
-        mean, covariance : (m,), (m, m) arrays
-            Of the others, their noise included.
+        `rows` (n,): only the observed ones count. `observed` (n,). Returns mean (m,) and covariance (m, m) of the
+        others, their noise included.
         """
         S = self.covariance
         hidden = ~observed

@@ -32,20 +32,11 @@ _SWEEPS = 10
 
 @dataclass(frozen=True)
 class Outliers:
-    """Prior of gross errors.
+    """Prior of gross errors."""
 
-    Parameters
-    ----------
-    probability : float
-        That a point is one.
-    inflation : float
-        Factor on the standard deviation of its noise.
-    further : tuple of float
-        Further factors, all equally probable: with a single one a point that is much farther off still has influence.
-    """
-
-    probability: float
-    inflation: float
+    probability: float  # that a point is one
+    inflation: float  # factor on the standard deviation of its noise
+    #: Further factors, all equally probable: with a single one a point that is much farther off still has influence.
     further: tuple[float, ...] = ()
 
     @property
@@ -62,24 +53,13 @@ class Outliers:
 
 @dataclass(frozen=True, eq=False)
 class GrossErrors:
-    """Gross errors under one hypothesis.
+    """Gross errors under one hypothesis."""
 
-    Attributes
-    ----------
-    log_density : float
-        Log density of the rows, summed over the inflation of each point with all others at their most probable ones.
-    log_odds : (g,) array
-        Of each point to be a gross error, given the others.
-    inflation : (g,) array
-        The most probable one of each point, 1 of a sound one.
-    weighted : (n,) array
-        The inverse of the covariance with these, times the rows.
-    """
-
+    #: Log density of the rows, summed over the inflation of each point with all others at their most probable ones.
     log_density: float
-    log_odds: Floats
-    inflation: Floats
-    weighted: Floats
+    log_odds: Floats  # (g,), of each point to be a gross error, given the others
+    inflation: Floats  # (g,), the most probable one of each point, 1 of a sound one
+    weighted: Floats  # (n,), the inverse of the covariance with these, times the rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +75,8 @@ class _Group:
 class PointRows:
     """Rows of recorded points under a model: what hypotheses with further columns have in common.
 
-    Parameters
-    ----------
-    model : GaussianModel
-    residual : (n,) array
-        Less what is expected of the causes.
-    points : sequence of int arrays
-        Rows of each point; rows of none are never gross errors.
-    weighted : (n,) array, optional
-        `S^-1 r`, if it is known.
+    `residual` (n,): less what is expected of the causes. `points`: rows of each point; rows of none are never gross
+    errors. `weighted` (n,): `S^-1 r`, if it is known.
     """
 
     def __init__(
@@ -138,16 +111,8 @@ class PointRows:
     ) -> GrossErrors:
         """Density of the rows where some points may be gross errors.
 
-        Parameters
-        ----------
-        prior : Outliers
-        start : (g,) array, optional
-            The most probable inflation of each point under a hypothesis that is nearly the same; all are sound by
-            default.
-        further : FurtherColumns, optional
-            Of these rows.
-        length : float
-            A factor on these.
+        `start` (g,): the most probable inflation of each point under a hypothesis that is nearly the same; all are
+        sound by default. `further`: of these rows. `length`: a factor on these.
         """
         search = _Search(self, prior, further, length)
         if start is not None and (start > 1.0).any():
@@ -172,12 +137,7 @@ class PointRows:
 class FurtherColumns:
     """Columns (n, k) beside those of a model of rows.
 
-    Parameters
-    ----------
-    rows : PointRows
-    columns : (n, k) array
-    weighted : (n, k) array, optional
-        `S_0^-1 G`, if it is known.
+    `columns` (n, k). `weighted` (n, k): `S_0^-1 G`, if it is known.
     """
 
     def __init__(self, rows: PointRows, columns: Floats, weighted: Floats | None = None) -> None:
@@ -189,24 +149,9 @@ class FurtherColumns:
         self.products = [products_of_rows(self.dual, group.rows) for group in rows.groups]
 
 
-def with_gross_errors(
-    model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers, start: Floats | None = None
-) -> GrossErrors:
-    """Density of residuals where some points may be gross errors; see `PointRows` and its method of this name.
-
-    Parameters
-    ----------
-    model : GaussianModel
-        Of the rows (n,) under the hypothesis, its causes among the columns.
-    residual : (n,) array
-        Less what is expected of the causes.
-    points : sequence of int arrays
-        Rows of each point; rows of none are never gross errors.
-    prior : Outliers
-    start : (g,) array, optional
-        The most probable inflation of each point under a hypothesis that is nearly the same; all are sound by default.
-    """
-    return PointRows(model, residual, points).with_gross_errors(prior, start)
+def with_gross_errors(model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> GrossErrors:
+    """Density of rows where some points may be gross errors: `PointRows`, with the causes among the columns."""
+    return PointRows(model, residual, points).with_gross_errors(prior)
 
 
 def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation: Floats) -> Floats:

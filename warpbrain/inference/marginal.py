@@ -23,27 +23,20 @@ _NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Marginal:
-    """Rows under one hypothesis.
+class Summed:
+    """Evidence summed over scales of the noise and over gross errors."""
 
-    Attributes
-    ----------
-    log_evidence : float
-    scale : float
-        The most probable factor on the noise.
-    inflation : (g,) array
-        Most probable factor on the noise of each point at that scale, 1 of sound ones.
-    model : GaussianModel
-        At that scale; the excess noise of these points is columns after those of the hypothesis.
-    excess_columns : int
-        How many columns the excess noise has.
-    """
+    log_evidence: float  # [nats]
+    scale: float  # the most probable factor on the noise
+    inflation: Floats  # (g,), most probable factor on the noise of each point at that scale, 1 of sound ones
 
-    log_evidence: float
-    scale: float
-    inflation: Floats
-    model: GaussianModel
-    excess_columns: int
+
+@dataclass(frozen=True, eq=False)
+class Marginal(Summed):
+    """The same with the most probable model of the rows under one hypothesis."""
+
+    model: GaussianModel  # at that scale; the excess noise of these points is columns after those of the hypothesis
+    excess_columns: int  # how many columns the excess noise has
 
     @property
     def gross(self) -> Bools:
@@ -73,39 +66,13 @@ class Marginal:
         return self.model.columns.shape[1] - self.excess_columns
 
 
-@dataclass(frozen=True, eq=False)
-class Summed:
-    """Evidence summed over scales of the noise and over gross errors.
-
-    Attributes
-    ----------
-    log_evidence : float
-        [nats]
-    scale : float
-        The most probable factor on the noise.
-    inflation : (g,) array
-        The most probable inflation of each point at that scale.
-    """
-
-    log_evidence: float
-    scale: float
-    inflation: Floats
-
-
 class RowsAtScales:
     """Evidence of rows under a model with further columns, whose length and the scale of the noise may vary.
 
     What neither changes is computed once.
 
-    Parameters
-    ----------
-    model : GaussianModel
-        The causes of the hypothesis among its columns.
-    residual : (n,) array
-        Less what is expected of the causes.
-    points : sequence of int arrays
-        Rows of each point.
-    further : (n, k) array, optional
+    `model`: the causes of the hypothesis among its columns. `residual` (n,): less what is expected of the causes.
+    `points`: rows of each point. `further` (n, k).
     """
 
     def __init__(
@@ -120,14 +87,8 @@ class RowsAtScales:
     def summed(self, length: float = 1.0, scale: float = 1.0, inflation: Floats | None = None) -> Summed:
         """The evidence with the further columns multiplied by a factor.
 
-        Parameters
-        ----------
-        length : float
-            That factor.
-        scale : float
-            A factor on the noise near the most probable one, where the sum begins.
-        inflation : (g,) array, optional
-            Of gross errors under a hypothesis that is nearly the same.
+        `length`: that factor. `scale`: a factor on the noise near the most probable one, where the sum begins.
+        `inflation` (g,): of gross errors under a hypothesis that is nearly the same.
         """
         values = self._values
         logs, inflations = np.full(len(values), -np.inf), [np.zeros(0)] * len(values)
@@ -156,11 +117,6 @@ class RowsAtScales:
             self._at[scale] = rows, FurtherColumns(rows, self._further, of_further)
         rows, further = self._at[scale]
         return rows.with_gross_errors(outliers(), start, further, length)
-
-
-def marginal(model: GaussianModel, residual: Floats, points: Sequence[Ints], scale: float = 1.0) -> Marginal:
-    """Evidence of residuals (n,) under a model; see `RowsAtScales`."""
-    return marginal_of(model, points, RowsAtScales(model, residual, points).summed(scale=scale))
 
 
 def marginal_of(model: GaussianModel, points: Sequence[Ints], summed: Summed) -> Marginal:

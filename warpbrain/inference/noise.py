@@ -56,11 +56,8 @@ def noise_covariance(
     return covariance
 
 
-def noise_factor(
-    positions: Floats, directions: Floats, times: Floats, sigma: Floats, radius: float, unresolved: Floats | None = None
-) -> Floats:
-    """Lower triangular factor (n, n) of `noise_covariance`, with its parameters."""
-    covariance = noise_covariance(positions, directions, times, sigma, radius, unresolved)
+def noise_factor(covariance: Floats, sigma: Floats) -> Floats:
+    """Lower triangular factor (n, n) of a covariance of rows whose independent noise is `sigma` (n,)."""
     # rows in metres and in newtons: scaled to a unit diagonal before they are factorised
     return np.asarray(sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma)))
 

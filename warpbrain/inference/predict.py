@@ -17,20 +17,11 @@ from warpbrain.inference.gaussian import GaussianModel
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Every block of rows predicted from all others.
+    """Every block of rows predicted from all others."""
 
-    Attributes
-    ----------
-    errors : (n,) array
-        What was recorded less what was predicted.
-    blocks : (n,) int array
-    log_densities : (b,) array
-        Of each block given the others.
-    """
-
-    errors: Floats
-    blocks: Ints
-    log_densities: Floats
+    errors: Floats  # (n,), what was recorded less what was predicted
+    blocks: Ints  # (n,)
+    log_densities: Floats  # (b,), of each block given the others
 
     def improvement(
         self, over: Prediction, rows: Bools, random: np.random.Generator, draws: int = 2000
@@ -57,11 +48,7 @@ class Prediction:
 def predict(model: GaussianModel, residual: Floats, blocks: Ints) -> Prediction:
     """Predict every block of rows.
 
-    Parameters
-    ----------
-    model : GaussianModel
-    residual : (n,) array
-    blocks : (n,) int array
+    `residual` (n,), `blocks` (n,).
     """
     return predict_with(model, residual, blocks, [np.zeros((len(model), 0))])[0]
 
@@ -73,12 +60,7 @@ def predict_with(
 
     With columns `G` the inverse covariance is `P - u (I + G^T u)^-1 u^T`, `u = P G` (Woodbury).
 
-    Parameters
-    ----------
-    model : GaussianModel
-    residual : (n,) array
-    blocks : (n,) int array
-    column_sets : sequence of (n, k) arrays
+    `residual` (n,), `blocks` (n,), `column_sets` (n, k).
     """
     weighted = model.precision_times(residual)
     rows_of = [np.flatnonzero(blocks == block) for block in np.unique(blocks)]
@@ -104,15 +86,8 @@ def log_factors_of_fields(
 ) -> Floats:
     """Log Bayes factor (d,) of a mixture of fields and sizes over none.
 
-    Parameters
-    ----------
-    model : GaussianModel
-    fields : sequence of (n, k) arrays
-    sizes : (s,) array
-        Factors on the columns of a field, all equally probable.
-    residuals : (n, d) array
-    weights : (f,) array, optional
-        Log probability of each field; equal unless given.
+    `fields` (n, k). `sizes` (s,): factors on the columns of a field, all equally probable. `residuals` (n, d).
+    `weights` (f,): log probability of each field; equal unless given.
     """
     white = model.standardised(residuals)
     weights = np.full(len(fields), -np.log(len(fields))) if weights is None else weights
@@ -140,4 +115,9 @@ def predictive_p(
     """Probability that the Bayes factor of `log_factors_of_fields` is as large in rows drawn from the model."""
     drawn = np.column_stack([residual, model.draws(draws, random)])
     statistic = log_factors_of_fields(model, fields, sizes, drawn, weights)
-    return float((1 + np.sum(statistic[1:] >= statistic[0])) / (1 + draws))
+    return p_value(statistic[0], statistic[1:])
+
+
+def p_value(observed: float, drawn: Sequence[float] | Floats) -> float:
+    """Share of values as large as an observed one, itself among them; those drawn (d,) are of the hypothesis."""
+    return float((1 + np.sum(np.asarray(drawn) >= observed)) / (1 + len(drawn)))

@@ -13,38 +13,23 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.inference.blocks import Blocks
-from warpbrain.inference.causes import Cause
+from warpbrain.inference.causes import Cause, Configuration, Hypothesis, Member
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.hypothesis import Configuration, Hypothesis, Member, Posterior
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Which sets are summed over.
+    """Which sets are summed over."""
 
-    Parameters
-    ----------
-    scales, log_scale_prior : (k,) array
-        Factors on the noise that are summed over, and the log probability of each.
-    places : int
-        Best places of each cause of which pairs are made.
-    beam : int
-        Best configurations of pairs to which a third cause is added at each scale; 0: no triples.
-    most : int
-        Causes of a set at most.
-    negligible : float
-        Pairs and triples are left out at scales where every single cause is below this part of the greatest density.
-    elsewhere : int
-        Configurations of each single cause at other places than the best that are kept.
-    """
-
+    #: (k,): factors on the noise that are summed over, and the log probability of each.
     scales: Floats
     log_scale_prior: Floats
-    places: int = 50
-    beam: int = 30
-    most: int = 3
+    places: int = 50  # best places of each cause of which pairs are made
+    beam: int = 30  # best configurations of pairs to which a third cause is added at each scale; 0: no triples
+    most: int = 3  # causes of a set at most
+    #: Pairs and triples are left out at scales where every single cause is below this part of the greatest density.
     negligible: float = 1e-4
-    elsewhere: int = 0
+    elsewhere: int = 0  # configurations of each single cause at other places than the best that are kept
 
 
 class _Sums:
@@ -122,16 +107,12 @@ class _Sums:
         return tuple(sorted(others, key=lambda configuration: -configuration.log_density)[: self._places - 1])
 
 
-def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], search: Search) -> Posterior:
-    """Probabilities of sets of at most three causes.
+def posterior(
+    model: GaussianModel, residual: Floats, causes: Sequence[Cause], search: Search
+) -> tuple[Hypothesis, ...]:
+    """Evidence of sets of at most three causes, the most probable first.
 
-    Parameters
-    ----------
-    model : GaussianModel
-        Of rows (n,) on which no cause acts.
-    residual : (n,) array
-    causes : sequence of Cause
-    search : Search
+    `model`: of rows (n,) on which no cause acts. `residual` (n,).
     """
     sums = _Sums(1 + search.elsewhere)
     by_scale: list[tuple[float, float, Blocks, Floats]] = []
@@ -162,22 +143,13 @@ def posterior(model: GaussianModel, residual: Floats, causes: Sequence[Cause], s
         )
         for members, log in sums.logs.items()
     ]
-    return Posterior(
-        tuple(sorted(hypotheses, key=lambda hypothesis: -(hypothesis.log_evidence + hypothesis.log_prior)))
-    )
+    return tuple(sorted(hypotheses, key=lambda hypothesis: -(hypothesis.log_evidence + hypothesis.log_prior)))
 
 
 def likely_places(model: GaussianModel, residual: Floats, causes: Sequence[Cause], most: int) -> dict[str, Ints]:
     """Numbers of the most probable places of each cause by its name, if it acts alone, at the scale of a model.
 
-    Parameters
-    ----------
-    model : GaussianModel
-        Of rows (n,) on which no cause acts.
-    residual : (n,) array
-    causes : sequence of Cause
-    most : int
-        Places of each cause at most.
+    `model`: of rows (n,) on which no cause acts. `residual` (n,). `most`: places of each cause at most.
     """
     blocks = Blocks(model, residual, causes)
     chosen = _best_places(blocks, blocks.log_factors() + blocks.log_weights, most)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from sinking_block import write_sinking
 
+from warpbrain.estimation.options import Listener
 from warpbrain.worlds.body.base import _CONVERGED, BaseFinder, _LinearModel
 from warpbrain.worlds.body.states import Hypothesis, States
-from warpbrain.worlds.listener import Listener
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,10 @@ import pytest
 
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import beliefs
-from warpbrain.inference.marginal import marginal
+from warpbrain.inference.marginal import RowsAtScales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.evidence import evidence_of
-from warpbrain.worlds.body.nuisances import UNKNOWN_MESH, Family, Nuisances
+from warpbrain.worlds.body.nuisances import UNKNOWN_MESH, Nuisances
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def base() -> Base:
     places = random.uniform(size=(40, 3))
     kernel = np.exp(-np.sum((places[:, None] - places[None, ::4]) ** 2, axis=2) / 0.02)
     relative = np.kron(kernel, np.eye(3))
-    families = (Family("registration", np.tile(np.eye(3), (40, 1))), Family(UNKNOWN_MESH, 0.006 * 80.0 * relative))
+    families = {"registration": np.tile(np.eye(3), (40, 1)), UNKNOWN_MESH: 0.006 * 80.0 * relative}
     nuisances = Nuisances(families, places[::4], 0.006, np.full(120, 80.0), relative)
     model = GaussianModel(np.eye(120), nuisances.columns)
     points = tuple(np.arange(3 * k, 3 * k + 3) for k in range(40))
@@ -65,7 +65,7 @@ def test_it_is_the_mean_over_all_sizes(base, seed):
     residual = rows_of(base, 0.028, seed)
     columns, result = evidence_of(base, base.model.columns, residual)
     logs = [
-        marginal(base.model.of_noise(columns_at(base, fraction)), residual, base.points).log_evidence
+        RowsAtScales(base.model.of_noise(columns_at(base, fraction)), residual, base.points).summed().log_evidence
         for fraction in beliefs("mesh.unknown").tolist()
     ]
     # terms below a hundredth of the largest are left out
@@ -122,10 +122,10 @@ def test_what_is_not_resolved_has_its_size(base, size):
 
 
 def test_a_body_that_does_not_move_has_none(base):
-    families = (base.nuisances.families[0], Family(UNKNOWN_MESH, np.zeros((120, 30))))
+    families = base.nuisances.families | {UNKNOWN_MESH: np.zeros((120, 30))}
     still = replace(base.nuisances, families=families, displacement=np.zeros(120))
     base.nuisances, base.model = still, GaussianModel(np.eye(120), still.columns)
     residual = np.random.default_rng(3).normal(size=120)
     columns, result = evidence_of(base, still.columns, residual)
     np.testing.assert_array_equal(columns, still.columns)
-    assert result.log_evidence == marginal(base.model, residual, base.points).log_evidence
+    assert result.log_evidence == RowsAtScales(base.model, residual, base.points).summed().log_evidence

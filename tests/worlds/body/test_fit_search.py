@@ -10,7 +10,7 @@ from sinking_block import OPTIONS, write_sinking
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.fit_search import FitSearch
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.nuisances import UNKNOWN_MESH, Family
+from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.screened import screened
 
 
@@ -25,9 +25,9 @@ def sets(tmp_path_factory: pytest.TempPathFactory) -> HypothesisSearch:
 def base(sets: HypothesisSearch) -> Base:
     """With an unknown error of the mesh of half the noise: the case as declared does not move, and has none."""
     nuisances, noise = sets.base.nuisances, sets.base.noise
-    *others, last = nuisances.families
-    columns = 0.5 * noise[:, None] * np.random.default_rng(2).normal(size=last.columns.shape)
-    return replace(sets.base, nuisances=replace(nuisances, families=(*others, Family(UNKNOWN_MESH, columns))))
+    shape = nuisances.families[UNKNOWN_MESH].shape
+    columns = 0.5 * noise[:, None] * np.random.default_rng(2).normal(size=shape)
+    return replace(sets.base, nuisances=replace(nuisances, families={**nuisances.families, UNKNOWN_MESH: columns}))
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def search(sets: HypothesisSearch, base: Base) -> FitSearch:
     """A fit of the set with the weight, at the most probable point of the linear model."""
     weighed = sets.get(("gravity",))
     assert weighed is not None
-    columns = base.nuisances.with_family("mesh, unknown", weighed.columns, base.nuisances.families[-1].columns)
+    columns = base.nuisances.with_family("mesh, unknown", weighed.columns, base.nuisances.families[UNKNOWN_MESH])
     fit = FitSearch(base, None, weighed.effects, columns, weighed.marginal)
     fit.start([weighed.coordinates], base.state)
     return fit

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from sinking_block import write_sinking
 
+from warpbrain.estimation.options import Listener
 from warpbrain.physics.mechanisms.compressibility import Compressibility
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.worlds.body.base import Base, BaseFinder
@@ -13,7 +14,6 @@ from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.mesh_error import expected_answer, volume_of
 from warpbrain.worlds.body.nuisances import LAW, other_volume
 from warpbrain.worlds.body.states import States
-from warpbrain.worlds.listener import Listener
 
 
 @pytest.fixture(scope="module")

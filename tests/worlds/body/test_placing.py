@@ -13,8 +13,8 @@ from warpbrain.worlds.body.placing import _around, best_in_cell
 def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_of_its_own(small_diagnosis):
     search = small_diagnosis.search
     base, spacing = search.base, search.spacing
-    numbers = search.candidates.of_kind["swelling"]
-    effect = search.candidates.effects[numbers[len(numbers) // 2]]
+    effects = search.candidates.effects["swelling"]
+    effect = effects[len(effects) // 2]
     proposed = effect.proposed
     near = next(place for place in _around(base, proposed, 0.5 * spacing) if place.radius == proposed.radius)
     [true] = base.effects.of([near])

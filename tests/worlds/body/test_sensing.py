@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from sinking_block import write_sinking
 
+from warpbrain.estimation.options import Listener
 from warpbrain.worlds.body.base import BaseFinder
 from warpbrain.worlds.body.states import States
-from warpbrain.worlds.listener import Listener
 
 
 def test_noise_that_is_not_declared(tmp_path, verify):

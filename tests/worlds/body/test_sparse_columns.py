@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warpbrain.worlds.body.sparse_columns import SparseColumns
+from warpbrain.worlds.body.effects import SparseColumns
 
 
 def test_it_is_the_matrix_of_all_columns_that_are_not_zero() -> None:

@@ -28,28 +28,14 @@ class LikelyCause:
 
 @dataclass(frozen=True, eq=False)
 class AveragedTissue:
-    """A mixture of normal distributions of `theta`, one for each set of causes.
+    """A mixture of normal distributions of `theta`, one for each set of causes."""
 
-    Attributes
-    ----------
-    parameters : Parameters
-        What `theta` means.
-    nothing : float
-        Probability that nothing acts but what the case says.
-    causes : tuple of LikelyCause
-        The most probable first.
-    probabilities : (s,) array
-        Of the sets.
-    means : (s, p) array
-    covariances : (s, p, p) array
-    """
-
-    parameters: Parameters
-    nothing: float
-    causes: tuple[LikelyCause, ...]
-    probabilities: Floats
-    means: Floats
-    covariances: Floats
+    parameters: Parameters  # what `theta` means
+    nothing: float  # probability that nothing acts but what the case says
+    causes: tuple[LikelyCause, ...]  # the most probable first
+    probabilities: Floats  # (s,), of the sets
+    means: Floats  # (s, p)
+    covariances: Floats  # (s, p, p)
 
     @property
     def mean(self) -> Floats:

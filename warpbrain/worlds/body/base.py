@@ -15,26 +15,23 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.options import Listener
 from warpbrain.estimation.parameters import Gaussian
-from warpbrain.estimation.prior import declared
+from warpbrain.estimation.prior import declared, tissue_prior
 from warpbrain.estimation.registration import registration_of
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
-from warpbrain.inference.noise import outliers, scales
+from warpbrain.inference.noise import noise_factor, outliers, scales
 from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
-from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.effects import Effects, SolvedSwitches
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
-from warpbrain.worlds.body.sensing import factor_of_noise, noise_of
-from warpbrain.worlds.body.sensors import Sensors, rows_of_points, tracked_points
+from warpbrain.worlds.body.sensors import Sensors, noise_of, rows_of_points, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
-from warpbrain.worlds.body.switching import SolvedSwitches
-from warpbrain.worlds.body.tissue_prior import tissue_prior
 from warpbrain.worlds.body.unknown import body_forces, fields
-from warpbrain.worlds.listener import Listener
 
 #: Gauss-Newton steps at most; the last one moves tissue and field by less than this [standard deviations].
 _STEPS, _CONVERGED = 6, 0.5
@@ -46,55 +43,26 @@ _UNSEEN = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """The base state and everything that is linear about it.
-
-    Attributes
-    ----------
-    states : States
-    prior : Gaussian
-        Of the tissues' parameters.
-    declared : SolvedState
-        The case as declared.
-    state : SolvedState
-        The base.
-    at : Linearisation
-    effects : Effects
-    switch_states : dict of str to SolvedState
-        States with a switch that were solved for them, by the mechanism.
-    nuisances : Nuisances
-    unknown : dict of str to (n, k) array
-        Columns of unknown fields, of 1 m.
-    model : GaussianModel
-        Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
-    noises : tuple of GaussianModel
-        The same noise without columns, and with what the mesh does not resolve, of each size of `mesh.unresolved`; of
-        the first alone where all are next to nothing.
-    noise : (n,) array
-        Standard deviation of the independent noise of each row.
-    points : tuple of int arrays
-        Rows of each recorded point.
-    residual : (n,) array
-        Of the linear model with all nuisances at their prior mean.
-    mesh_errors : MeshErrors or None
-        Of the base; None: the mesh is taken for exact.
-    remarks : tuple of str
-    """
+    """The base state and everything that is linear about it."""
 
     states: States
-    prior: Gaussian
-    declared: SolvedState
-    state: SolvedState
+    prior: Gaussian  # of the tissues' parameters
+    declared: SolvedState  # the case as declared
+    state: SolvedState  # the base
     at: Linearisation
     effects: Effects
-    switch_states: dict[str, SolvedState]
+    switch_states: dict[str, SolvedState]  # states with a switch that were solved for them, by the mechanism
     nuisances: Nuisances
-    unknown: dict[str, Floats]
+    unknown: dict[str, Floats]  # (n, k), columns of unknown fields, of 1 m
+    #: Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
     model: GaussianModel
+    #: The same noise without columns, and with what the mesh does not resolve, of each size of `mesh.unresolved`; of
+    #: the first alone where all are next to nothing.
     noises: tuple[GaussianModel, ...]
-    noise: Floats
-    points: tuple[Ints, ...]
-    residual: Floats
-    mesh_errors: MeshErrors | None
+    noise: Floats  # (n,), standard deviation of the independent noise of each row
+    points: tuple[Ints, ...]  # rows of each recorded point
+    residual: Floats  # (n,), of the linear model with all nuisances at their prior mean
+    mesh_errors: MeshErrors | None  # of the base; None: the mesh is taken for exact
     remarks: tuple[str, ...]
 
     @property
@@ -120,16 +88,7 @@ class Base:
 class BaseFinder:
     """Finds the base of a case.
 
-    Parameters
-    ----------
-    states : States
-    spacing : float
-        Between sites [m].
-    mesh_error : bool
-    without_nuisances : bool
-    listener : Listener
-    prior : Gaussian, optional
-        Of the tissues' parameters, if it is not `tissue_prior`.
+    `spacing`: between sites [m]. `prior`: of the tissues' parameters, if it is not `tissue_prior`.
     """
 
     def __init__(
@@ -156,10 +115,7 @@ class BaseFinder:
     def find(self) -> Base:
         """The base state.
 
-        Raises
-        ------
-        SolveError
-            If the case as declared has no equilibrium.
+        `SolveError` if the case as declared has no equilibrium.
         """
         self._listener.stage("the case as declared")
         declared = self.states.solve(self._declared())
@@ -275,7 +231,7 @@ class _LinearModel:
         #: Columns of smooth forces as large as the residuals.
         self.smooth_force = size * smooth
         self.noise = noise_of(sensors, self.residual, self.nuisances.columns, smooth)
-        self.noise_factor = factor_of_noise(sensors, self.noise)
+        self.noise_factor = noise_factor(sensors.noise_covariance(self.noise), self.noise)
         self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
         self.points = tuple(rows for group in rows_of_points(sensors) for rows in group)
 
@@ -299,8 +255,8 @@ def _noises(linear: _LinearModel, resolved: bool) -> tuple[GaussianModel, ...]:
     visible = sizes.max() * np.linalg.norm(sensors.over_element, axis=1) > _UNSEEN * linear.noise
     factors = [linear.noise_factor]
     for size in sizes[1:].tolist() if visible.any() and not resolved else []:
-        beyond = size * sensors.over_element
-        factors.append(factor_of_noise(sensors, linear.noise, beyond))
+        covariance = sensors.noise_covariance(linear.noise, size * sensors.over_element)
+        factors.append(noise_factor(covariance, linear.noise))
     return tuple(GaussianModel(factor, nothing) for factor in factors)
 
 
@@ -310,14 +266,7 @@ def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats
     It depends on the mesh, the load and the sensors; if it is overestimated it hides what is missing. Its evidence is
     that of models with and without a smooth force, so that a missing cause is not taken for an error of the mesh.
 
-    Parameters
-    ----------
-    nuisances : Nuisances
-    factor : (n, n) array
-        Of the noise.
-    residual : (n,) array
-    smooth : (n, k) array
-        Columns of a smooth force as large as the noise.
+    `factor` (n, n): of the noise. `residual` (n,). `smooth` (n, k): columns of a smooth force as large as the noise.
     """
     from scipy.special import logsumexp, softmax
 

@@ -11,7 +11,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.inference import Cause, GaussianModel, Kind, Place
 from warpbrain.inference.beliefs import belief, beliefs
-from warpbrain.inference.hypothesis import Member
+from warpbrain.inference.causes import Member
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import Candidates
 from warpbrain.worlds.body.effects import Effect
@@ -22,17 +22,10 @@ UNKNOWN = "unknown"
 
 @dataclass(frozen=True, eq=False)
 class BodyCauses:
-    """Causes, and the effects of mechanisms at their places.
-
-    Attributes
-    ----------
-    causes : tuple of Cause
-    effects : mapping of str to tuple of Effect
-        Of each mechanism, by place.
-    """
+    """Causes, and the effects of mechanisms at their places."""
 
     causes: tuple[Cause, ...]
-    effects: Mapping[str, tuple[Effect, ...]]
+    effects: Mapping[str, tuple[Effect, ...]]  # of each kind, by place
 
     def named(self, name: str) -> Cause:
         """A cause by its name."""
@@ -62,11 +55,7 @@ def visible(causes: BodyCauses, model: GaussianModel) -> BodyCauses:
     A set with a cause that changes nothing is as probable as without it: many of them would share the probability of
     what acts, and tell of nothing. Their sizes are believed, but no verdict depends on them.
 
-    Parameters
-    ----------
-    causes : BodyCauses
-    model : GaussianModel
-        Of the rows without them.
+    `model`: of the rows without them.
     """
     least = belief("checks.invisible")
     return replace(causes, causes=tuple(cause for cause in causes.causes if _length(cause, model) > least))
@@ -95,11 +84,9 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
     sizes, not_physics_sizes = beliefs("causes.sizes"), beliefs("causes.not_physics_sizes")
     unit_sizes = np.ones(len(sizes))
     causes: list[Cause] = []
-    effects: dict[str, tuple[Effect, ...]] = {}
-    for kind, numbers in candidates.of_kind.items():
-        of_kind = tuple(candidates.effects[number] for number in numbers.tolist())
+    for kind, of_kind in candidates.effects.items():
         places = tuple(Place(effect.columns, effect.mean if effect.mean.any() else None) for effect in of_kind)
-        if kind in candidates.alternatives:
+        if of_kind[0].proposal is None:
             causes.append(
                 Cause(kind, places, math.log(belief("causes.not_physics")), not_physics_sizes, Kind.NOT_PHYSICS)
             )
@@ -107,12 +94,11 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
         # a mechanism with an expected size, such as a weight, has that one
         has_mean = any(place.mean is not None for place in places)
         causes.append(Cause(kind, places, math.log(belief("causes.mechanism")), unit_sizes if has_mean else sizes))
-        effects[kind] = of_kind
     # setting in at any recorded time
     courses = main_courses(base.states.times)
     factors = [factor_of_rows(course, base.at.sensors) for course in courses]
     causes.append(unknown_cause(base, [factor for factor in factors if factor.any()]))
-    return BodyCauses(tuple(causes), effects)
+    return BodyCauses(tuple(causes), candidates.effects)
 
 
 def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:

@@ -35,23 +35,12 @@ _STEPS, _LAST = 40, 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What is recorded on the way to a final state, less what is recorded there, at any pace.
-
-    Attributes
-    ----------
-    sensors : Sensors
-    answers : (n, m) array
-        Of the sensors to each vector of a basis of the unknowns.
-    times : (m,) array
-        Relaxation times [s] of the eigenvectors.
-    first : (m, m) array
-        Initial amplitudes of the eigenvectors in the basis, times their relaxation times.
-    """
+    """What is recorded on the way to a final state, less what is recorded there, at any pace."""
 
     sensors: Sensors
-    answers: Floats
-    times: Floats
-    first: Floats
+    answers: Floats  # (n, m), of the sensors to each vector of a basis of the unknowns
+    times: Floats  # (m,), relaxation times [s] of the eigenvectors
+    first: Floats  # (m, m), initial amplitudes of the eigenvectors in the basis, times their relaxation times
 
     def at(self, pace: float) -> Floats:
         """Difference (n,) from the final state at the recorded times if all goes so many times faster."""
@@ -78,12 +67,8 @@ def bound_term(system: System, mechanism: Following) -> Term:
 def consolidation(at: Linearisation, term: Term) -> Course:
     """What is recorded while a term's own unknowns relax to zero after all loads are applied at once.
 
-    Parameters
-    ----------
-    at : Linearisation
-        About the final state.
-    term : Term
-        With unknowns of its own; bound to the system of that state, but not one of its terms.
+    `at`: about the final state. `term`: with unknowns of its own; bound to the system of that state, but not one of its
+    terms.
     """
     from scipy.linalg import eigh_tridiagonal
 

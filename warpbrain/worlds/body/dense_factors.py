@@ -21,18 +21,8 @@ _MATRICES, _TOGETHER = 3, 2048
 class DenseFactors:
     """The Cholesky factor of a symmetric positive definite matrix on a GPU.
 
-    Parameters
-    ----------
-    matrix : SciPy sparse matrix (n, n)
-    device : warp.Device
-        A GPU for which there is CuPy.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If it is not positive definite.
-    MemoryError
-        If it does not fit into the GPU's memory.
+    `matrix` SciPy sparse matrix (n, n). `device`: a GPU for which there is CuPy. `numpy.linalg.LinAlgError` if it is
+    not positive definite. `MemoryError` if it does not fit into the GPU's memory.
     """
 
     def __init__(self, matrix: Any, device: Any) -> None:
@@ -80,11 +70,7 @@ def dense_factors(matrix: Any, device: Any) -> DenseFactors | None:
     It cannot if it is no GPU, if CuPy is not installed for it, if its memory is too small, or if the matrix is not
     positive definite.
 
-    Parameters
-    ----------
-    matrix : SciPy sparse matrix (n, n)
-        Symmetric.
-    device : warp.Device
+    `matrix` SciPy sparse matrix (n, n): symmetric.
     """
     if not has_cupy(device):
         return None

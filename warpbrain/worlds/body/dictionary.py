@@ -19,12 +19,12 @@ from warpbrain.physics.load import Load
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.threads import in_threads
-from warpbrain.worlds.body.courses import over_time
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.states import SolvedState
 from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, named_triangles, with_free_surfaces
+from warpbrain.worlds.body.time_courses import over_time
 
 #: About how many sites a scan has in the tissue, and on its surface.
 _VOLUME_SITES, _SURFACE_SITES = 350, 480
@@ -35,19 +35,11 @@ RADII, BETWEEN = (0.154, 0.231, 0.354, 0.538, 0.815), 0.215
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:
-    """Proposals by kind.
-
-    Attributes
-    ----------
-    situation : Situation
-    proposals : dict of str to tuple of Proposal
-    rejected : dict of str to str
-        Kinds that are not tried, and why.
-    """
+    """Proposals by kind."""
 
     situation: Situation
     proposals: dict[str, tuple[Proposal, ...]]
-    rejected: dict[str, str]
+    rejected: dict[str, str]  # kinds that are not tried, and why
 
 
 def situation_of(case: Case, instants: int = 1) -> Situation:
@@ -107,20 +99,8 @@ def dictionary_of(
 ) -> Dictionary:
     """Proposals of all kinds, or of some.
 
-    Parameters
-    ----------
-    case : Case
-    kinds : sequence of str, optional
-    instants : int
-        See `Situation`.
-    times : sequence of float
-        Of states that are looked at [s]: with several, what may change from one to the next is proposed with a course,
-        too.
-
-    Raises
-    ------
-    InputError
-        If there is no such kind.
+    `instants`: see `Situation`. `times`: of states that are looked at [s]: with several, what may change from one to
+    the next is proposed with a course, too. `InputError` if there is no such kind.
     """
     registry = mechanisms()
     requested = list(registry) if kinds is None else list(kinds)
@@ -132,8 +112,8 @@ def dictionary_of(
     rejected: dict[str, str] = {}
     for kind in requested:
         try:
-            found = over_time(registry[kind].proposals(situation), times)
-            proposals[kind] = _composable(case, situation.mesh, found)
+            proposed = over_time(registry[kind].proposals(situation), times)
+            proposals[kind] = _composable(case, situation.mesh, proposed)
         except NotTestableError as error:
             rejected[kind] = f"not testable with these data: {error}"
     return Dictionary(situation, proposals, rejected)
@@ -158,25 +138,11 @@ def _composable(case: Case, mesh: TetMesh, proposals: Sequence[Proposal]) -> tup
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Effects of all proposals at one state.
+    """Effects of all proposals at one state."""
 
-    Attributes
-    ----------
-    effects : tuple of Effect
-    of_kind : dict of str to int array
-        Numbers of the effects of each kind.
-    alternatives : frozenset of str
-        Kinds that are no physics.
-    rejected : dict of str to str
-    source : Effects or None
-        Which made them at a state; None if they were given.
-    """
-
-    effects: tuple[Effect, ...]
-    of_kind: dict[str, Ints]
-    alternatives: frozenset[str]
+    effects: dict[str, tuple[Effect, ...]]  # of each kind
     rejected: dict[str, str]
-    source: Effects | None = None
+    source: Effects  # which made them at a state
 
 
 def candidates_at(
@@ -189,8 +155,7 @@ def candidates_at(
 
     Kinds that cannot be simulated are rejected with a reason.
     """
-    all_effects: list[Effect] = []
-    of_kind: dict[str, Ints] = {}
+    by_kind: dict[str, tuple[Effect, ...]] = {}
     rejected = dict(dictionary.rejected)
     for kind, proposals in dictionary.proposals.items():
         if on_kind is not None:
@@ -212,15 +177,10 @@ def candidates_at(
         within = [effect for effect in of_this_kind if is_linear(effect, effects.at)]
         if of_this_kind and not within:
             rejected[kind] = "its effect is not linear here: its usual size would move the body by more than its own"
-        of_this_kind = within
-        if of_this_kind:
-            of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
+        if within:
+            by_kind[kind] = tuple(within)
             rejected.pop(kind, None)
-            all_effects.extend(of_this_kind)
-    for name, effect in alternatives.items():
-        of_kind[name] = np.array([len(all_effects)])
-        all_effects.append(effect)
-    return Candidates(tuple(all_effects), of_kind, frozenset(alternatives), rejected, effects)
+    return Candidates(by_kind | {name: (effect,) for name, effect in alternatives.items()}, rejected, effects)
 
 
 def is_linear(effect: Effect, at: Linearisation) -> bool:
@@ -264,32 +224,22 @@ def candidates_about_fit(
     Switches, courses in time and what is no physics keep their columns at the base, as do all at improbable places. A
     kind of which a case has only one is left out if it acts already.
 
-    Parameters
-    ----------
-    state : SolvedState
-    acting : sequence of Effect
-    candidates : Candidates
-        At the base.
-    places : mapping of str to int array
-        Of each kind, numbers of the places whose columns are made anew.
+    `candidates`: at the base. `places`: of each kind, numbers of the places whose columns are made anew.
     """
-    mesh_errors = None if candidates.source is None else candidates.source.mesh_errors
-    effects = Effects(state.linearised(), mesh_errors=mesh_errors)
+    effects = Effects(state.linearised(), mesh_errors=candidates.source.mesh_errors)
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
-    all_effects: list[Effect] = []
-    of_kind: dict[str, Ints] = {}
-    for kind, numbers in candidates.of_kind.items():
+    by_kind: dict[str, tuple[Effect, ...]] = {}
+    for kind, at_base in candidates.effects.items():
         if kind in acting_kinds:
             continue
-        of_this_kind = [candidates.effects[k] for k in numbers.tolist()]
+        of_this_kind = list(at_base)
         smooth = [k for k in places[kind].tolist() if _is_smooth(of_this_kind[k])]
         for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
             if is_linear(effect, effects.at):
                 of_this_kind[k] = effect
-        of_kind[kind] = np.arange(len(all_effects), len(all_effects) + len(of_this_kind))
-        all_effects.extend(of_this_kind)
-    return replace(candidates, effects=tuple(all_effects), of_kind=of_kind, source=effects)
+        by_kind[kind] = tuple(of_this_kind)
+    return replace(candidates, effects=by_kind, source=effects)
 
 
 def _is_smooth(effect: Effect) -> bool:

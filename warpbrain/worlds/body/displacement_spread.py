@@ -28,16 +28,7 @@ _LOADS = "known loads"
 def displacement_deviation(weighted_set: WeightedSet, base: Base) -> Floats:
     """Standard deviation (N, 3) [m] of each component of the displacement under a set: see the module.
 
-    Parameters
-    ----------
-    weighted_set : WeightedSet
-        Fitted, or without any cause.
-    base : Base
-
-    Raises
-    ------
-    SolveError
-        If a mechanism is not linear about the fit.
+    `weighted_set`: fitted, or without any cause. `SolveError` if a mechanism is not linear about the fit.
     """
     columns = displacement_columns(weighted_set, base)
     refit = weighted_set.refit
@@ -46,18 +37,15 @@ def displacement_deviation(weighted_set: WeightedSet, base: Base) -> Floats:
     else:
         covariance = refit.marginal.model.coefficients(refit.linear)[1]
     # the model has columns of gross errors behind them
-    own = covariance[: columns.shape[1], : columns.shape[1]]
-    variance = np.einsum("ij,jk,ik->i", columns, own, columns, optimize=True)
+    of_coordinates = covariance[: columns.shape[1], : columns.shape[1]]
+    variance = np.einsum("ij,jk,ik->i", columns, of_coordinates, columns, optimize=True)
     return np.sqrt(np.maximum(variance, 0.0)).reshape(-1, 3)
 
 
 def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
     """Displacement (3 N, q + k) [m] of every node by a standard deviation of each coordinate of a fit.
 
-    Raises
-    ------
-    SolveError
-        As `displacement_deviation`.
+    `SolveError`: as `displacement_deviation`.
     """
     refit = weighted_set.refit
     effects: tuple[Effect, ...] = ()
@@ -72,10 +60,10 @@ def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
     nodes = tracked_points(mesh, mesh.points, base.states.centre)
     nuisances, made = base.for_sensors(nodes)
     columns = np.zeros((len(nodes), len(z)))
-    own, loads = base.nuisances.part(_LOADS), nuisances.part(_LOADS)
+    part, loads = base.nuisances.part(_LOADS), nuisances.part(_LOADS)
     # those that no recording sees have no coordinate
-    if own.stop - own.start == loads.stop - loads.start:
-        columns[:, own] = nuisances.columns[:, loads]
+    if part.stop - part.start == loads.stop - loads.start:
+        columns[:, part] = nuisances.columns[:, loads]
     # a switch is there: its size is not in question
     moving = [number for number, effect in enumerate(effects) if not effect.proposed.is_there_or_not]
     over_nodes = list(effects)

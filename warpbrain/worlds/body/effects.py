@@ -6,22 +6,23 @@ import itertools
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
 from warpbrain.physics.proposal import Proposal, Varying
+from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.model import substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
 from warpbrain.worlds.body.sensors import Sensors
-from warpbrain.worlds.body.sparse_columns import SparseColumns
+from warpbrain.worlds.body.states import SolvedState, States
 
 #: Part of a standard deviation by which a smooth or a fading proposal is differentiated.
 _STEP = 1e-3
@@ -32,35 +33,77 @@ _PUSHING: frozenset[type] = frozenset((Load, Following, Substituting))
 _ACTING = _PUSHING | {Weakening, Growing}
 
 
-class SwitchEffects(Protocol):
-    """Effects of switches, which are solved, not differentiated: `warpbrain.worlds.body.switching.SolvedSwitches`."""
+class SparseColumns:
+    """Columns of one length, such as the forces of thousands of patches, collected; those that are zero are left out.
 
-    def at(self, instant: int, sensors: Sensors) -> SwitchEffects:
-        """The same of other sensors, at the time of a number."""
+    `size`: rows. `numbers`: under which those that are not zero were added.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.numbers: list[int] = []
+        self._size = size
+        self._rows: list[Ints] = []
+        self._values: list[Floats] = []
+
+    def add(self, number: int, column: Floats) -> None:
+        """Add a column (size,)."""
+        # `flatnonzero` of booleans is eight times as fast as of numbers
+        rows = np.flatnonzero(column != 0.0)
+        if len(rows):
+            self.numbers.append(number)
+            self._rows.append(rows)
+            self._values.append(column[rows])
+
+    def matrix(self) -> Any:
+        """Those that are not zero: SciPy CSC (size, k), in the order of `numbers`."""
+        from scipy.sparse import csc_matrix
+
+        first = np.cumsum([0, *(len(rows) for rows in self._rows)])
+        shape = self._size, len(self.numbers)
+        return csc_matrix((np.concatenate(self._values), np.concatenate(self._rows), first), shape)
+
+
+class SolvedSwitches:
+    """Effects of switches, such as contact, that have no derivative: states with each are solved, and kept.
+
+    `state`: without the mechanisms. `sensors`: whose response is computed. `solved_states`: states that were solved
+    already, by the mechanism; further ones are added. `instant`: number of the time of the states.
+    """
+
+    def __init__(
+        self,
+        states: States,
+        state: SolvedState,
+        sensors: Sensors,
+        solved_states: dict[str, SolvedState],
+        instant: int = -1,
+    ) -> None:
+        self._states, self._state, self._sensors = states, state, sensors
+        self._solved_states, self._instant = solved_states, instant
+
+    def at(self, instant: int, sensors: Sensors) -> SolvedSwitches:
+        """The same of other sensors at the time of a number."""
+        return SolvedSwitches(self._states, self._state, sensors, self._solved_states, instant)
 
     def effect_of(self, mechanism: Mechanism) -> Floats:
         """What sensors (n,) record in the state with a mechanism, less that without it."""
+        key, state = repr(mechanism), self._state
+        if key not in self._solved_states:
+            hypothesis = replace(state.hypothesis, mechanisms=(mechanism,))
+            # the loads act already: one load step, or the state is taken not to exist
+            self._solved_states[key] = self._states.solve(hypothesis, state.u, iterations=EquilibriumOptions.max_newton)
+        solved, without = self._solved_states[key].instants[self._instant], state.instants[self._instant]
+        return self._sensors.answer(solved.u - without.u, solved.reactions - without.reactions)
 
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """A proposal as columns over the sensors: `mean + columns z`, `z ~ N(0, I)`.
+    """A proposal as columns over the sensors: `mean + columns z`, `z ~ N(0, I)`."""
 
-    Attributes
-    ----------
-    proposal : Proposal or None
-        None of what is no physics.
-    mean : (n,) array
-        At the prior mean of the coefficients.
-    columns : (n, k) array
-        Of one standard deviation of each.
-    columns_at : callable, or None
-        Of a course in time: from its coefficients (k,) to the columns (n, k) about them.
-    """
-
-    proposal: Proposal | None
-    mean: Floats
-    columns: Floats
+    proposal: Proposal | None  # None of what is no physics
+    mean: Floats  # (n,), at the prior mean of the coefficients
+    columns: Floats  # (n, k), of one standard deviation of each
+    #: Of a course in time: from its coefficients (k,) to the columns (n, k) about them.
     columns_at: Callable[[Floats], Floats] | None = None
 
     @property
@@ -92,17 +135,12 @@ def column_slices(effects: Sequence[Effect], first: int) -> tuple[slice, ...]:
 class Effects:
     """Makes the columns of proposals at one state.
 
-    Parameters
-    ----------
-    at : Linearisation
-    switches : SwitchEffects, optional
-        Needed for proposals that are switches.
-    mesh_errors : MeshErrors, optional
-        Of the state: less compressible tissue locks more, which is part of the effect of a law.
+    `switches`: needed for proposals that are switches. `mesh_errors`: of the state: less compressible tissue locks
+    more, which is part of the effect of a law.
     """
 
     def __init__(
-        self, at: Linearisation, switches: SwitchEffects | None = None, mesh_errors: MeshErrors | None = None
+        self, at: Linearisation, switches: SolvedSwitches | None = None, mesh_errors: MeshErrors | None = None
     ) -> None:
         self.at = at
         self.mesh_errors = mesh_errors
@@ -116,33 +154,46 @@ class Effects:
     def of(self, proposals: Sequence[Proposal], present: Mechanism | None = None) -> list[Effect]:
         """Columns of each proposal, with what they have in common computed once.
 
-        Parameters
-        ----------
-        proposals : sequence of Proposal
-        present : Mechanism, optional
-            Mechanism of that kind that acts at the state already.
+        `present`: mechanism of that kind that acts at the state already.
         """
         bases = [proposal if proposal.over_time is None else proposal.over_time.base for proposal in proposals]
-        if not self.at.moments:
-            constant = self._at_one_time(_each_once(bases), present)
-            effects = [constant[id(base)] for base in bases]
-            times = self.at.sensors.times
-            return [
-                _over_time(proposal, [(effect, slice(None), 1.0, times)])
-                for proposal, effect in zip(proposals, effects, strict=True)
-            ]
-        by_moment = []
+        # of each state: effects there, its rows among all, with which sign, and their times
+        parts: list[tuple[Effects, Any, float, Floats]] = []
         for moment in self.at.moments:
             switches = None if self._switches is None else self._switches.at(moment.number, moment.at.sensors)
             here = Effects(moment.at, switches, self.mesh_errors)
-            by_moment.append((here._at_one_time(_each_once(bases), present), moment))
+            parts.append((here, moment.rows, moment.sign, np.full(len(moment.rows), moment.time)))
+        parts = parts or [(self, slice(None), 1.0, self.at.sensors.times)]
+        by_part = [(here._at_one_time(_each_once(bases), present), *where) for here, *where in parts]
         return [
-            _over_time(
-                proposal,
-                [(effects[id(base)], m.rows, m.sign, np.full(len(m.rows), m.time)) for effects, m in by_moment],
-            )
+            self._over_time(proposal, [(effects[id(base)], *where) for effects, *where in by_part])
             for proposal, base in zip(proposals, bases, strict=True)
         ]
+
+    def _over_time(self, proposal: Proposal, parts: Sequence[tuple[Effect, Any, float, Floats]]) -> Effect:
+        """The effect over all rows: of each state at its time, less at that from which it is counted."""
+        varying = proposal.over_time
+        effect = parts[0][0]
+        if varying is None and not self.at.moments:
+            return effect
+
+        def total(of: Callable[[Effect], Floats], expanded: bool = False) -> Floats:
+            changes = [
+                _expanded(of(effect), varying, times) if expanded and varying is not None else of(effect)
+                for effect, _, _, times in parts
+            ]
+            summed = np.zeros((len(self.at.sensors), *changes[0].shape[1:]))
+            for (_, rows, sign, _), change in zip(parts, changes, strict=True):
+                summed[rows] += sign * change
+            return summed
+
+        columns_at = None
+        if effect.columns_at is not None:
+
+            def columns_at(c: Floats) -> Floats:
+                return total(lambda e: e.columns if e.columns_at is None else e.columns_at(c))
+
+        return Effect(proposal, total(lambda e: e.mean), total(lambda e: e.columns, True), columns_at)
 
     def _at_one_time(self, proposals: Sequence[Proposal], present: Mechanism | None) -> dict[int, Effect]:
         """Effects at one state by the identity of their proposals."""
@@ -309,36 +360,6 @@ def _each_once(proposals: Sequence[Proposal]) -> list[Proposal]:
     return list({id(proposal): proposal for proposal in proposals}.values())
 
 
-#: An effect at one state, rows of its sensors among all, 1 or -1, and the time of each of these rows [s].
-AtTime = tuple[Effect, Any, float, Floats]
-
-
-def _over_time(proposal: Proposal, parts: Sequence[AtTime]) -> Effect:
-    """The effect over all rows: of each at its time, less at that from which it is counted."""
-    varying = proposal.over_time
-    effect, rows, _, _ = parts[0]
-    if varying is None and isinstance(rows, slice):
-        return effect
-    count = max(int(np.max(rows)) + 1 for _, rows, _, _ in parts) if not isinstance(rows, slice) else len(effect.mean)
-
-    def total(of: Callable[[Effect], Floats], expanded: bool) -> Floats:
-        summed: Floats | None = None
-        for effect, rows, sign, times in parts:
-            change = _expanded(of(effect), varying, times) if expanded and varying is not None else of(effect)
-            summed = np.zeros((count, *change.shape[1:])) if summed is None else summed
-            summed[rows] += sign * change
-        assert summed is not None
-        return summed
-
-    columns_at = None
-    if effect.columns_at is not None:
-
-        def columns_at(c: Floats) -> Floats:
-            return total(lambda e: e.columns if e.columns_at is None else e.columns_at(c), False)
-
-    return Effect(proposal, total(lambda e: e.mean, False), total(lambda e: e.columns, True), columns_at)
-
-
 def _expanded(columns: Floats, varying: Varying, times: Floats) -> Floats:
     """Columns (n, k) of what acts at one time as those of modes, for rows at times (n,)."""
     modes = varying.modes_at(times)
@@ -351,10 +372,10 @@ def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats, mesh_err
     varying = proposal.over_time
     assert varying is not None
 
-    def about(one: Linearisation, time: float) -> Floats:
+    def about(state: Linearisation, time: float) -> Floats:
         here = varying.at(c, time)
         smooth = replace(varying.base, follows="smooth", start=here, sd=_sd_of(proposal, varying))
-        return Effects(one, mesh_errors=mesh_errors).of([smooth], varying.base.make(here))[0].columns
+        return Effects(state, mesh_errors=mesh_errors).of([smooth], varying.base.make(here))[0].columns
 
     if not at.moments:
         return _expanded(about(at, float(varying.times[-1])), varying, at.sensors.times)

@@ -27,26 +27,14 @@ _NEGLIGIBLE = 1e-2
 def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.0) -> tuple[Floats, Marginal]:
     """Evidence of residuals, and the columns with the most probable size of the smooth part.
 
-    Parameters
-    ----------
-    base : Base
-    columns : (n, q) array
-        Of nuisances and causes.
-    residual : (n,) array
-        Less what is expected of the causes.
-    scale : float
-        A factor on the noise near the most probable one.
-
-    Returns
-    -------
-    columns : (n, q) array
-    marginal : Marginal
-        With these columns and the most probable noise; its log evidence is the mean over all sizes.
+    `columns` (n, q): of nuisances and causes. `residual` (n,): less what is expected of the causes. `scale`: a factor
+    on the noise near the most probable one. Returns the columns (n, q), and the marginal with these columns and the
+    most probable noise; its log evidence is the mean over all sizes.
     """
     nuisances, fractions = base.nuisances, beliefs("mesh.unknown")
     part = nuisances.part(UNKNOWN_MESH)
     # of nothing that moves, or where no displacement was recorded, there is one size
-    moving = nuisances.families[-1].columns.any()
+    moving = nuisances.families[UNKNOWN_MESH].any()
     fractions = fractions if moving else np.ones(1)
     others = np.delete(columns, np.r_[part], axis=1) if moving else columns
     models, relative = [noise.of_noise(others) for noise in base.noises], None
@@ -82,9 +70,9 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
     # as if the evidence were a product of what depends on one size, and on the other
     if relative is not None:
         columns = nuisances.with_family(UNKNOWN_MESH, columns, fractions[best] * relative)
-    found = marginal_of(base.noises[noise].of_noise(columns), base.points, summed[best, noise])
+    marginal = marginal_of(base.noises[noise].of_noise(columns), base.points, summed[best, noise])
     means = [float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs.max()) for logs in (by_fraction, by_noise)]
-    return columns, replace(found, log_evidence=found.log_evidence + sum(means))
+    return columns, replace(marginal, log_evidence=marginal.log_evidence + sum(means))
 
 
 def _displacement(base: Base, left: Floats) -> Floats:

@@ -24,18 +24,8 @@ _TOGETHER = 256
 class Factors:
     """Factors of a positive definite matrix, symmetric if they are on a GPU, all but symmetric on the host.
 
-    Parameters
-    ----------
-    matrix : SciPy sparse matrix (n, n)
-    device : warp.Device, optional
-        A GPU that may hold them; the host unless given.
-    symmetric : bool
-        Whether the matrix is exactly that.
-
-    Raises
-    ------
-    SolveError
-        If it is singular.
+    `matrix` SciPy sparse matrix (n, n). `device`: a GPU that may hold them; the host unless given. `symmetric`: whether
+    the matrix is exactly that. `SolveError` if it is singular.
     """
 
     def __init__(self, matrix: Any, device: Any = None, symmetric: bool = True) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
-from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import is_linear
 from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, parts_of, width_of
@@ -24,27 +23,16 @@ from warpbrain.worlds.body.states import SolvedState
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Order of the coordinates of a fit: nuisances, causes that act linearly, coefficients of each effect.
+    """Order of the coordinates of a fit: nuisances, causes that act linearly, coefficients of each effect."""
 
-    Attributes
-    ----------
-    tissue, field, law, coefficients : slice
-        Tissue, stiffness field, shape of its law, and the coefficients of all effects.
-    effects : tuple of slice
-        Coefficients of each effect.
-    linear : (q + e,) bool array
-        Which of the first act linearly: all but tissue and field.
-    nonlinear : (q + e + k,) bool array
-        Which act through an equilibrium.
-    """
-
+    #: Tissue, stiffness field, shape of its law, and the coefficients of all effects.
     tissue: slice
     field: slice
     law: slice
     coefficients: slice
-    effects: tuple[slice, ...]
-    linear: Bools
-    nonlinear: Bools
+    effects: tuple[slice, ...]  # coefficients of each effect
+    linear: Bools  # (q + e,), which of the first act linearly: all but tissue and field
+    nonlinear: Bools  # (q + e + k,), which act through an equilibrium
 
     @classmethod
     def of(cls, nuisances: Nuisances, count: int, effects: Sequence[Effect]) -> Layout:
@@ -72,31 +60,9 @@ def columns_about(
     What the shape of a law does is next to nothing where strains are small: about the base, which nothing but declared
     loads deforms. It is not where a mechanism strains tissue by half, and would be taken for a cause.
 
-    Parameters
-    ----------
-    state : SolvedState
-    z : (q,) array
-        Its coordinates.
-    columns : (n, q) array
-        About another state.
-    layout : Layout
-    effects : sequence of Effect
-    base : Base
-    mesh_errors : MeshErrors or None
-    mesh_share : MeshShare or None
-        That is taken off the residuals.
-
-    Returns
-    -------
-    columns : (n, q) array
-        Those that were given if the state cannot be linearised.
-    at : Linearisation or None
-        If the state was linearised.
-
-    Raises
-    ------
-    SolveError
-        If a mechanism is not linear there.
+    `z` (q,): its coordinates. `columns` (n, q): about another state. `mesh_share`: that is taken off the residuals.
+    Returns columns (n, q), those that were given if the state cannot be linearised, and the linear model if it was
+    linearised. `SolveError` if a mechanism is not linear there.
     """
     try:
         at = state.linearised()
@@ -117,7 +83,8 @@ def columns_about(
         elif effect.proposed.over_time is not None:
             columns[:, part] = columns_over_time(at, effect.proposed, c, mesh_errors)
         elif not effect.proposed.is_there_or_not:
-            about = made.of([_proposal_about(effect.proposed, c)], effect.proposed.make(c))[0]
+            there = {"mean": c} if effect.proposed.changes_in_time else {"follows": "smooth", "start": c}
+            about = made.of([replace(effect.proposed, **there)], effect.proposed.make(c))[0]
             if not is_linear(about, at):
                 raise SolveError(f"{effect.proposed.region or 'it'}: its effect is not linear here")
             columns[:, part] = about.columns
@@ -147,10 +114,3 @@ def _relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats]
         if effect.proposed.history is not None:
             stiffness += np.maximum(parts_of(effect.proposed, effect.coefficients(z), sensors), 0.0)
     return np.where(sensors.is_displacement, 1.0 / stiffness, stiffness)[:, None]
-
-
-def _proposal_about(proposal: Proposal, c: Floats) -> Proposal:
-    """The proposal whose columns are those about some coefficients (k,)."""
-    if proposal.changes_in_time:
-        return replace(proposal, mean=c)
-    return replace(proposal, follows="smooth", start=c)

@@ -49,22 +49,9 @@ _MATTERS = 0.3
 class FitSearch:
     """One fit on its way: the best point so far, and the columns of the linear model about it.
 
-    Parameters
-    ----------
-    base : Base
-    mesh_errors : MeshErrors or None
-        Without the share of mechanisms; None: the mesh is taken for exact.
-    effects, columns, screened :
-        See `warpbrain.worlds.body.fitting.Fitter`.
-
-    Attributes
-    ----------
-    z : (q + e + k,) array
-        Coordinates of the best point.
-    state : SolvedState
-    residual : (n,) array
-    columns : (n, q + e + k) array
-    converged : bool
+    `mesh_errors`: without the share of mechanisms; None: the mesh is taken for exact. `effects`, `columns`, `screened`:
+    see `warpbrain.worlds.body.fitting.Fitter`. `z` (q + e + k,): coordinates of the best point. `residual` (n,),
+    `columns` (n, q + e + k).
     """
 
     def __init__(
@@ -115,16 +102,7 @@ class FitSearch:
     def begin_at(self, subset: Refit, about: Linearisation | None = None) -> Floats:
         """Take the columns for those about a fit with the first of the effects, or all; keep its share of the mesh.
 
-        Parameters
-        ----------
-        subset : Refit
-        about : Linearisation, optional
-            Of its state, if it was linearised.
-
-        Returns
-        -------
-        (q + e + k,) array
-            Coordinates of that fit.
+        `about`: of its state, if it was linearised. Returns (q + e + k,): coordinates of that fit.
         """
         first, coefficients = self._U.shape[1], np.concatenate(subset.coefficients)
         z = np.zeros(len(self.z))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.errors import SolveError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.inference.marginal import Marginal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect
@@ -25,15 +25,14 @@ _ROUNDS = 3
 _SAME = 0.1
 #: Change of the mesh's error [standard deviations of the noise, all sensors together] with which a fit is repeated.
 _MATTERS = 0.3
+#: What is raised of a set that cannot be fitted.
+CANNOT_BE_FITTED = (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError)
 
 
 class Fitter:
     """Fits sets of causes of one case.
 
-    Parameters
-    ----------
-    base : Base
-        Where fits begin.
+    `base`: where fits begin.
     """
 
     def __init__(self, base: Base) -> None:
@@ -102,19 +101,9 @@ class Fitter:
     def begin(self, effects: tuple[Effect, ...], refit: Refit, about: Linearisation | None) -> Refit:
         """State, residual and Laplace evidence with other effects at the coordinates of a fit, before any iteration.
 
-        Parameters
-        ----------
-        effects : tuple of Effect
-            As many as those of the fit, with as many coefficients each.
-        refit : Refit
-            Whose columns, noise and share of the mesh's error are kept.
-        about : Linearisation or None
-            Of its state, if it was linearised.
-
-        Raises
-        ------
-        SolveError
-            If there is no equilibrium.
+        `effects`: as many as those of the fit, with as many coefficients each. `refit`: whose columns, noise and share
+        of the mesh's error are kept. `about`: of its state, if it was linearised. `SolveError` if there is no
+        equilibrium.
         """
         search = FitSearch(self.base, self.mesh_errors, effects, refit.columns, refit.marginal)
         search.start([search.begin_at(refit, about)], refit.state)

@@ -14,11 +14,12 @@ from functools import partial
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.errors import InputError, SolveError
-from warpbrain.inference import GaussianModel, Posterior, Search, posterior
+from warpbrain.errors import SolveError
+from warpbrain.estimation.options import Listener
+from warpbrain.inference import GaussianModel, Search, posterior
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads
@@ -27,14 +28,13 @@ from warpbrain.worlds.body.causes import causes_of, visible
 from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.evidence import evidence_of
-from warpbrain.worlds.body.fitting import Fitter
+from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.moving import moved_about_fit
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighing import weigh, with_refined_places
 from warpbrain.worlds.body.weighted_set import WeightedSet
-from warpbrain.worlds.listener import Listener
 
 #: Places of each cause of which pairs are made, and sets that are weighed with gross errors of their own.
 _PLACES, _SETS = 20, 12
@@ -51,13 +51,7 @@ _BETTER = 1.0
 class HypothesisSearch:
     """Weighs sets of causes.
 
-    Parameters
-    ----------
-    base : Base
-    candidates : Candidates
-    spacing : float
-        Between the places of a scan [m].
-    listener : Listener
+    `spacing`: between the places of a scan [m].
     """
 
     def __init__(self, base: Base, candidates: Candidates, spacing: float, listener: Listener) -> None:
@@ -136,10 +130,7 @@ class HypothesisSearch:
     def fit(self, alone: bool = False) -> None:
         """Fit sets, and weigh supersets of those that are fitted, until no fit can be expected to change the verdict.
 
-        Parameters
-        ----------
-        alone : bool
-            Fit the set without any cause alone.
+        `alone`: fit the set without any cause alone.
         """
         self._fit(frozenset())
         while not alone and (single := far_from_linear(list(self._sets.values()), self._bend)) is not None:
@@ -159,11 +150,7 @@ class HypothesisSearch:
     def fitted_with(self, mechanisms: frozenset[str], superset: WeightedSet | None = None) -> WeightedSet | None:
         """The most probable fitted set with exactly these mechanisms, fitted if none was; None if none can be.
 
-        Parameters
-        ----------
-        mechanisms : frozenset of str
-        superset : WeightedSet, optional
-            A fitted set that has these and others, from whose optimum they are fitted if they were not weighed.
+        `superset`: a fitted set that has these and others, from whose optimum they are fitted if they were not weighed.
         """
         sets = self._with_mechanisms(mechanisms)
         fitted = next((candidate for candidate in sets if candidate.refit is not None), None)
@@ -201,7 +188,7 @@ class HypothesisSearch:
         about = None if subset is None else subset.refit
         try:
             refit = self._fitter.fit(candidate.effects, candidate.columns, starts, candidate.marginal, nearby, about)
-        except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError) as error:
+        except CANNOT_BE_FITTED as error:
             self._sets[names] = replace(candidate, failure=str(error))
             return
         gain = refit.log_evidence - candidate.marginal.log_evidence
@@ -209,11 +196,9 @@ class HypothesisSearch:
             # what the fit without any cause gains is of tissue and registration, and is gained by all others; a search
             # that ended too early must not make everything else look better
             gain = max(gain, 0.0)
-        fitted = replace(candidate, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
         inherited = candidate.inherited_gain or 0.0
         gain = inherited + _of_all_places(gain - inherited, candidate.log_share)
-        log_evidence = candidate.hypothesis.log_evidence - inherited + gain
-        fitted = fitted.with_evidence(log_evidence)
+        fitted = candidate.fitted(refit).with_evidence(candidate.hypothesis.log_evidence - inherited + gain)
         # places are moved where the verdict may depend on it
         near = self._missing(fitted) <= belief("fits.change")
         self._sets[names] = moved_about_fit(self.base, self._fitter, fitted, self.spacing) if near else fitted
@@ -260,13 +245,13 @@ class HypothesisSearch:
         screened = reduced.marginal
         try:
             refit = self._fitter.fit(reduced.effects, reduced.columns, [reduced.coordinates], screened, subset=begun)
-        except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
+        except CANNOT_BE_FITTED:
             return None
-        fitted = replace(reduced, residual=refit.linear, columns=refit.columns, marginal=refit.marginal, refit=refit)
         gain = refit.log_evidence - screened.log_evidence
         log_prior = sum(self.causes.named(mechanism).log_prior for mechanism in mechanisms)
-        hypothesis = replace(fitted.hypothesis, log_prior=fitted.hypothesis.log_prior - log_prior)
-        return replace(fitted, hypothesis=hypothesis).with_evidence(reduced.hypothesis.log_evidence + gain)
+        hypothesis = replace(reduced.hypothesis, log_prior=reduced.hypothesis.log_prior - log_prior)
+        fitted = replace(reduced.fitted(refit), hypothesis=hypothesis)
+        return fitted.with_evidence(reduced.hypothesis.log_evidence + gain)
 
     def release(self) -> None:
         """Let go of factors and of the finer mesh, which no result needs: hundreds of megabytes at 5,000 nodes."""
@@ -310,7 +295,6 @@ class HypothesisSearch:
         model = GaussianModel(noise_factor, fitted.columns)
         places = likely_places(model, fitted.residual, self.causes.causes, _PLACES_ABOUT_FIT)
         candidates = candidates_about_fit(refit.state, fitted.effects, self.candidates, places)
-        assert candidates.source is not None
         self._expanded[fitted.names] = candidates.source
         causes = causes_of(self.base, candidates)
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
@@ -362,8 +346,8 @@ def _search(most: int) -> Search:
     return Search(values, log_prior, places=_PLACES, beam=0, most=most, elsewhere=_ELSEWHERE)
 
 
-def _most_probable(screened: Posterior, singles: bool = True) -> list[Hypothesis]:
+def _most_probable(screened: Sequence[Hypothesis], singles: bool = True) -> list[Hypothesis]:
     """The most probable sets, that without any cause, and every single cause if `singles`."""
-    others = screened.hypotheses[_SETS:]
+    others = screened[_SETS:]
     kept = [other for other in others if not other.causes or (singles and len(other.causes) == 1)]
-    return [*screened.hypotheses[:_SETS], *kept]
+    return [*screened[:_SETS], *kept]

@@ -54,38 +54,19 @@ class _Grown(Mechanism):
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """Rows that are compared with, or counted from, the state of one time.
+    """Rows that are compared with, or counted from, the state of one time."""
 
-    Attributes
-    ----------
-    number : int
-        Of the time.
-    time : float
-        [s]
-    at : Linearisation
-        About that state, of these rows.
-    rows : (k,) int array
-    sign : float
-        -1 if they are counted from it.
-    """
-
-    number: int
-    time: float
-    at: Linearisation
-    rows: Ints
-    sign: float
+    number: int  # of the time
+    time: float  # [s]
+    at: Linearisation  # about that state, of these rows
+    rows: Ints  # (k,)
+    sign: float  # -1 if they are counted from it
 
 
 class Linearisation:
     """A state of a system, and the response of the sensors to forces there.
 
-    Parameters
-    ----------
-    system : System
-    u, reactions : (N, 3) array
-        An equilibrium of it [m], [N].
-    sensors : Sensors
-        At that state.
+    `u`, `reactions` (N, 3): an equilibrium of it [m], [N]. `sensors`: at that state.
     """
 
     def __init__(self, system: System, u: Floats, reactions: Floats, sensors: Sensors) -> None:
@@ -107,10 +88,8 @@ class Linearisation:
     def in_time(self, states: Sequence[tuple[float, Linearisation, float]]) -> Linearisation:
         """The same, where rows are of states at several times or are counted from one.
 
-        Parameters
-        ----------
-        states : sequence of (float, Linearisation, float)
-            Of each time [s] that time, the linear model about its state, and the part of the last state that it is.
+        `states`: of each time [s] that time, the linear model about its state, and the part of the last state that it
+        is.
         """
         other = copy.copy(self)
         other._states = tuple(states)
@@ -120,23 +99,20 @@ class Linearisation:
     @cached_property
     def moments(self) -> tuple[Moment, ...]:
         """By the time of the state; none where all rows are of one state, counted from rest."""
-        sensors, found = self.sensors, []
+        sensors, moments = self.sensors, []
         for number, (time, about, share) in enumerate(self._states):
             last = number == len(self._states) - 1
             for sign, of_rows in ((1.0, sensors.after), (-1.0, sensors.before)):
                 rows = np.flatnonzero((of_rows == number) | (last and sign > 0.0 and of_rows < 0))
                 if len(rows):
-                    own = about.with_sensors(replace(sensors.of_rows(rows, time), share=share))
-                    found.append(Moment(number, time, own.in_time(()), rows, sign))
-        return tuple(found)
+                    model = about.with_sensors(replace(sensors.of_rows(rows, time), share=share))
+                    moments.append(Moment(number, time, model.in_time(()), rows, sign))
+        return tuple(moments)
 
     def summed(self, answer: Callable[[Linearisation], Floats]) -> Floats:
         """What something changes of each row (n, ...): at its time, less at that from which it is counted.
 
-        Parameters
-        ----------
-        answer : callable
-            From the linear model about one state to what it changes of the rows of that.
+        `answer`: from the linear model about one state to what it changes of the rows of that.
         """
         if not self.moments:
             return answer(self)
@@ -198,17 +174,8 @@ class Linearisation:
 
         They slide along the surface; where they are under tension they also leave it, if they can.
 
-        Parameters
-        ----------
-        patch : (N,) bool array
-        held : (N,) bool array
-            The surface that the patch is a part of, all of whose components are held.
-        lifts : bool
-
-        Raises
-        ------
-        SolveError
-            If too little holds the body without the patch.
+        `patch` (N,). `held` (N,): the surface that the patch is a part of, all of whose components are held.
+        `SolveError` if too little holds the body without the patch.
         """
         key = held.tobytes()
         with self._surface_lock:
@@ -242,7 +209,7 @@ class Linearisation:
     def answers(self, forces: Floats) -> Floats:
         """Response (n, ...) of the sensors to nodal forces (..., N, 3) [N]."""
         flat = np.asarray(forces).reshape(-1, len(self._free))
-        return self._answers(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
+        return self.answers_of_columns(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
 
     def answers_of_patches(self, weights: Floats) -> Floats:
         """Response (n, s, 3) to forces of 1 N in each direction, spread over nodes with weights (N, s)."""
@@ -258,11 +225,10 @@ class Linearisation:
         return np.asarray(answers.transpose(2, 1, 0)[which])
 
     def answers_of_columns(self, forces: Any) -> Floats:
-        """Response (n, k) to sparse forces, SciPy CSC (3 N, k)."""
-        return self._answers(forces)
+        """Response (n, k) to forces (3 N, k), an array or SciPy CSC.
 
-    def _answers(self, forces: Any) -> Floats:
-        """Response to forces (3 N, k): by equilibria until these are as many as the compliance takes, then by that."""
+        By equilibria until these are as many as the compliance takes, then by that.
+        """
         from scipy.sparse import issparse
 
         count = forces.shape[1]
@@ -304,7 +270,7 @@ class Linearisation:
             element_forces = _gathered(
                 self.system.tetrahedra, element_forces, np.arange(len(element_forces)), self.system
             )
-        return -self._answers(element_forces @ weights)
+        return -self.answers_of_columns(element_forces @ weights)
 
     @cached_property
     def element_forces(self) -> Any:

@@ -32,27 +32,13 @@ _STEP = 0.2
 
 @dataclass(frozen=True, eq=False)
 class MeshErrors:
-    """The error of the mesh at a state, and how it changes.
+    """The error of the mesh at a state, and how it changes."""
 
-    Attributes
-    ----------
-    error : Difference
-        At that state.
-    volume : float
-        `volume_of` the tissue there.
-    by_volume : Difference
-        Its derivative by that.
-    by_tissue : tuple of Difference
-        Its derivative by each standard normal coordinate of the tissues' prior.
-    finer : FinerStates
-        Which compute it at other states.
-    """
-
-    error: Difference
-    volume: float
-    by_volume: Difference
-    by_tissue: tuple[Difference, ...]
-    finer: FinerStates
+    error: Difference  # at that state
+    volume: float  # `volume_of` the tissue there
+    by_volume: Difference  # its derivative by that
+    by_tissue: tuple[Difference, ...]  # its derivative by each standard normal coordinate of the tissues' prior
+    finer: FinerStates  # which compute it at other states
 
     def with_tissue(self, theta: Floats, volume: float, prior: Gaussian) -> Difference:
         """The error with other tissue (p,) of another `volume_of`, without the share of mechanisms."""
@@ -83,12 +69,7 @@ def expected_answer(sensors: Sensors, known: Difference) -> Floats:
 
 
 class FinerStates:
-    """The error of the mesh of states under hypotheses.
-
-    Parameters
-    ----------
-    states : States
-    """
+    """The error of the mesh of states under hypotheses."""
 
     def __init__(self, states: States) -> None:
         self.states = states
@@ -113,18 +94,8 @@ class FinerStates:
     def error(self, hypothesis: Hypothesis, nearby: SolvedState, tolerance: float = ROUGH) -> Difference:
         """The error of a hypothesis with a uniform stiffness within tissues, on which it hardly depends.
 
-        Parameters
-        ----------
-        hypothesis : Hypothesis
-        nearby : SolvedState
-            A state near to it.
-        tolerance : float
-            Out-of-balance force of the finer state, relative.
-
-        Raises
-        ------
-        SolveError
-            If there is no equilibrium on the finer mesh.
+        `nearby`: a state near to it. `tolerance`: out-of-balance force of the finer state, relative. `SolveError` if
+        there is no equilibrium on the finer mesh.
         """
         uniform = replace(hypothesis, field=np.zeros_like(hypothesis.field))
         coarse = self.states.solve(uniform, nearby.u)

@@ -22,18 +22,10 @@ from warpbrain.worlds.body.states import SolvedState
 
 @dataclass(frozen=True, eq=False)
 class MeshShare:
-    """Part of the error of the mesh at coefficients z of all mechanisms: `answer (constant + gradient z)`.
+    """Part of the error of the mesh at coefficients z of all mechanisms: `answer (constant + gradient z)`."""
 
-    Attributes
-    ----------
-    answer : (n,) array
-        At the coefficients for which it was computed.
-    gradient : (k,) array
-    constant : float
-    """
-
-    answer: Floats
-    gradient: Floats
+    answer: Floats  # (n,), at the coefficients for which it was computed
+    gradient: Floats  # (k,)
     constant: float
 
     def at(self, z: Floats) -> Floats:
@@ -71,18 +63,8 @@ def mesh_share_of(
 
     A switch has no size: alone it has a constant share, beside others none.
 
-    Parameters
-    ----------
-    effects : sequence of Effect
-    coefficients : sequence of (k,) arrays
-        Of each effect, in standard deviations about its mean.
-    state : SolvedState
-        With these mechanisms.
-    known : MeshErrors
-        Of tissue alone.
-    finer : FinerStates
-    prior : Gaussian
-        Of the tissues' parameters.
+    `coefficients` (k,): of each effect, in standard deviations about its mean. `state`: with these mechanisms. `known`:
+    of tissue alone. `prior`: of the tissues' parameters.
     """
     sized = [not effect.proposed.is_there_or_not for effect in effects]
     parts = list(zip(sized, effects, coefficients, strict=True))

@@ -13,11 +13,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpbrain.errors import InputError, SolveError
+from warpbrain.errors import SolveError
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import scaled
 from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.fitting import Fitter
+from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.placing import places_about
 from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.weighted_set import WeightedSet
@@ -30,13 +30,7 @@ _MOVES, _STEP, _BETTER = 3, 0.25, 1.0
 def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:
     """A fitted set, fitted again where its mechanisms are better placed.
 
-    Parameters
-    ----------
-    base : Base
-    fitter : Fitter
-    fitted : WeightedSet
-    spacing : float
-        Between the places of a scan [m].
+    `spacing`: between the places of a scan [m].
     """
     for _ in range(_MOVES):
         assert fitted.refit is not None
@@ -63,13 +57,13 @@ def _moved_once(base: Base, fitter: Fitter, refit: Refit, step: float) -> Refit 
     for effects in tried:
         try:
             begun = max(begun, fitter.begin(effects, refit, about), key=lambda fit: fit.log_evidence)
-        except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
+        except CANNOT_BE_FITTED:
             continue
     if begun.log_evidence < refit.log_evidence + _BETTER:
         return None
     try:
         moved = fitter.fit(begun.effects, begun.columns, [], begun.marginal, begun.state, begun)
-    except (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError):
+    except CANNOT_BE_FITTED:
         return None
     return moved if moved.log_evidence > refit.log_evidence else None
 
@@ -90,12 +84,4 @@ def _with_fit(fitted: WeightedSet, refit: Refit, better: float) -> WeightedSet:
 
     Both places are as probable as each other before anything is recorded: their evidence is added up.
     """
-    moved = replace(
-        fitted,
-        effects=refit.effects,
-        residual=refit.linear,
-        columns=refit.columns,
-        marginal=refit.marginal,
-        refit=refit,
-    )
-    return moved.with_evidence(fitted.hypothesis.log_evidence + float(np.logaddexp(0.0, better)))
+    return fitted.fitted(refit).with_evidence(fitted.hypothesis.log_evidence + float(np.logaddexp(0.0, better)))

@@ -25,7 +25,7 @@ SENTENCES = {
 def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]:
     """Effects by name."""
     sensors = at.sensors
-    by_name = {family.name: family.columns for family in nuisances.families}
+    by_name = nuisances.families
     columns_by_name = {
         "registration": sensors.rigid
         * np.repeat([belief("registration.wrong_shift") * sensors.radius, belief("registration.wrong_turn")], 3),

@@ -42,59 +42,30 @@ _STEP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
-    """Nuisances of one kind.
-
-    Attributes
-    ----------
-    name : str
-    columns : (n, k) array
-        Change of what is recorded by one standard deviation of each.
-    """
-
-    name: str
-    columns: Floats
-
-
-@dataclass(frozen=True, eq=False)
 class Nuisances:
-    """All of them.
+    """All of them."""
 
-    Attributes
-    ----------
-    families : tuple of Family
-        The first is the tissue's parameters, the second the stiffness field.
-    anchors : (a, 3) array
-        Points [m] of the kernel functions of the unknown part of the mesh's error.
-    fraction : float
-        That part, relative to the displacement.
-    displacement : (n,) array
-        Of the state at each row [m]; zero of forces.
-    relative : (n, k) array
-        Columns of that part if it were as large as a displacement of 1 m.
-    """
-
-    families: tuple[Family, ...]
-    anchors: Floats
-    fraction: float
-    displacement: Floats
-    relative: Floats
+    #: (n, k), by the name of each family of nuisances: change of what is recorded by one standard deviation of each.
+    families: Mapping[str, Floats]
+    anchors: Floats  # (a, 3), points [m] of the kernel functions of the unknown part of the mesh's error
+    fraction: float  # that part, relative to the displacement
+    displacement: Floats  # (n,), of the state at each row [m]; zero of forces
+    relative: Floats  # (n, k), columns of that part if it were as large as a displacement of 1 m
 
     @property
     def columns(self) -> Floats:
         """Of all, side by side (n, q)."""
-        return np.concatenate([family.columns for family in self.families], axis=1)
+        return np.concatenate(list(self.families.values()), axis=1)
 
     def weakened(self) -> Nuisances:
         """The same with columns that are next to nothing, so that they explain nothing."""
-        families = tuple(Family(f.name, 1e-9 * f.columns) for f in self.families)
+        families = {name: 1e-9 * columns for name, columns in self.families.items()}
         return replace(self, families=families, relative=1e-9 * self.relative)
 
     def with_fraction(self, fraction: float) -> Nuisances:
         """The same with another size of the unknown part of the mesh's error."""
-        *others, last = self.families
-        scaled = Family(last.name, last.columns * (fraction / self.fraction))
-        return replace(self, families=(*others, scaled), fraction=fraction)
+        unknown = self.families[UNKNOWN_MESH] * (fraction / self.fraction)
+        return replace(self, families={**self.families, UNKNOWN_MESH: unknown}, fraction=fraction)
 
     def with_family(self, name: str, columns: Floats, of_family: Floats) -> Floats:
         """Columns (n, q + k) that begin with these nuisances, with others (n, j) of one family."""
@@ -112,9 +83,9 @@ class Nuisances:
     def part(self, name: str) -> slice:
         """Where the columns of a family are."""
         at = 0
-        for family in self.families:
-            width = family.columns.shape[1]
-            if family.name == name:
+        for family, columns in self.families.items():
+            width = columns.shape[1]
+            if family == name:
                 return slice(at, at + width)
             at += width
         raise KeyError(name)
@@ -155,26 +126,26 @@ def nuisances_at(
     if anchors is None:
         places = sensors.positions[sensors.is_displacement]
         anchors = places[spread_points(places, belief("mesh.alike") * sensors.radius, 60)]
-    families = [
-        Family("tissue", tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors)),
-        Family("stiffness field", field_columns(at, states)),
-        Family(LAW, law_columns(effects, states)),
-        Family("known loads", _known_loads(at)),
-        Family("registration", sensors.rigid * registration_of(states.case).deviations),
-    ]
+    families = {
+        "tissue": tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors),
+        "stiffness field": field_columns(at, states),
+        LAW: law_columns(effects, states),
+        "known loads": _known_loads(at),
+        "registration": sensors.rigid * registration_of(states.case).deviations,
+    }
     if mesh_errors is not None:
         error = mesh_errors.error
         answer = sensors.share * sensors.answer(error.u, error.reactions)
-        families.append(Family("mesh", Discretisation().deviation * answer[:, None]))
-        families.append(Family(MESH_SHARE, np.zeros((len(sensors), 1))))
+        families["mesh"] = Discretisation().deviation * answer[:, None]
+        families[MESH_SHARE] = np.zeros((len(sensors), 1))
     displacement, relative = _displacement(at), _alike(sensors, anchors)
-    families.append(Family(UNKNOWN_MESH, fraction * displacement[:, None] * relative))
-    return Nuisances(tuple(families), anchors, fraction, displacement, relative)
+    families[UNKNOWN_MESH] = fraction * displacement[:, None] * relative
+    return Nuisances(families, anchors, fraction, displacement, relative)
 
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
     """What one standard deviation of each parameter of the tissues changes of what is recorded: (n, p)."""
-    return at.summed(lambda one: _tissue_columns(one, states, theta, prior))
+    return at.summed(lambda state: _tissue_columns(state, states, theta, prior))
 
 
 def _tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
@@ -198,7 +169,7 @@ def _materials(system: System, states: States, theta: Floats) -> Mapping[int, Ma
 
 def field_columns(at: Linearisation, states: States) -> Floats:
     """What one standard deviation of each mode of the stiffness field changes of what is recorded: (n, k)."""
-    return at.summed(lambda one: one.answers_of_elements(one.element_forces, states.modes))
+    return at.summed(lambda state: state.answers_of_elements(state.element_forces, states.modes))
 
 
 def law_columns(effects: Effects, states: States) -> Floats:

@@ -15,12 +15,7 @@ from warpbrain.worlds.body.effects import Effect
 def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, ...]:
     """Parameters that differ among proposals, such as a level or a radius: mean and standard deviation over them.
 
-    Parameters
-    ----------
-    effects : sequence of Effect
-        Of one kind.
-    weights : (v,) array
-        Their probabilities, with the sum 1.
+    `effects`: of one kind. `weights` (v,): their probabilities, with the sum 1.
     """
     numbers = [numbers_of(effect, np.zeros(effect.columns.shape[1])) for effect in effects]
     result = []
@@ -94,13 +89,9 @@ def mechanism_numbers(mechanism: Mechanism) -> dict[str, tuple[float, str]]:
 def smallest_of(effect: Effect, whitened_length: float, seen: float, named: float) -> Smallest:
     """The sizes at which an effect has two detectabilities.
 
-    Parameters
-    ----------
-    effect : Effect
-    whitened_length : float
-        Its detectability per standard deviation of its first coefficient (of a switch, or a course: when it is there).
-    seen, named : float
-        Detectabilities at which it raises an alarm, and at which it is named; infinite if it never is.
+    `whitened_length`: its detectability per standard deviation of its first coefficient (of a switch, or a course: when
+    it is there). `seen`, `named`: detectabilities at which it raises an alarm, and at which it is named; infinite if it
+    never is.
     """
     size, unit, name = _size_at(effect, seen / max(whitened_length, 1e-12))
     return Smallest(size, unit, name, _size_at(effect, named / max(whitened_length, 1e-12))[0])

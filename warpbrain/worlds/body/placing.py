@@ -30,20 +30,11 @@ _RADII = (0.8, 1.0, 1.25)
 
 @dataclass(frozen=True, eq=False)
 class BestInCell:
-    """The best effect of a cell.
-
-    Attributes
-    ----------
-    effect : Effect
-    gain : float
-        By how much [nats] the mean of the cell is more probable than its middle.
-    log_share : float
-        Log of the part of the best place in that mean.
-    """
+    """The best effect of a cell."""
 
     effect: Effect
-    gain: float
-    log_share: float
+    gain: float  # by how much [nats] the mean of the cell is more probable than its middle
+    log_share: float  # log of the part of the best place in that mean
 
 
 def best_in_cell(
@@ -53,21 +44,9 @@ def best_in_cell(
 
     Each place has gross errors of its own: points that a local effect moves far are sound in the right place alone.
 
-    Parameters
-    ----------
-    base : Base
-    effects : Effects
-        Which makes columns at the state that the linear model is about.
-    effect : Effect
-        Of a proposal that can be elsewhere.
-    size : float
-        Of its coefficients, relative to what is usual.
-    spacing : float
-        Between the places of the scan [m].
-    without : GaussianModel
-        Of rows with all else that acts and all points sound.
-    residual : (n,) array
-        Less what is expected of all else.
+    `effects`: which makes columns at the state that the linear model is about. `effect`: of a proposal that can be
+    elsewhere. `size`: of its coefficients, relative to what is usual. `spacing`: between the places of the scan [m].
+    `without`: of rows with all else that acts and all points sound. `residual` (n,): less what is expected of all else.
     """
 
     everywhere = PointRows(without, residual, base.points)

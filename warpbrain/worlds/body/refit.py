@@ -14,42 +14,20 @@ from warpbrain.worlds.body.states import SolvedState
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """A set of causes at its best point.
+    """A set of causes at its best point."""
 
-    Attributes
-    ----------
-    effects : tuple of Effect
-        Of its mechanisms beside those of the case.
-    state : SolvedState
-    nuisances : (q,) array
-        Coordinates of the nuisances, and of causes that act linearly.
-    coefficients : tuple of (k,) arrays
-        Of each effect, in standard deviations about its mean.
-    covariances : tuple of (k, k) arrays
-        Of these.
-    residual : (n,) array
-        What is left at the best point, linear nuisances and the expected error of the mesh taken off.
-    linear : (n,) array
-        Residual of the linear model about that point, with all coordinates at zero.
-    columns : (n, q + k) array
-        Of that model.
-    marginal : Marginal
-        Its Laplace evidence, the scale of the noise and gross errors.
-    converged : bool
-    mesh_share : MeshShare or None
-        Part of the error of the mesh that belongs to its mechanisms, if that is known.
-    """
-
-    effects: tuple[Effect, ...]
+    effects: tuple[Effect, ...]  # of its mechanisms beside those of the case
     state: SolvedState
-    nuisances: Floats
-    coefficients: tuple[Floats, ...]
-    covariances: tuple[Floats, ...]
+    nuisances: Floats  # (q,), coordinates of the nuisances, and of causes that act linearly
+    coefficients: tuple[Floats, ...]  # (k,), of each effect, in standard deviations about its mean
+    covariances: tuple[Floats, ...]  # (k, k), of these
+    #: (n,): what is left at the best point, linear nuisances and the expected error of the mesh taken off.
     residual: Floats
-    linear: Floats
-    columns: Floats
-    marginal: Marginal
+    linear: Floats  # (n,), residual of the linear model about that point, with all coordinates at zero
+    columns: Floats  # (n, q + k), of that model
+    marginal: Marginal  # its Laplace evidence, the scale of the noise and gross errors
     converged: bool
+    #: Part of the error of the mesh that belongs to its mechanisms, if that is known.
     mesh_share: MeshShare | None = None
 
     @property

@@ -29,20 +29,9 @@ _FARTHEST = 0.2
 class HeldSurface:
     """A set of held nodes at a state.
 
-    Parameters
-    ----------
-    stiffness : SciPy CSR (3 N, 3 N)
-        `K` [N/m].
-    free : (3 N,) bool array
-        Components that nothing holds.
-    factors : Factors
-        Of the free part of `K`.
-    members : (N,) bool array
-        Nodes, all of whose components are held.
-    normals, reactions : (N, 3) array
-        Outward, and what the nodes are held with [N].
-    size : float
-        Of the body [m].
+    `stiffness` SciPy CSR (3 N, 3 N): `K` [N/m]. `free` (3 N,): components that nothing holds. `factors`: of the free
+    part of `K`. `members` (N,): nodes, all of whose components are held. `normals`, `reactions` (N, 3): outward, and
+    what the nodes are held with [N]. `size`: of the body [m].
     """
 
     def __init__(
@@ -76,13 +65,8 @@ class HeldSurface:
     ) -> Floats:
         """What sensors (n,) record where each component of `moved` is 1 m: (n, 3 m).
 
-        Parameters
-        ----------
-        stiffness, free :
-            Those that it was made of.
-        compliance : (n, 3 N) array
-            Of the sensors, see `Linearisation.compliance`.
-        by_displacement, by_reactions : SciPy CSR (n, 3 N)
+        `stiffness`, `free`: those that it was made of. `compliance` (n, 3 N): of the sensors, see
+        `Linearisation.compliance`. `by_displacement`, `by_reactions` SciPy CSR (n, 3 N).
         """
         components = (3 * self.members[:, None] + np.arange(3)).ravel()
         held = by_reactions[:, ~free] @ stiffness[~free][:, components]
@@ -96,15 +80,7 @@ class HeldSurface:
     def moved(self, patch: Bools, lifts: bool) -> Floats:
         """Displacement (3 m,) [m] of its nodes, along two tangents and the normal of each, where a patch lets go.
 
-        Parameters
-        ----------
-        patch : (N,) bool array
-        lifts : bool
-
-        Raises
-        ------
-        SolveError
-            If too little holds the body without the patch.
+        `patch` (N,). `SolveError` if too little holds the body without the patch.
         """
         members = patch[self.members]
         key = members.tobytes(), lifts
@@ -140,14 +116,8 @@ class HeldSurface:
     def _lifted(S: Floats, R: Floats, off: Bools) -> Floats:
         """Displacement (k,) along the normals of nodes that leave the wall where they are under tension.
 
-        Parameters
-        ----------
-        S : (k, k) array
-            Stiffness of their motion along the normals, that along the wall eliminated.
-        R : (k,) array
-            Reactions along the normals.
-        off : (k,) bool array
-            Those that are off at first.
+        `S` (k, k): stiffness of their motion along the normals, that along the wall eliminated. `R` (k,): reactions
+        along the normals. `off` (k,): those that are off at first.
         """
         from scipy.linalg import cho_factor, cho_solve
 

@@ -14,16 +14,7 @@ from warpbrain.worlds.body.states import States
 class RigidMotion:
     """The motion that recordings are taken to have been moved by, as coordinates of a fit.
 
-    Parameters
-    ----------
-    states : States
-        By whose motion sensors are realigned.
-    nuisances : Nuisances
-
-    Attributes
-    ----------
-    part : slice
-        Of the coordinates.
+    `states`: by whose motion sensors are realigned. `part`: of the coordinates.
     """
 
     def __init__(self, states: States, nuisances: Nuisances) -> None:
@@ -60,9 +51,9 @@ class RigidMotion:
         return np.asarray(turned + self._centre + self._realigned[:3])
 
     @staticmethod
-    def _along(sensors: Sensors, ways: Floats) -> Floats:
+    def _along(sensors: Sensors, vectors: Floats) -> Floats:
         """Components (n, k) of ways (n, 3, k) in the directions of the sensors; zero of forces."""
         rows = sensors.is_displacement
-        found = np.zeros((len(sensors), ways.shape[2]))
-        found[rows] = np.einsum("nj,njk->nk", sensors.directions[rows], ways[rows])
-        return found
+        components = np.zeros((len(sensors), vectors.shape[2]))
+        components[rows] = np.einsum("nj,njk->nk", sensors.directions[rows], vectors[rows])
+        return components

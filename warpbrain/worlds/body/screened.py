@@ -7,19 +7,26 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from warpbrain.cases.case import Case
+from warpbrain.cases.enough import too_few_to_diagnose
+from warpbrain.errors import InputError
+from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.options import Listener
 from warpbrain.estimation.parameters import Gaussian
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.body.base import BaseFinder
 from warpbrain.worlds.body.dictionary import candidates_at, dictionary_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.not_physics import not_physics_at
-from warpbrain.worlds.body.observable import require_observable
 from warpbrain.worlds.body.states import States, instants_of
-from warpbrain.worlds.listener import Listener
 
 
-def _untimed(_stage: str) -> AbstractContextManager[Any]:
-    return nullcontext()
+def require_observable(case: Case) -> None:
+    """Raise `InputError` if there are too few recordings."""
+    if case.specimen is not None:
+        raise InputError(f"{case.path}: [specimen]: a specimen is diagnosed test by test")
+    Observations.to_fit(case)
+    if why := too_few_to_diagnose(case):
+        raise InputError(f"{case.path}: {why}")
 
 
 def screened(
@@ -31,7 +38,7 @@ def screened(
     mesh_error: bool = True,
     without_nuisances: bool = False,
     mechanisms: Sequence[str] | None = None,
-    timed: Callable[[str], AbstractContextManager[Any]] = _untimed,
+    timed: Callable[[str], AbstractContextManager[Any]] = nullcontext,
 ) -> HypothesisSearch:
     """Sets of causes of a case.
 

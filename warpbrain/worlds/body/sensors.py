@@ -1,16 +1,19 @@
-"""Points of a body and rows of sensors: spread, tracked, and the columns of smooth fields over them."""
+"""Points of a body and rows of sensors: spread, tracked, the columns of smooth fields over them, and their noise."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from warpbrain.arrays import Floats, Ints
+from warpbrain.estimation.likelihood import Likelihood
 from warpbrain.estimation.observations import Sensors as Sensors
 from warpbrain.estimation.registration import rigid_columns
 from warpbrain.mesh import TetMesh
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.location import locate
 
 
@@ -82,3 +85,25 @@ def _spread(points_as_bytes: bytes, spacing: float, most: int) -> Ints:
     numbers = np.array(chosen, dtype=np.int64)
     numbers.flags.writeable = False
     return numbers
+
+
+def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Floats) -> Floats:
+    """Standard deviation (n,) of each row: where none is declared, as by an estimate, given nuisances and a field.
+
+    `residual` (n,). `nuisances` (n, k): columns of one standard deviation. `field` (n, k): of a smooth force of 1 m.
+    """
+    undeclared = np.isnan(sensors.sigma)
+    if not undeclared.any():
+        return sensors.sigma
+    lengths = sensors.is_displacement
+    size = root_mean_square(residual[lengths]) if lengths.any() else 0.0
+    columns = np.column_stack([nuisances, max(size, 1e-9) * field])
+    # a smooth fit as rough as the residuals are: what it leaves is where the search begins
+    typical = max(float(np.median(np.abs(residual))), 1e-12)
+    W = columns / typical
+    left = residual - columns @ np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, W.T @ (residual / typical))
+    # what the mesh does not resolve is found with each set of causes
+    resolved = replace(sensors, over_element=np.zeros_like(sensors.over_element))
+    noise = Likelihood().noise(resolved, left, residual, columns)
+    # a factor on noise of which none is declared is its size
+    return noise.scale * noise.sigma if undeclared.all() else noise.sigma

@@ -44,24 +44,12 @@ _SHORT = (1e-3, 0.1, 0.4)
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """Tissue, stiffness field and mechanisms that a state is computed with.
+    """Tissue, stiffness field and mechanisms that a state is computed with."""
 
-    Attributes
-    ----------
-    theta : (p,) array
-        Of the tissues; see `Parameters`.
-    field : (k,) array
-        Of the modes of the stiffness field, in standard deviations.
-    mechanisms : tuple of Mechanism
-        Beside those of the case.
-    patches : tuple of Patch
-        Nodes that the case's boundaries no longer hold.
-    """
-
-    theta: Floats
-    field: Floats
-    mechanisms: tuple[Mechanism, ...] = ()
-    patches: tuple[Patch, ...] = ()
+    theta: Floats  # (p,), of the tissues; see `Parameters`
+    field: Floats  # (k,), of the modes of the stiffness field, in standard deviations
+    mechanisms: tuple[Mechanism, ...] = ()  # beside those of the case
+    patches: tuple[Patch, ...] = ()  # nodes that the case's boundaries no longer hold
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,28 +64,18 @@ class Instant:
 
 @dataclass(frozen=True, eq=False)
 class SolvedState:
-    """An equilibrium under a hypothesis.
-
-    Attributes
-    ----------
-    hypothesis : Hypothesis
-    system : System
-    u, reactions : (N, 3) array
-    sensors : Sensors
-        At that state, corrected by the expected error of the mesh: with walls where elements that are too stiff leave
-        them a point in a narrow ventricle would be taken for one of the opposite wall.
-    course : tuple of (N, 3) arrays
-        Displacement [m] at each of `steps_to` where it was followed over time; empty where it was not.
-    instants : tuple of Instant
-        The state at each of the times, of which `system`, `u` and `reactions` are the last.
-    """
+    """An equilibrium under a hypothesis."""
 
     hypothesis: Hypothesis
     system: System
-    u: Floats
-    reactions: Floats
+    u: Floats  # (N, 3)
+    reactions: Floats  # (N, 3)
+    #: At that state, corrected by the expected error of the mesh: with walls where elements that are too stiff leave
+    #: them a point in a narrow ventricle would be taken for one of the opposite wall.
     sensors: Sensors
+    #: (N, 3): displacement [m] at each of `steps_to` where it was followed over time; empty where it was not.
     course: tuple[Floats, ...] = ()
+    #: The state at each of the times, of which `system`, `u` and `reactions` are the last.
     instants: tuple[Instant, ...] = ()
 
     def linearised(self, sensors: Sensors | None = None) -> Linearisation:
@@ -105,10 +83,7 @@ class SolvedState:
 
         A state that was followed over time is linear about its end.
 
-        Raises
-        ------
-        SolveError
-            If it is unstable.
+        `SolveError` if it is unstable.
         """
         sensors = self.sensors if sensors is None else sensors
         last = Linearisation(self.system, self.u, self.reactions, sensors)
@@ -127,20 +102,9 @@ class SolvedState:
 class States:
     """Solves a case under hypotheses.
 
-    Parameters
-    ----------
-    case : Case
-    device : str, optional
-    role : {"fit", "check"}
-        Of the recordings that states are compared with.
-
-    Attributes
-    ----------
-    times : tuple of float
-        Those of rows and of what they are counted from [s], increasing; infinity alone if there is one state.
-    motion : (6,) array
-        Rigid motion that recordings are taken to have been moved by.
-    solves : int
+    `role` {"fit", "check"}: of the recordings that states are compared with. `times`: those of rows and of what they
+    are counted from [s], increasing; infinity alone if there is one state. `motion` (6,): rigid motion that recordings
+    are taken to have been moved by.
     """
 
     def __init__(self, case: Case, device: str | None = None, role: str = "fit") -> None:
@@ -256,27 +220,29 @@ class States:
         """The equilibrium at each time, under what acts then."""
         case = self.case_of(hypothesis)
         moments = Moments.of(case, self.times)
-        found: dict[int, Instant] = {}
+        instants: dict[int, Instant] = {}
         # the last first: it is what others begin at
         for time, number in sorted(zip(moments.times, moments.numbers, strict=True), reverse=True):
-            if number in found:
+            if number in instants:
                 continue
-            own = system if moments.cases[number] is case else self._system(hypothesis, moments.cases[number])
-            near = start if not found else self._near.get(time, start)
-            external = own.model.external_forces()
-            solver = EquilibriumSolver(own, options, factors=self._factors_of(own))
-            if nearby is not None and near is not None and not found:
-                near = nearby.toward_equilibrium(own, external, near, TOLERANCE)
+            system_then = system if moments.cases[number] is case else self._system(hypothesis, moments.cases[number])
+            near = start if not instants else self._near.get(time, start)
+            external = system_then.model.external_forces()
+            solver = EquilibriumSolver(system_then, options, factors=self._factors_of(system_then))
+            if nearby is not None and near is not None and not instants:
+                near = nearby.toward_equilibrium(system_then, external, near, TOLERANCE)
             try:
                 state = solver.solve(external, near)
             except SolveError:
-                if not found or near is None:
+                if not instants or near is None:
                     raise
                 state = solver.solve(external)
-            found[number] = self._instant(time, own, state, external)
+            instants[number] = self._instant(time, system_then, state, external)
             if len(moments.cases) > 1:
                 self._near[time] = state.u
-        return [replace(found[number], time=time) for time, number in zip(moments.times, moments.numbers, strict=True)]
+        return [
+            replace(instants[number], time=time) for time, number in zip(moments.times, moments.numbers, strict=True)
+        ]
 
     def _flowing(self, hypothesis: Hypothesis, system: System) -> Mechanism | None:
         """The mechanism of a hypothesis whose fluid flows while recordings are made.

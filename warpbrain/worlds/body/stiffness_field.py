@@ -42,14 +42,9 @@ def _covariance(a: Floats, b: Floats, reach: float) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StiffnessField(Mechanism):
-    """Moduli of each element times `exp(log_factor)`; no user assumes it, so it is in no registry.
+    """Moduli of each element times `exp(log_factor)`; no user assumes it, so it is in no registry."""
 
-    Parameters
-    ----------
-    log_factor : (m,) array
-    """
-
-    log_factor: Floats = field(repr=False)
+    log_factor: Floats = field(repr=False)  # (m,)
     kind: ClassVar[str] = "stiffness field"
     sentence: ClassVar[str] = "Stiffness varies from place to place."
 

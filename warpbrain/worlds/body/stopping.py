@@ -14,8 +14,8 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
+from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.decide import Decision, decide
-from warpbrain.inference.hypothesis import Hypothesis
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -28,13 +28,8 @@ def next_to_fit(
 ) -> WeightedSet | None:
     """The set that is fitted next, or whose supersets are weighed next if it is fitted; None to stop.
 
-    Parameters
-    ----------
-    sets : sequence of WeightedSet
-        The most probable first.
-    probabilities : (s,) array
-    expanded : collection of frozenset of str
-        Fitted sets whose supersets were weighed about their fit.
+    `sets`: the most probable first. `probabilities` (s,). `expanded`: fitted sets whose supersets were weighed about
+    their fit.
     """
     decision, _ = _decide(sets)
     named = [candidate for candidate in sets if frozenset(candidate.mechanisms) == frozenset(decision.causes)]
@@ -67,12 +62,8 @@ def bend_of(base: Base) -> float:
 def far_from_linear(sets: Sequence[WeightedSet], bend: float) -> WeightedSet | None:
     """A mechanism that was not fitted and may be the best for all that the linear model knows; None if there is none.
 
-    Parameters
-    ----------
-    sets : sequence of WeightedSet
-        With that of no cause.
-    bend : float
-        See `bend_of`: of what is at stake, the evidence of the best set over that of nothing.
+    `sets`: with that of no cause. `bend`: see `bend_of`: of what is at stake, the evidence of the best set over that of
+    nothing.
     """
     nothing = next(candidate.hypothesis.log_evidence for candidate in sets if not candidate.names)
     best = max(candidate.hypothesis.log_evidence for candidate in sets)

@@ -6,6 +6,10 @@ on it is there all at once, grows evenly, or approaches its full size exponentia
     f(t) = 1,    (t - t0) / (T - t0),    1 - exp(-3 (t - t0) / (T - t0)),      f = 0 before,
 
 `t0` the beginning of the interval and `T` the last time. A cause that is seen at the last time alone has no course.
+
+A cause may also change from one recorded time to the next. Then its size is a Gaussian process over the recorded times,
+with a squared exponential covariance of a variance of one. Its time is the rank of a recorded one: recordings are made
+as densely as things change. So it needs few modes, and a course is found as the coefficients of these are.
 """
 
 from __future__ import annotations
@@ -16,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.inference.beliefs import belief
+from warpbrain.physics.proposal import Proposal, Varying
 from warpbrain.worlds.body.sensors import Sensors
 
 AT_ONCE, EVENLY, SLOWER = "all at once", "growing evenly", "growing ever more slowly"
@@ -29,22 +35,13 @@ _SHAPES: dict[str, Callable[[Floats], Floats]] = {
 
 @dataclass(frozen=True)
 class TimeCourse:
-    """An interval of onset and a shape.
+    """An interval of onset and a shape."""
 
-    Attributes
-    ----------
-    interval : int
-        Number of the interval in which it begins.
-    begin, end : float
-        The first time of that interval, and the last recorded one [s].
-    shape : str
-        In words.
-    """
-
-    interval: int
+    interval: int  # number of the interval in which it begins
+    #: The first time of that interval, and the last recorded one [s].
     begin: float
     end: float
-    shape: str
+    shape: str  # in words
 
     def factor(self, times: Floats) -> Floats:
         """Part (n,) of its full size at times (n,) [s]."""
@@ -83,3 +80,25 @@ def main_courses(times: Sequence[float]) -> list[TimeCourse]:
     """A representative subset of the courses: all at once in each interval, or evenly from the beginning on."""
     courses = time_courses(times)
     return [c for c in courses if c.shape == AT_ONCE or (c.interval == 0 and c.shape == EVENLY)]
+
+
+def modes_of(count: int) -> Floats:
+    """Modes (m, r) of the process over m times, the largest first; their squares have the sum of the variances."""
+    ranks = np.linspace(0.0, 1.0, count)
+    covariance = np.exp(-0.5 * ((ranks[:, None] - ranks) / belief("courses.reach")) ** 2)
+    variances, vectors = np.linalg.eigh(covariance)
+    variances, vectors = np.maximum(variances[::-1], 0.0), vectors[:, ::-1]
+    left = 1.0 - np.cumsum(variances) / variances.sum()
+    kept = int(np.searchsorted(-left, -belief("courses.cut"))) + 1
+    # the sign of an eigenvector is arbitrary
+    signs = np.where(vectors[-1] < 0.0, -1.0, 1.0)
+    return np.asarray((signs * vectors * np.sqrt(variances))[:, :kept])
+
+
+def over_time(proposals: Sequence[Proposal], times: Sequence[float]) -> list[Proposal]:
+    """Proposals, and with several times [s] those that may change from one to the next with a course, too."""
+    constant = [proposal for proposal in proposals if not proposal.only_over_time]
+    if len(times) < 2:
+        return constant
+    ends, modes = finite_times(np.array(times)), modes_of(len(times))
+    return constant + [Varying(proposal, ends, modes).proposal() for proposal in proposals if proposal.varying]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpbrain.inference import GaussianModel
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.noise import scales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses
@@ -31,16 +31,8 @@ def weigh(
     log evidence: the mean over its likeliest places, since points that a local cause moves far are gross errors where
     it is thought to be elsewhere.
 
-    Parameters
-    ----------
-    base : Base
-    hypothesis : Hypothesis
-    causes : BodyCauses
-        Those that were screened.
-    screened : GaussianModel
-        Of the rows without them.
-    about : WeightedSet, optional
-        A fitted set, whose causes act beside those of the hypothesis; the base, where no cause acts, unless given.
+    `causes`: those that were screened. `screened`: of the rows without them. `about`: a fitted set, whose causes act
+    beside those of the hypothesis; the base, where no cause acts, unless given.
     """
     configurations = (hypothesis.best, *hypothesis.elsewhere)
     weighed = [
@@ -94,16 +86,8 @@ def with_refined_places(
 ) -> WeightedSet:
     """A set with its mechanisms at the best places within their cells of a scan.
 
-    Parameters
-    ----------
-    base : Base
-    candidate : WeightedSet
-    spacing : float
-        Between the places of the scan [m].
-    source : Effects
-        Which makes columns at the state that the set is linear about.
-    placed : int
-        Effects, the first ones, whose places stay: those of the fit that the set is linear about.
+    `spacing`: between the places of the scan [m]. `source`: which makes columns at the state that the set is linear
+    about. `placed`: effects, the first ones, whose places stay: those of the fit that the set is linear about.
     """
     effects = list(candidate.effects)
     placed = len(effects) if candidate.refined else placed

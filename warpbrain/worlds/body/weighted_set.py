@@ -8,7 +8,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference import Kind
-from warpbrain.inference.hypothesis import Hypothesis
+from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.marginal import Marginal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
@@ -18,39 +18,22 @@ from warpbrain.worlds.body.refit import Refit
 
 @dataclass(frozen=True, eq=False)
 class WeightedSet:
-    """A set of causes and the linear model about its best point.
-
-    Attributes
-    ----------
-    hypothesis : Hypothesis
-    effects : tuple of Effect
-        Of its mechanisms, in the order of the hypothesis.
-    residual : (n,) array
-        With all coordinates at zero.
-    columns : (n, q + e + k) array
-        Of nuisances, of causes that are no mechanisms (unknown fields, and what is no physics), and of effects.
-    marginal : Marginal
-    refit : Refit or None
-    failure : str
-        Why it could not be fitted; empty if it could, or was not tried.
-    inherited_gain : float or None
-        Part of its log evidence that the fit of some of its causes (or of none) has gained over the linear model, until
-        it is fitted itself. None if its linear model is about a fit, whose gain it has already.
-    refined : bool
-        Whether its mechanisms are at the best places within their cells.
-    log_share : float
-        Log of the part of these places in the evidence of a set that is not fitted, which is a sum over all places.
-    """
+    """A set of causes and the linear model about its best point."""
 
     hypothesis: Hypothesis
-    effects: tuple[Effect, ...]
-    residual: Floats
+    effects: tuple[Effect, ...]  # of its mechanisms, in the order of the hypothesis
+    residual: Floats  # (n,), with all coordinates at zero
+    #: (n, q + e + k): of nuisances, of causes that are no mechanisms (unknown fields, and what is no physics), and of
+    #: effects.
     columns: Floats
     marginal: Marginal
     refit: Refit | None = None
-    failure: str = ""
+    failure: str = ""  # why it could not be fitted; empty if it could, or was not tried
+    #: Part of its log evidence that the fit of some of its causes (or of none) has gained over the linear model, until
+    #: it is fitted itself. None if its linear model is about a fit, whose gain it has already.
     inherited_gain: float | None = 0.0
-    refined: bool = False
+    refined: bool = False  # whether its mechanisms are at the best places within their cells
+    #: Log of the part of these places in the evidence of a set that is not fitted, which is a sum over all places.
     log_share: float = 0.0
 
     @property
@@ -91,6 +74,17 @@ class WeightedSet:
     def with_evidence(self, log_evidence: float) -> WeightedSet:
         """The same with another log evidence."""
         return replace(self, hypothesis=replace(self.hypothesis, log_evidence=log_evidence))
+
+    def fitted(self, refit: Refit) -> WeightedSet:
+        """The set linear about its fit."""
+        return replace(
+            self,
+            effects=refit.effects,
+            residual=refit.linear,
+            columns=refit.columns,
+            marginal=refit.marginal,
+            refit=refit,
+        )
 
     def without(self, mechanism: str, base: Base) -> WeightedSet:
         """The set less one of its mechanisms, linear about the same point, with an evidence to be compared with its."""

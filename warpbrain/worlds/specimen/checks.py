@@ -16,7 +16,7 @@ from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.confirm import Confirmation
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.predict import Prediction, predictive_p
+from warpbrain.inference.predict import Prediction, p_value, predictive_p
 from warpbrain.physics.words import pascals
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.specimen.fit import Fit
@@ -43,9 +43,8 @@ class CheckResults:
 
 @dataclass(frozen=True, eq=False)
 class _Predicted:
-    """A fit, its stress and held-out stress at all recorded rows (n,) [Pa], and its held-out log density."""
+    """Stress and held-out stress of a fit at all recorded rows (n,) [Pa], and its held-out log density."""
 
-    fit: Fit
     stress: Floats
     held: Floats
     log_density: float
@@ -57,7 +56,7 @@ class Checker:
     def __init__(self, sets: Sets, protocol: Protocol, draws: int, random: np.random.Generator) -> None:
         self.sets, self.protocol, self._draws, self._random = sets, protocol, draws, random
         self.folds = folds_of(protocol.thinned)
-        self._predictions: dict[int, _Predicted] = {}
+        self._predictions: dict[Fit, _Predicted] = {}
 
     def p_left(self, fit: Fit) -> float:
         """Posterior predictive probability of rows that other causes explain as well, if a fit has all that acts.
@@ -73,14 +72,14 @@ class Checker:
         base = self.sets.base
         scores: dict[str, Score] = {}
         stresses: dict[str, Floats] = {}
-        for name, one in (("refitted", base), ("explained", fit))[: 1 if fit is base else 2]:
-            predicted = self._predicted(one)
+        for name, compared in (("refitted", base), ("explained", fit))[: 1 if fit is base else 2]:
+            predicted = self._predicted(compared)
             stresses |= {name: predicted.stress, f"heldout {name}": predicted.held}
             scores[name] = score(self.protocol, predicted.stress, predicted.held)
         if fit is base:
             return CheckResults(None, scores, stresses)
-        names = [one.effect.name for one in fit.assumed if one.effect.kind is Kind.PHYSICS]
-        confirmations = [found for name in names if (found := self._confirm(fit, name)) is not None]
+        names = [component.effect.name for component in fit.assumed if component.effect.kind is Kind.PHYSICS]
+        confirmations = [confirmation for name in names if (confirmation := self._confirm(fit, name)) is not None]
         return CheckResults(self.p_left(fit), scores, stresses, self._improvement(base, fit), tuple(confirmations))
 
     def heldout_rms(self, fit: Fit) -> float:
@@ -88,16 +87,16 @@ class Checker:
         return root_mean_square((self.protocol.observed - self._predicted(fit).held)[self.protocol.fitted])
 
     def _predicted(self, fit: Fit) -> _Predicted:
-        if id(fit) not in self._predictions:
+        if fit not in self._predictions:
             # what has no name is known at thinned rows alone, and explains nothing of others
             assumed, z = fit.only(lambda effect: effect.kind is not Kind.UNKNOWN)
             everywhere, z = fit.forward.of(protocol=self.protocol), np.concatenate([fit.z[: len(fit.forward)], z])
-            whole = everywhere.stress(assumed, z)
+            stress = everywhere.stress(assumed, z)
             predicted, log_density = held_out(fit, self.folds)
             # of thinned rows it is known by how much it differs from the fit: smoothly
-            held = whole + self.protocol.spread(predicted - fit.forward.stress(assumed, z))
-            self._predictions[id(fit)] = _Predicted(fit, whole, held, log_density)
-        return self._predictions[id(fit)]
+            held = stress + self.protocol.spread(predicted - fit.forward.stress(assumed, z))
+            self._predictions[fit] = _Predicted(stress, held, log_density)
+        return self._predictions[fit]
 
     def _improvement(self, before: Fit, after: Fit) -> tuple[float, float, float]:
         """Of held-out errors relative to the largest stress of each test."""
@@ -192,7 +191,7 @@ def _placebo_p(about: Linear, name: str, folds: Folds, random: np.random.Generat
     columns as the cause, of the same sizes, and both are in the same model: about the fit without the cause.
     """
     fit = about.fit
-    cause = next(one for one in about.causes if one.name == name)
+    cause = next(candidate for candidate in about.causes if candidate.name == name)
     length = np.sqrt(np.mean([np.mean(place.columns**2) for place in cause.places]))
     peaks = fit.forward.protocol.peaks[fit.rows]
     where, causes = _coordinates(fit.forward.protocol)[fit.rows], [cause]
@@ -203,24 +202,24 @@ def _placebo_p(about: Linear, name: str, folds: Folds, random: np.random.Generat
             places.append(Place(pattern * length / np.sqrt(np.mean(pattern**2)), None, place.weight))
         causes.append(Cause(str(number), tuple(places), 0.0, cause.sizes))
     residual = fit.residual[fit.rows]
-    total, whole = np.zeros(len(causes)), _log_densities(fit.model, residual, causes)
+    total, of_all_rows = np.zeros(len(causes)), _log_densities(fit.model, residual, causes)
     for held in folds.held:
         observed = ~held[fit.rows]
         kept = [
-            Cause(one.name, tuple(Place(p.columns[observed], None, p.weight) for p in one.places), 0.0, one.sizes)
-            for one in causes
+            Cause(each.name, tuple(Place(p.columns[observed], None, p.weight) for p in each.places), 0.0, each.sizes)
+            for each in causes
         ]
-        total += whole - _log_densities(fit.model.rows(observed), residual[observed], kept)
-    return float((1 + np.sum(total[1:] >= total[0])) / (1 + _PLACEBOS))
+        total += of_all_rows - _log_densities(fit.model.rows(observed), residual[observed], kept)
+    return p_value(total[0], total[1:])
 
 
 def _log_densities(model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> Floats:
     """Of rows under each cause, summed over its places and sizes."""
     blocks = Blocks(model, residual, causes)
     logs = np.logaddexp.reduce(blocks.log_factors() + blocks.log_weights, axis=1)
-    found = np.full(len(causes), -np.inf)
-    np.logaddexp.at(found, blocks.cause, logs)
-    return np.asarray(found + float(model.log_density(residual)))
+    log_densities = np.full(len(causes), -np.inf)
+    np.logaddexp.at(log_densities, blocks.cause, logs)
+    return np.asarray(log_densities + float(model.log_density(residual)))
 
 
 def _pattern(where: Floats, count: int, random: np.random.Generator) -> Floats:

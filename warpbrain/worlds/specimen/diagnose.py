@@ -9,6 +9,7 @@ import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
+from warpbrain.estimation.options import Listener
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.confirm import after_checks
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
@@ -17,7 +18,6 @@ from warpbrain.recordings.recording import TestRecording
 from warpbrain.seconds import Seconds
 from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.threads import one_thread_of_blas
-from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import Checker, grown_errors, score
 from warpbrain.worlds.specimen.fit import Fit, fit
@@ -39,19 +39,8 @@ Ordered = Sequence[tuple[CauseSet, float]]
 class DiagnosingSpecimen:
     """Diagnoses the tests of one case.
 
-    Parameters
-    ----------
-    case : Case
-        With a specimen.
-    options : DiagnosisOptions, optional
-    device : str, optional
-        Of the finite elements that glued ends need.
-    listener : Listener, optional
-
-    Raises
-    ------
-    InputError
-        If the case has no tests, too few rows for any conclusion, or assumes what a homogeneous state has not.
+    `case`: with a specimen. `device`: of the finite elements that glued ends need. `InputError` if the case has no
+    tests, too few rows for any conclusion, or assumes what a homogeneous state has not.
     """
 
     def __init__(
@@ -64,7 +53,7 @@ class DiagnosingSpecimen:
         self.case, self.device, self._listener = case, device, listener or Listener()
         self.options = options or DiagnosisOptions()
         self.seconds = Seconds()
-        recordings = [one for one in case.recordings if isinstance(one, TestRecording)]
+        recordings = [recording for recording in case.recordings if isinstance(recording, TestRecording)]
         _check(case, recordings)
         #: All recorded rows.
         self.protocol = protocol_of(specimen_of(case), recordings)
@@ -72,10 +61,7 @@ class DiagnosingSpecimen:
     def run(self) -> SpecimenDiagnosis:
         """Every stage.
 
-        Raises
-        ------
-        InputError
-            If the declared law finds no state in the tests.
+        `InputError` if the declared law finds no state in the tests.
         """
         with one_thread_of_blas():
             return self._run()
@@ -97,7 +83,7 @@ class DiagnosingSpecimen:
             checker = Checker(sets, protocol, options.draws, np.random.default_rng([options.seed, 11]))
             p_value = checker.p_left(base)
             chances = np.array([p for _, p in ordered])
-            by_posterior, _ = decide([one.hypothesis for one, _ in ordered], chances, calibration().losses)
+            by_posterior, _ = decide([candidate.hypothesis for candidate, _ in ordered], chances, calibration().losses)
             if p_value > options.alpha:
                 by_posterior = Decision(NOTHING)
             best = base if by_posterior.verdict == NOTHING else _explaining(ordered, by_posterior)
@@ -112,6 +98,7 @@ class DiagnosingSpecimen:
             explained = _explained_case(best) if names else None
         declared = forward.of(protocol=protocol).stress((), np.zeros(len(forward)))
         ranking = _ranking(sets, ordered, checker)
+        ranked = {cause.name: cause for cause in ranking}
         nothing = sets.nothing.hypothesis.log_evidence
         shows = None
         if best is not base:
@@ -124,18 +111,18 @@ class DiagnosingSpecimen:
             doubts=doubts,
             p_value=p_value,
             p_left=checked.p_left,
-            named=tuple(replace(_of_name(ranking, name), values=values_of(best, name)) for name in names),
+            named=tuple(replace(ranked[name], values=values_of(best, name)) for name in names),
             ranking=ranking,
             rejected=rejected,
             combinations=tuple(
                 Combination(
                     # what has no name comes last
-                    tuple(sorted(one.hypothesis.causes, key=lambda name: name == UNKNOWN)),
-                    one.hypothesis.log_evidence - nothing,
+                    tuple(sorted(candidate.hypothesis.causes, key=lambda name: name == UNKNOWN)),
+                    candidate.hypothesis.log_evidence - nothing,
                     p,
-                    one.fit is not None,
+                    candidate.fit is not None,
                 )
-                for one, p in ordered[:_TOLD]
+                for candidate, p in ordered[:_TOLD]
             ),
             assumed=tuple(sorted(best.names)),
             where=shows,
@@ -148,9 +135,9 @@ class DiagnosingSpecimen:
             explained=explained,
             assumptions=assumptions_of(best, protocol, checker.folds.by_test),
             remarks=tuple(
-                f"{one.effect.name} is not simulated by a run: the explained case is fitted without it"
-                for one in best.assumed
-                if not one.effect.runs and one.effect.name != UNKNOWN
+                f"{component.effect.name} is not simulated by a run: the explained case is fitted without it"
+                for component in best.assumed
+                if not component.effect.runs and component.effect.name != UNKNOWN
             ),
             by_test=checker.folds.by_test,
             seconds=self.seconds,
@@ -159,26 +146,27 @@ class DiagnosingSpecimen:
 
 def _check(case: Case, recordings: Sequence[TestRecording]) -> None:
     """Raise `InputError` if nothing can be said of tests."""
-    rows = sum(len(one.imposed) for one in recordings if one.role == "fit")
+    rows = sum(len(recording.imposed) for recording in recordings if recording.role == "fit")
     if rows < _FEWEST:
         raise InputError(
             f"{case.path}: [[recording]] role = 'fit': {rows} rows of tests: too few for any conclusion; "
             f"{_FEWEST - rows} more would do"
         )
-    for one in recordings:
-        who = f"{case.path}: [[recording]] '{one.name}'"
-        if why := not_transmitted(specimen_of(case).grips, one.mode):
-            raise InputError(f"{who} mode '{one.mode}': {why}")
-        if not np.abs(one.response).any():
-            raise InputError(f"{who} file '{one.file}': every response is 0")
+    for recording in recordings:
+        who = f"{case.path}: [[recording]] '{recording.name}'"
+        if why := not_transmitted(specimen_of(case).grips, recording.mode):
+            raise InputError(f"{who} mode '{recording.mode}': {why}")
+        if not np.abs(recording.response).any():
+            raise InputError(f"{who} file '{recording.file}': every response is 0")
 
 
 def _explaining(ordered: Ordered, decision: Decision) -> Fit:
     """The most probable fit that has all causes of a verdict; of one that speaks of none, of all with any."""
     spoken = decision.verdict in (NAMED, NAMED_AND_REST)
     wanted = {name for name in decision.causes if name != UNKNOWN} if spoken else set()
-    fits = [one.fit for one, _ in ordered if one.fit is not None]
-    return next((one for one in fits if one.names and wanted <= one.names), next(one for one in fits if not one.names))
+    fits = [candidate.fit for candidate, _ in ordered if candidate.fit is not None]
+    explaining = (each for each in fits if each.names and wanted <= each.names)
+    return next(explaining, next(each for each in fits if not each.names))
 
 
 def _explained_case(best: Fit) -> Case | None:
@@ -188,35 +176,36 @@ def _explained_case(best: Fit) -> Case | None:
     """
     assumed, z = best.only(lambda effect: effect.runs)
     forward = best.forward.of(shape_of_law=False)
-    found = fit(forward, assumed, np.concatenate([np.zeros(len(forward)), z]), best.scale) if assumed else None
-    if found is None:
+    refitted = fit(forward, assumed, np.concatenate([np.zeros(len(forward)), z]), best.scale) if assumed else None
+    if refitted is None:
         return None
     case = forward.case
     [(label, tissue)] = case.tissues.items()
-    law = tissue.known_law.scaled_to(found.forward.modulus(found.z) * tissue.known_law.shear_modulus)
+    law = tissue.known_law.scaled_to(refitted.forward.modulus(refitted.z) * tissue.known_law.shear_modulus)
     return replace(
         case,
         name=f"{case.name}-explained",
-        title=f"{case.title}, with {'-and-'.join(one.effect.name for one in assumed)}",
+        title=f"{case.title}, with {'-and-'.join(component.effect.name for component in assumed)}",
         tissues={label: replace(tissue, law=law)},
-        mechanisms=(*case.mechanisms, *found.forward.mechanisms(assumed, found.z)),
+        mechanisms=(*case.mechanisms, *refitted.forward.mechanisms(assumed, refitted.z)),
     )
 
 
 def _next(ordered: Ordered, base: Fit) -> tuple[Measurement, ...]:
     """What would tell the two most probable sets with mechanisms of a run apart, or the only one from none."""
     fits: dict[frozenset[str], Fit] = {}
-    for one, _ in ordered:
-        if one.fit is not None:
-            fits.setdefault(frozenset(own.effect.name for own in one.fit.assumed if own.effect.runs), one.fit)
-    first = [*(found for runs, found in fits.items() if runs), base]
+    for candidate, _ in ordered:
+        if candidate.fit is not None:
+            runs = frozenset(each.effect.name for each in candidate.fit.assumed if each.effect.runs)
+            fits.setdefault(runs, candidate.fit)
+    first = [*(fitted for runs, fitted in fits.items() if runs), base]
     return next_measurements(*first[:2]) if len(first) > 1 else ()
 
 
 def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ...]:
     """Every cause alone, that which most probably acts first."""
     base, nothing = sets.base, sets.nothing.hypothesis.log_evidence
-    found = []
+    ranked = []
     for effect in sets.effects:
         alone = sets.by_names.get(frozenset({effect.name}))
         change = d = None
@@ -224,25 +213,20 @@ def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ..
             change = checker.heldout_rms(alone.fit) - checker.heldout_rms(base)
             moved = (alone.fit.stress - base.stress)[base.rows]
             d = float(np.linalg.norm(base.model.standardised(moved)))
-        fits = (one.fit for one, _ in ordered if effect.name in one.names and one.fit is not None)
-        best = next(fits, None)
+        best = next((each.fit for each, _ in ordered if effect.name in each.names and each.fit is not None), None)
         values = () if best is None else values_of(best, effect.name)
-        regions = () if best is None else (one.variant.region for one in best.assumed if one.effect is effect)
-        found.append(
+        regions = () if best is None else (each.variant.region for each in best.assumed if each.effect is effect)
+        ranked.append(
             Ranked(
                 name=effect.name,
                 sentence=effect.sentence_of(values),
                 kind=effect.kind,
                 log_evidence=float("-inf") if alone is None else alone.hypothesis.log_evidence - nothing,
-                probability=sum(p for one, p in ordered if effect.name in one.names),
+                probability=sum(p for candidate, p in ordered if effect.name in candidate.names),
                 detectability=d,
                 change=change,
                 values=values,
                 region=next(iter(regions), ""),
             )
         )
-    return tuple(sorted(found, key=lambda one: (-one.probability, -one.log_evidence)))
-
-
-def _of_name(ranking: Sequence[Ranked], name: str) -> Ranked:
-    return next(one for one in ranking if one.name == name)
+    return tuple(sorted(ranked, key=lambda cause: (-cause.probability, -cause.log_evidence)))

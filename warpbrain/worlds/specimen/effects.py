@@ -127,9 +127,9 @@ def softening(case: Case, protocol: Protocol) -> Effect:
         each = [pattern(forward.protocol, chain) for chain in forward.protocol.chains]
         return Action(factor=1.0 - np.clip(c[0], 0.0, 0.95) * np.concatenate(each))
 
-    ways = ((below, "below the largest strain so far"), (cycles, "with every cycle"))
+    patterns = ((below, "below the largest strain so far"), (cycles, "with every cycle"))
     size = belief("specimen.largest_softening")
-    variants = tuple(Variant.of(partial(act, way), size, one_sign=True, region=words) for way, words in ways)
+    variants = tuple(Variant.of(partial(act, each), size, one_sign=True, region=words) for each, words in patterns)
     return Effect(
         "softening", Kind.PHYSICS, "Tissue is softer where it was deformed before.", variants, ("part",), ("",)
     )
@@ -206,8 +206,8 @@ def friction(case: Case, protocol: Protocol) -> Effect:
     def act(c: Floats, forward: Forward) -> Action:
         axial = forward.protocol.mask([k for k, test in enumerate(forward.protocol.tests) if test.mode == "axial"])
         part = float(np.clip(c[0], 0.0, 1.0))
-        sticks, whole = (1.0 - part, forward.factor) if glued else (part, 1.0)
-        return Action(factor=np.where(axial, (1.0 + sticks * (forward.sticking - 1.0)) / whole, 1.0))
+        sticks, present = (1.0 - part, forward.factor) if glued else (part, 1.0)
+        return Action(factor=np.where(axial, (1.0 + sticks * (forward.sticking - 1.0)) / present, 1.0))
 
     variants = (Variant.of(act, belief("specimen.largest_slip"), one_sign=True),)
     sentence = "The ends of the specimen slip." if glued else "The ends of the specimen stick to the platens."
@@ -268,9 +268,5 @@ def unknown(protocol: Protocol) -> Effect:
         columns = smooth_patterns(protocol, reach)
         columns = columns[:, np.any(columns[protocol.fitted] != 0.0, axis=0)]
         size = belief("specimen.largest_unknown")
-        variants.append(Variant.of_added(partial(_fixed, columns), size, columns.shape[1]))
+        variants.append(Variant.of_added(partial(lambda fixed, _protocol: fixed, columns), size, columns.shape[1]))
     return Effect(UNKNOWN, Kind.UNKNOWN, "Something acts that is none of the known mechanisms.", tuple(variants))
-
-
-def _fixed(columns: Floats, protocol: Protocol) -> Floats:
-    return columns

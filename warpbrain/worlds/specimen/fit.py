@@ -49,7 +49,7 @@ class Fit:
     @property
     def names(self) -> frozenset[str]:
         """Of its causes."""
-        return frozenset(one.effect.name for one in self.assumed)
+        return frozenset(component.effect.name for component in self.assumed)
 
     @cached_property
     def residual(self) -> Floats:
@@ -80,7 +80,7 @@ class Fit:
 
     def only(self, kept: Callable[[Effect], bool]) -> tuple[tuple[Component, ...], Floats]:
         """Some of its causes, and their coefficients (k,)."""
-        numbers = [k for k, one in enumerate(self.assumed) if kept(one.effect)]
+        numbers = [k for k, component in enumerate(self.assumed) if kept(component.effect)]
         z = np.concatenate([np.zeros(0), *(self.z[self.part(k)] for k in numbers)])
         return tuple(self.assumed[k] for k in numbers), z
 
@@ -90,21 +90,21 @@ def fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: floa
 
     The noise and the glued ends are those of what is arrived at.
     """
-    found = None
+    settled = None
     for _ in range(_SETTLING):
         try:
             again = _fit(forward, assumed, z, scale, forward.protocol.fitted)
             law = forward.material(assumed, again.z)
         except CANNOT_BE:
-            return found
+            return settled
         moved = forward.of(law=law) if forward.glued else forward
         same_ends = float(np.abs(moved.factor - forward.factor).max()) <= _SAME
-        found = again
+        settled = again
         if again.scale == scale and same_ends:
             break
         z, scale = again.z, again.scale
         forward = forward if same_ends else moved
-    return found
+    return settled
 
 
 def _fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: float, rows: Bools) -> Fit:

@@ -142,7 +142,7 @@ class Forward:
 
     def mechanisms(self, assumed: Sequence[Component], z: Floats) -> tuple[Mechanism, ...]:
         """Of the registry, at coefficients (k,)."""
-        return tuple(mechanism for one in self.actions(assumed, z) for mechanism in one.mechanisms)
+        return tuple(mechanism for action in self.actions(assumed, z) for mechanism in action.mechanisms)
 
     def material(self, assumed: Sequence[Component], z: Floats) -> HomogeneousMaterial:
         """Of the tissue, at coefficients (k,)."""
@@ -155,13 +155,13 @@ class Forward:
     def actions(self, assumed: Sequence[Component], z: Floats) -> list[Action]:
         """What causes do at coefficients (k,)."""
         parts = np.split(z, np.cumsum([len(self), *map(len, assumed)])[:-1])[1:]
-        return [one.variant.act(one.coefficients(c), self) for one, c in zip(assumed, parts, strict=True)]
+        return [each.variant.act(each.coefficients(c), self) for each, c in zip(assumed, parts, strict=True)]
 
     def stress_of(self, actions: Sequence[Action], z: Floats) -> Floats:
         """The stress of what causes do, with the coefficients of nuisances among all (k,)."""
         scale, shapes, added = self._nuisances(actions, z)
-        simulated = self._homogeneous(tuple(m for one in actions for m in one.mechanisms)) * self.factor
-        simulated = simulated + self.scaled @ shapes + sum(one.scaled for one in actions)
+        simulated = self._homogeneous(tuple(m for action in actions for m in action.mechanisms)) * self.factor
+        simulated = simulated + self.scaled @ shapes + sum(action.scaled for action in actions)
         return np.asarray(scale * simulated + added)
 
     def tangent(self, assumed: Sequence[Component], z: Floats, stress: Floats) -> Floats:
@@ -169,29 +169,29 @@ class Forward:
         scale, _, added = self._nuisances(self.actions(assumed, z), z)
         of_law = self.logarithmic * (stress - added)[:, None], self.scaled * scale[:, None]
         adds, columns = self.adding(assumed)
-        found = np.empty((len(stress), len(z)))
-        found[:, : len(self) - self.added.shape[1]] = np.concatenate(of_law, axis=1)
-        found[:, adds] = columns
+        tangent = np.empty((len(stress), len(z)))
+        tangent[:, : len(self) - self.added.shape[1]] = np.concatenate(of_law, axis=1)
+        tangent[:, adds] = columns
         for number in np.flatnonzero(~adds[len(self) :]) + len(self):
             moved = self.stress(assumed, z + _STEP * np.eye(len(z))[number])
-            found[:, number] = (moved - stress) / _STEP
-        return found
+            tangent[:, number] = (moved - stress) / _STEP
+        return tangent
 
     def adding(self, assumed: Sequence[Component]) -> tuple[Bools, Floats]:
         """Which coefficients (k,) only add stress, and what one of each of these adds (n, a) [Pa]."""
         adds, columns = [np.arange(len(self)) >= len(self) - self.added.shape[1]], [self.added]
-        for one in assumed:
-            adds.append(np.full(len(one), one.variant.added is not None))
-            if one.variant.added is not None:
-                columns.append(one.variant.added(self.protocol) * one.sd)
+        for component in assumed:
+            adds.append(np.full(len(component), component.variant.added is not None))
+            if component.variant.added is not None:
+                columns.append(component.variant.added(self.protocol) * component.sd)
         return np.concatenate(adds), np.concatenate(columns, axis=1)
 
     def _nuisances(self, actions: Sequence[Action], z: Floats) -> tuple[Floats, Floats, Floats]:
         """Factor (n,) on the simulated stress, coefficients of the law's shape, and all that is added (n,)."""
         a = self.logarithmic.shape[1]
         b = a + self.scaled.shape[1]
-        scale = np.exp(self.logarithmic @ z[:a]) * prod(one.factor for one in actions)
-        return scale, z[a:b], self.added @ z[b : len(self)] + sum(one.added for one in actions)
+        scale = np.exp(self.logarithmic @ z[:a]) * prod(action.factor for action in actions)
+        return scale, z[a:b], self.added @ z[b : len(self)] + sum(action.added for action in actions)
 
     def _homogeneous(self, mechanisms: tuple[Mechanism, ...]) -> Floats:
         key = repr(mechanisms)

@@ -63,14 +63,14 @@ class GluedEnds:
         for shrink in (1.0, 0.5, 0.25):
             recording = self._recording(mode, np.array([rest + shrink * low, rest + shrink * high]))
             try:
-                found = self._rig(material).run(recording, _STEPS)
-                strain = strain_of(self._specimen, mode, recording.quantities[0], found.imposed)
+                simulated = self._rig(material).run(recording, _STEPS)
+                strain = strain_of(self._specimen, mode, recording.quantities[0], simulated.imposed)
                 moved = np.abs(strain - rest) > 0.05 * max(-low, high)
                 homogeneous = elastic.stress(mode, strain[moved], None)
             except (SolveError, NoStateError):
                 continue
             unit = stress_unit(self._specimen, recording)
-            return strain[moved], unit * found.response[moved] / homogeneous
+            return strain[moved], unit * simulated.response[moved] / homogeneous
         return none
 
     def _recording(self, mode: str, strain: Floats) -> TestRecording:
@@ -91,9 +91,12 @@ class GluedEnds:
         return Rig(case, self._device, elements=ELEMENTS)
 
 
-def _alike(one: HomogeneousMaterial, other: HomogeneousMaterial) -> bool:
+def _alike(material: HomogeneousMaterial, other: HomogeneousMaterial) -> bool:
     """Whether two laws differ so little, apart from their modulus, that the shape has one factor for both."""
-    if type(one.law) is not type(other.law) or (one.poisson, one.formulation) != (other.poisson, other.formulation):
+    if type(material.law) is not type(other.law) or (material.poisson, material.formulation) != (
+        other.poisson,
+        other.formulation,
+    ):
         return False
-    mine, its = (np.array(each.law.scaled_to(1.0).parameters()) for each in (one, other))
+    mine, its = (np.array(each.law.scaled_to(1.0).parameters()) for each in (material, other))
     return mine.shape == its.shape and bool(np.allclose(mine, its, rtol=_NEAR, atol=0.0))

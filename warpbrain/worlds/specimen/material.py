@@ -40,23 +40,13 @@ def can_act(kind: type[Mechanism]) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class HomogeneousMaterial:
-    """What a specimen is made of.
-
-    Attributes
-    ----------
-    law : Law
-    poisson : float
-    formulation : str
-    storing : tuple of Storing
-        What stores energy beside the law.
-    moduli, times : tuple of float
-        Branches of its memory: relative to the law's shear modulus, and [s].
-    """
+    """What a specimen is made of."""
 
     law: Law
     poisson: float
     formulation: str
-    storing: tuple[Storing, ...] = ()
+    storing: tuple[Storing, ...] = ()  # what stores energy beside the law
+    #: Branches of its memory: relative to the law's shear modulus, and [s].
     moduli: tuple[float, ...] = ()
     times: tuple[float, ...] = ()
 
@@ -64,15 +54,12 @@ class HomogeneousMaterial:
     def of_case(cls, case: Case, mechanisms: Sequence[Mechanism], turn: Floats | None = None) -> HomogeneousMaterial:
         """The tissue of a case with all that acts on it, its own mechanisms among that, turned in the machine.
 
-        Raises
-        ------
-        InputError
-            If one of them is not known to a homogeneous state, or parameters make no sense.
+        `InputError` if one of them is not known to a homogeneous state, or parameters make no sense.
         """
         [(label, tissue)] = case.tissues.items()
         material = cls(tissue.known_law, case.poisson, tissue.formulation)
-        for given in (*case.mechanisms, *mechanisms):
-            mechanism = given if turn is None else given.turned(turn)
+        for declared in (*case.mechanisms, *mechanisms):
+            mechanism = declared if turn is None else declared.turned(turn)
             if isinstance(mechanism, Substituting):
                 law, poisson, formulation = mechanism.substitute(
                     label, material.law, material.poisson, material.formulation

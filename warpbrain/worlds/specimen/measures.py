@@ -23,22 +23,22 @@ _ROWS, _REACH, _DURATION, _SPREAD = 40, 0.5, 100.0, 0.1
 
 def values_of(fit: Fit, name: str) -> tuple[Value, ...]:
     """Parameters of one of the causes of a fit, with standard deviations to first order."""
-    number = [one.effect.name for one in fit.assumed].index(name)
-    one, part = fit.assumed[number], fit.part(number)
-    if not one.effect.names:
+    number = [cause.effect.name for cause in fit.assumed].index(name)
+    component, part = fit.assumed[number], fit.part(number)
+    if not component.effect.names:
         return ()
     z = fit.z[part]
-    here = np.array(one.variant.values(one.coefficients(z)))
-    moved = [np.array(one.variant.values(one.coefficients(z + _STEP * move))) for move in np.eye(len(z))]
+    here = np.array(component.variant.values(component.coefficients(z)))
+    moved = [np.array(component.variant.values(component.coefficients(z + _STEP * move))) for move in np.eye(len(z))]
     slope = (np.array(moved) - here).T / _STEP
     sd = np.sqrt(np.maximum(np.diag(slope @ fit.covariance[part, part] @ slope.T), 0.0))
-    each = zip(one.effect.names, here.tolist(), sd.tolist(), one.effect.units, strict=True)
+    each = zip(component.effect.names, here.tolist(), sd.tolist(), component.effect.units, strict=True)
     return tuple(Value(*value) for value in each)
 
 
 def where_it_shows(protocol: Protocol, without: Floats, with_it: Floats) -> Segment:
     """The segment in which squared errors of stresses (n,), over the largest of the test, fall most [Pa]."""
-    found = []
+    segments = []
     for number in protocol.to_fit:
         test, rows = protocol.tests[number], protocol.rows[number]
         gain = ((test.stress - without[rows]) ** 2 - (test.stress - with_it[rows]) ** 2) / test.peak**2
@@ -51,13 +51,13 @@ def where_it_shows(protocol: Protocol, without: Floats, with_it: Floats) -> Segm
                     strain, time = test.strain[part], None if test.time is None else test.time[part]
                     times = None if time is None else (float(time.min()), float(time.max()))
                     strains = float(strain.min()), float(strain.max())
-                    found.append((float(gain[part].sum()), Segment(test.name, test.mode, name, strains, times)))
-    return max(found, key=lambda one: one[0])[1]
+                    segments.append((float(gain[part].sum()), Segment(test.name, test.mode, name, strains, times)))
+    return max(segments, key=lambda gained: gained[0])[1]
 
 
 def smallest_of(about: Linear) -> dict[str, Smallest]:
     """Of each cause, the size of its first number that is seen nearly always; of its places the plainest counts."""
-    found: dict[str, Smallest] = {}
+    smallest: dict[str, Smallest] = {}
     for cause, components in zip(about.causes, about.components, strict=True):
         effect = components[0].effect
         if not effect.names:
@@ -68,33 +68,33 @@ def smallest_of(about: Linear) -> dict[str, Smallest]:
         part = belief("specimen.seen") / max(seen[best], 1e-12)
         there = variant.nothing + part * (trial[0] - variant.nothing)
         size = abs(variant.values(there)[0] - variant.values(variant.nothing)[0])
-        found[effect.name] = Smallest(size, effect.units[0], effect.names[0])
-    return found
+        smallest[effect.name] = Smallest(size, effect.units[0], effect.names[0])
+    return smallest
 
 
-def next_measurements(one: Fit, other: Fit) -> tuple[Measurement, ...]:
+def next_measurements(likeliest: Fit, other: Fit) -> tuple[Measurement, ...]:
     """What could be measured to tell the materials of two fits apart, what tells most first: expected Bayes factors."""
-    tests = one.forward.protocol.tests
+    tests = likeliest.forward.protocol.tests
     reach = min(max(test.reach for test in tests), _REACH)
     lasts = [float(np.ptp(test.time)) for test in tests if test.time is not None]
-    found = []
-    for what, (mode, strain, time) in _tests(reach, max(lasts, default=_DURATION)).items():
+    measurements = []
+    for words, (mode, strain, time) in _tests(reach, max(lasts, default=_DURATION)).items():
         try:
             first, second = (
                 fit.forward.modulus(fit.z) * fit.forward.material(fit.assumed, fit.z).stress(mode, strain, time)
-                for fit in (one, other)
+                for fit in (likeliest, other)
             )
         except CANNOT_BE:
             continue
         away = float(np.abs(strain - REST[mode]).max())
         path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain)))]) / away
         test = Test(
-            what, mode, "", True, np.arange(len(strain)), strain, first, time, path, 0.0, 1.0,
+            words, mode, "", True, np.arange(len(strain)), strain, first, time, path, 0.0, 1.0,
             float(np.abs(first).max()), away, np.eye(3),
         )  # fmt: skip
         model = GaussianModel(noise_factor(Protocol((test,))), _SPREAD * second[:, None])
-        found.append(Measurement(what, 0.5 * float(np.sum(model.standardised(first - second) ** 2))))
-    return tuple(sorted(found, key=lambda one: -one.expected_nats))
+        measurements.append(Measurement(words, 0.5 * float(np.sum(model.standardised(first - second) ** 2))))
+    return tuple(sorted(measurements, key=lambda measurement: -measurement.expected_nats))
 
 
 def _tests(reach: float, duration: float) -> dict[str, tuple[str, Floats, Floats]]:

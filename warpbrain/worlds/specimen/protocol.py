@@ -207,8 +207,8 @@ def _reading(specimen: Specimen, recording: TestRecording, strain: Floats, stres
     if recording.sigma is None:
         return stiffness * _roughness(strain)
     # strains are linear in what was read
-    none, one = strain_of(specimen, recording.mode, recording.quantities[0], np.array([0.0, recording.sigma]))
-    return stiffness * abs(float(one - none))
+    zero, deviation = strain_of(specimen, recording.mode, recording.quantities[0], np.array([0.0, recording.sigma]))
+    return stiffness * abs(float(deviation - zero))
 
 
 def strain_of(specimen: Specimen, mode: str, quantity: str, imposed: Floats) -> Floats:

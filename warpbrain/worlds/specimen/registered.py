@@ -39,31 +39,28 @@ def effects_of(
 ) -> tuple[tuple[Effect, ...], dict[str, str]]:
     """Causes that are looked for, the unknown last, and why others are not; all unless some are wanted by name.
 
-    Raises
-    ------
-    InputError
-        If one is wanted that nobody knows.
+    `InputError` if one is wanted that nobody knows.
     """
     shown, situation = _shown(protocol), _situation(case, 2 if _tells_time(protocol) else 1)
-    found: dict[str, Effect] = {}
+    testable: dict[str, Effect] = {}
     rejected: dict[str, str] = {}
     registry = {name: known for name, known in mechanisms().items() if known.of_specimens}
     for name in (*registry, *_OTHERS):
         try:
             if name in registry:
-                found[name] = _registered(registry[name], shown, situation)
+                testable[name] = _registered(registry[name], shown, situation)
             else:
-                found[name] = _OTHERS[name](case, protocol)
+                testable[name] = _OTHERS[name](case, protocol)
         except NotTestableError as error:
             rejected[name] = f"not testable with these data: {error}"
     if wanted is not None:
         for name in wanted:
-            if name not in found and name not in rejected:
-                known = ", ".join((*found, *rejected))
+            if name not in testable and name not in rejected:
+                known = ", ".join((*testable, *rejected))
                 raise InputError(f"--candidates {name}: means nothing in a specimen; what can be looked for: {known}")
-        rejected |= {name: "not asked for" for name in (*found, *rejected) if name not in wanted}
-        found = {name: effect for name, effect in found.items() if name in wanted}
-    return (*found.values(), effects.unknown(protocol)), rejected
+        rejected |= {name: "not asked for" for name in (*testable, *rejected) if name not in wanted}
+        testable = {name: effect for name, effect in testable.items() if name in wanted}
+    return (*testable.values(), effects.unknown(protocol)), rejected
 
 
 def _shown(protocol: Protocol) -> Tests:
@@ -126,7 +123,7 @@ def _registered(kind: type[Mechanism], shown: Tests, situation: Situation) -> Ef
     proposals = kind.proposals(situation)
     says, first = kind.parameters(), proposals[0]
     here, there = (first.make(first.without + move) for move in (0.5 * first.sd, first.sd))
-    numbers = [name for name, one in says.items() if one.kind in ("number", "numbers")]
+    numbers = [name for name, parameter in says.items() if parameter.kind in ("number", "numbers")]
     names = tuple(name for name in numbers if _number(here, name) != _number(there, name))
     variants = tuple(_variant(proposal, names) for proposal in proposals)
     return Effect(

@@ -15,13 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.causes import Cause, Kind, Place
-from warpbrain.inference.hypothesis import Configuration, Hypothesis, Posterior
+from warpbrain.inference.causes import Cause, Configuration, Hypothesis, Kind, Place
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import Search, posterior
-from warpbrain.worlds.listener import Listener
 from warpbrain.worlds.specimen.effects import Effect
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit, fit
 from warpbrain.worlds.specimen.forward import Component
@@ -49,7 +48,7 @@ class Linear:
     causes: tuple[Cause, ...]
     components: tuple[tuple[Component, ...], ...]
 
-    def posterior(self, beam: int) -> Posterior:
+    def posterior(self, beam: int) -> tuple[Hypothesis, ...]:
         """Over sets of these causes beside those of the fit."""
         values, logs = scales()
         residual = self.fit.residual[self.fit.rows]
@@ -60,15 +59,15 @@ class Linear:
         sizes = beliefs("specimen.sizes").tolist()
         new = [replace(self.components[m.cause][m.place], size=sizes[m.size]) for m in best.members]
         columns = [
-            one.size * self.causes[m.cause].places[m.place].columns for one, m in zip(new, best.members, strict=True)
+            each.size * self.causes[m.cause].places[m.place].columns for each, m in zip(new, best.members, strict=True)
         ]
         model = self.fit.model.with_scale(best.scale).with_columns(np.concatenate(columns, axis=1))
         mean = model.coefficients(self.fit.residual[self.fit.rows])[0]
-        first, *moves = np.split(mean, np.cumsum([len(self.fit.z), *(one.shape[1] for one in columns)])[:-1])
+        first, *moves = np.split(mean, np.cumsum([len(self.fit.z), *(block.shape[1] for block in columns)])[:-1])
         parts = [first]
-        for one, move in zip(new, moves, strict=True):
-            c = one.variant.nothing + one.size * move @ (one.trial - one.variant.nothing)
-            parts.append((c - one.variant.mean) / one.sd)
+        for component, move in zip(new, moves, strict=True):
+            c = component.variant.nothing + component.size * move @ (component.trial - component.variant.nothing)
+            parts.append((c - component.variant.mean) / component.sd)
         return (*self.fit.assumed, *new), np.concatenate(parts)
 
 
@@ -79,28 +78,28 @@ def linearise(fit: Fit, effects: Sequence[Effect]) -> Linear:
         if effect.name in fit.names:
             continue
         each = [Component(effect, variant, trial, 1.0) for variant in effect.variants for trial in variant.trials]
-        known = [(one, columns[fit.rows]) for one in each if (columns := _columns(fit, one)) is not None]
+        known = [(place, columns[fit.rows]) for place in each if (columns := _columns(fit, place)) is not None]
         if known:
             places = tuple(Place(columns) for _, columns in known)
             sizes = beliefs("specimen.sizes")
             causes.append(Cause(effect.name, places, _log_odds(effect.kind), sizes, effect.kind))
-            components.append(tuple(one for one, _ in known))
+            components.append(tuple(component for component, _ in known))
     return Linear(fit, tuple(causes), tuple(components))
 
 
-def _columns(fit: Fit, one: Component) -> Floats | None:
+def _columns(fit: Fit, component: Component) -> Floats | None:
     """What trials of a cause change (n, m) beside all that the fit has; None where there is no state."""
-    forward, variant = fit.forward, one.variant
+    forward, variant = fit.forward, component.variant
     if variant.added is not None:
-        return variant.added(forward.protocol) @ one.trial.T
+        return variant.added(forward.protocol) @ component.trial.T
     try:
         with np.errstate(all="ignore"):
             actions = forward.actions(fit.assumed, fit.z)
-            each = [forward.stress_of([*actions, variant.act(c, forward)], fit.z) for c in one.trial]
+            each = [forward.stress_of([*actions, variant.act(c, forward)], fit.z) for c in component.trial]
     except CANNOT_BE:
         return None
-    found = np.column_stack(each) - fit.stress[:, None]
-    return found if np.isfinite(found).all() else None
+    columns = np.column_stack(each) - fit.stress[:, None]
+    return columns if np.isfinite(columns).all() else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +129,7 @@ class Sets:
     def __init__(self, effects: Sequence[Effect], base: Fit, listener: Listener) -> None:
         self.effects, self.base, self._listener = tuple(effects), base, listener
         self.by_names: dict[frozenset[str], CauseSet] = {}
-        self._about: dict[int, Linear] = {}
+        self._about: dict[Fit, Linear] = {}
         self._propose(base, 0.0)
         self.by_names[frozenset()] = replace(self.nothing, fit=base, spread=0.0)
         self._search()
@@ -143,14 +142,14 @@ class Sets:
     def ordered(self) -> list[tuple[CauseSet, float]]:
         """Sets with their probabilities, the most probable first."""
         sets = list(self.by_names.values())
-        chances = calibration().probabilities([one.hypothesis for one in sets])
+        chances = calibration().probabilities([candidate.hypothesis for candidate in sets])
         return [(sets[k], float(chances[k])) for k in np.argsort(-chances, kind="stable")]
 
     def about(self, fit: Fit) -> Linear:
         """All other causes, linearised about a fit."""
-        if id(fit) not in self._about:
-            self._about[id(fit)] = linearise(fit, self.effects)
-        return self._about[id(fit)]
+        if fit not in self._about:
+            self._about[fit] = linearise(fit, self.effects)
+        return self._about[fit]
 
     def fitted(self, names: frozenset[str]) -> Fit | None:
         """The fit of a set, made if it was not; None if none stands."""
@@ -161,59 +160,59 @@ class Sets:
                 if fewer is not None:
                     self._propose(fewer, self.by_names[kept].spread)
                     break
-        found = self.by_names.get(names)
-        return None if found is None else found.fit or self._fit(found)
+        candidate = self.by_names.get(names)
+        return None if candidate is None else candidate.fit or self._fit(candidate)
 
     def _search(self) -> None:
         best = frozenset[str]()
         for _ in range(_FITS):
             ordered = self.ordered()
             before = itertools.accumulate((p for _, p in ordered), initial=0.0)
-            likely = (one for (one, _), total in zip(ordered, before, strict=False) if total < _MASS)
-            first = next((one for one in likely if one.fit is None), None)
+            likely = (candidate for (candidate, _), total in zip(ordered, before, strict=False) if total < _MASS)
+            first = next((candidate for candidate in likely if candidate.fit is None), None)
             if first is None:
                 break
             self._fit(first)
-            leading = next(one for one, _ in self.ordered() if one.fit is not None)
+            leading = next(candidate for candidate, _ in self.ordered() if candidate.fit is not None)
             if leading.names != best and leading.fit is not None:
                 best = leading.names
                 self._propose(leading.fit, leading.spread)
 
-    def _fit(self, found: CauseSet) -> Fit | None:
-        hypothesis, linear = found.hypothesis, found.linear
+    def _fit(self, candidate: CauseSet) -> Fit | None:
+        hypothesis, linear = candidate.hypothesis, candidate.linear
         self._listener.stage(f"fit with {' and '.join(hypothesis.causes)}")
         best = hypothesis.best
         made = fit(linear.fit.forward, *linear.start(best), best.scale)
         if made is None:
-            del self.by_names[found.names]
+            del self.by_names[candidate.names]
             return None
         # the best places and sizes have their probability among all of them, as the linear model has it
         weights = sum(float(linear.causes[m.cause].log_weights[m.place, m.size]) for m in best.members)
         spread = hypothesis.log_evidence - best.log_density + weights
         log_evidence = made.log_density + spread
         # sets with more causes sum over the scale of the noise themselves
-        spread -= found.of_scale
+        spread -= candidate.of_scale
         hypothesis = replace(hypothesis, log_evidence=log_evidence)
-        self.by_names[found.names] = replace(found, hypothesis=hypothesis, spread=spread, fit=made)
+        self.by_names[candidate.names] = replace(candidate, hypothesis=hypothesis, spread=spread, fit=made)
         return made
 
     def _propose(self, fit: Fit, spread: float) -> None:
         """Sets with the causes of a fit and others: those that were not fitted take their evidence from here."""
         linear = self.about(fit)
-        kinds = {one.effect.name: one.effect.kind for one in fit.assumed}
-        hypotheses = linear.posterior(0 if kinds else _BEAM).hypotheses
-        nothing = next(one for one in hypotheses if not one.causes)
+        kinds = {component.effect.name: component.effect.kind for component in fit.assumed}
+        hypotheses = linear.posterior(0 if kinds else _BEAM)
+        nothing = next(hypothesis for hypothesis in hypotheses if not hypothesis.causes)
         of_scale = nothing.log_evidence - nothing.best.log_density
-        for one in hypotheses:
-            names = frozenset((*kinds, *one.causes))
+        for hypothesis in hypotheses:
+            names = frozenset((*kinds, *hypothesis.causes))
             known = self.by_names.get(names)
             if len(names) > _CAUSES or (known is not None and known.fit is not None):
                 continue
-            whole = replace(
-                one,
-                causes=(*kinds, *one.causes),
-                kinds=(*kinds.values(), *one.kinds),
-                log_evidence=one.log_evidence + spread,
-                log_prior=one.log_prior + sum(_log_odds(kind) for kind in kinds.values()),
+            joint = replace(
+                hypothesis,
+                causes=(*kinds, *hypothesis.causes),
+                kinds=(*kinds.values(), *hypothesis.kinds),
+                log_evidence=hypothesis.log_evidence + spread,
+                log_prior=hypothesis.log_prior + sum(_log_odds(kind) for kind in kinds.values()),
             )
-            self.by_names[names] = CauseSet(whole, linear, spread, of_scale)
+            self.by_names[names] = CauseSet(joint, linear, spread, of_scale)

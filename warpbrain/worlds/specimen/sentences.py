@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpbrain.inference.beliefs import belief
-from warpbrain.inference.decide import GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
+from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.probability import percent
-from warpbrain.physics.sizes import size_in_words, smallest_in_words
+from warpbrain.physics.sizes import size_in_words
 from warpbrain.physics.words import pascals
 from warpbrain.simulation.specimen import specimen_of
+from warpbrain.worlds.sentences import Words, clause, grounds, verdict_in_words
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.glued_ends import ELEMENTS
 from warpbrain.worlds.specimen.protocol import Protocol
@@ -25,56 +26,26 @@ _VALUES = 6
 
 def sentence_of(diagnosis: SpecimenDiagnosis) -> str:
     """The verdict for people."""
-    return " ".join([_verdict(diagnosis), *diagnosis.doubts])
-
-
-def _verdict(diagnosis: SpecimenDiagnosis) -> str:
-    p, causes = f"p = {diagnosis.p_value:.2g}", diagnosis.decision.causes
-    if diagnosis.verdict == NOTHING:
-        seen = "; ".join(f"{name} {smallest_in_words(name, one)}" for name, one in diagnosis.smallest.items())
-        return (
-            f"No missing physics is detected ({p}). What these tests would have shown: "
-            f"{seen or 'none of those that were looked for'}."
-        )
-    if diagnosis.verdict in (NAMED, NAMED_AND_REST):
-        rest = " Something else is left, which this does not explain." if diagnosis.verdict == NAMED_AND_REST else ""
-        first, *others = map(effect_sentence, diagnosis.named)
-        beside = [f"Beside it: {sentence[0].lower()}{sentence[1:]}" for sentence in others]
-        return f"{' '.join([first, *beside])} {_grounds(diagnosis)}{rest}"
-    if diagnosis.verdict == NOT_PHYSICS:
-        sentences = " ".join(one.sentence for one in diagnosis.ranking if one.name in causes)
-        return f"It is not physics that is missing ({p}). {sentences} That explains the mismatch better."
-    if diagnosis.verdict == UNKNOWN:
-        return (
-            f"Something is missing ({p}) that none of the known mechanisms explains: a smooth change of single tests "
-            "fits better than all of them."
-        )
-    members = [one for one in diagnosis.ranking if one.name in causes and one.name != UNKNOWN]
-    which = "; or ".join(f"{_clause(one)} ({percent(one.probability)})" for one in members)
-    if diagnosis.verdict == GROUP:
-        other = "; or something without a name" if UNKNOWN in causes else ""
-        return f"Something is missing ({p}), and these tests do not tell which of these it is: {which}{other}."
-    perhaps = f" Perhaps: {which}." if members else ""
-    return f"Something is missing ({p}), but these tests cannot say what.{perhaps}"
-
-
-def effect_sentence(one: Ranked) -> str:
-    """What a cause is, how large it was found to be, and in which way it acts."""
-    size = "; ".join([*size_in_words(one.name, one.values)[:_VALUES], *([one.region] if one.region else [])])
-    return f"{one.sentence.rstrip('.')}: {size}." if size else one.sentence
-
-
-def _clause(one: Ranked) -> str:
-    return f"{one.sentence[0].lower()}{one.sentence[1:].rstrip('.')}"
-
-
-def _grounds(diagnosis: SpecimenDiagnosis) -> str:
-    before, after = (pascals(diagnosis.scores[name].heldout or 0.0) for name in ("refitted", "explained"))
-    chances = " and ".join(percent(one.probability) for one in diagnosis.named)
-    probable, it = ("Its probability is", "it") if len(diagnosis.named) == 1 else ("Their probabilities are", "them")
-    return (
-        f"{probable} {chances}; tests that were held out are predicted to {after} with {it}, to {before} without {it}."
+    named, causes, scores = diagnosis.named, diagnosis.decision.causes, diagnosis.scores
+    members = [cause for cause in diagnosis.ranking if cause.name in causes and cause.name != UNKNOWN]
+    errors = [pascals(scores[name].heldout or 0.0) for name in ("explained", "refitted") if name in scores]
+    words = Words(
+        data="these tests",
+        nothing="none of those that were looked for",
+        unnamed="a smooth change of single tests",
+        named=[effect_sentence(cause) for cause in named],
+        grounds=grounds([cause.probability for cause in named], "tests", (errors[0], errors[-1])),
+        members=[(cause.sentence, cause.probability) for cause in members],
+        perhaps=[f"{clause(cause.sentence)} ({percent(cause.probability)})" for cause in members],
     )
+    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.smallest, words)
+    return " ".join([sentence, *diagnosis.doubts])
+
+
+def effect_sentence(cause: Ranked) -> str:
+    """What a cause is, how large it was found to be, and in which way it acts."""
+    size = "; ".join([*size_in_words(cause.name, cause.values)[:_VALUES], *([cause.region] if cause.region else [])])
+    return f"{cause.sentence.rstrip('.')}: {size}." if size else cause.sentence
 
 
 def assumptions_of(fit: Fit, protocol: Protocol, by_test: bool) -> tuple[str, ...]:

@@ -1,0 +1,73 @@
+"""The verdict of a diagnosis in sentences, of a body as of a specimen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN, Decision
+from warpbrain.inference.probability import percent
+from warpbrain.physics.sizes import smallest_in_words
+from warpbrain.physics.words import Smallest
+
+
+@dataclass(frozen=True)
+class Words:
+    """What a verdict is put together from."""
+
+    data: str  # what was recorded: "these data"
+    nothing: str  # what would have been seen, where nothing was looked for
+    unnamed: str  # what fits better than all that has a name
+    named: Sequence[str]  # sentences of what is named
+    grounds: str  # a sentence: why
+    members: Sequence[tuple[str, float]]  # sentence and probability of each cause of the verdict that has a name
+    perhaps: Sequence[str]  # clauses of what may act, where nothing can be said
+    missing: str = "Something is missing"
+    rest: str = ""  # what is known of what has no name: a sentence after a space
+
+
+def verdict_in_words(decision: Decision, p_value: float, smallest: Mapping[str, Smallest], words: Words) -> str:
+    """The verdict for people: whole sentences."""
+    p, verdict, data = f"p = {p_value:.2g}", decision.verdict, words.data
+    if verdict == NOTHING:
+        seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in smallest.items())
+        return f"No missing physics is detected ({p}). What {data} would have shown: {seen or words.nothing}."
+    if verdict in (NAMED, NAMED_AND_REST):
+        first, *others = words.named
+        sentences = [first, *(f"Beside it: {_lower(sentence)}" for sentence in others), words.grounds]
+        rest = f" Something else is left, which this does not explain.{words.rest}"
+        return f"{' '.join(sentences)}{rest if verdict == NAMED_AND_REST else ''}"
+    if verdict == NOT_PHYSICS:
+        sentences = [sentence for sentence, _ in words.members]
+        return f"It is not physics that is missing ({p}). {' '.join(sentences)} That explains the mismatch better."
+    if verdict == UNKNOWN:
+        return (
+            f"Something is missing ({p}) that none of the known mechanisms explains: {words.unnamed} fits better than "
+            f"all of them.{words.rest}"
+        )
+    if verdict == CANNOT_SAY:
+        perhaps = f" Perhaps: {'; or '.join(words.perhaps)}." if words.perhaps else ""
+        return f"{words.missing} ({p}), but {data} cannot say what.{perhaps}"
+    which = "; or ".join(f"{clause(sentence)} ({percent(probability)})" for sentence, probability in words.members)
+    other = "; or something without a name" if UNKNOWN in decision.causes else ""
+    return f"Something is missing ({p}), and {data} do not tell which of these it is: {which}{other}."
+
+
+def grounds(probabilities: Sequence[float], held_out: str, errors: tuple[str, str] | None) -> str:
+    """How probable causes are, and how well what was held out is predicted with them and without, if that is known."""
+    chances = " and ".join(map(percent, probabilities))
+    probable, it = ("Its probability is", "it") if len(probabilities) == 1 else ("Their probabilities are", "them")
+    if errors is None:
+        return f"{probable} {chances}."
+    after, before = errors
+    predicted = f"{held_out} that were held out are predicted to {after} with {it}, to {before} without {it}"
+    return f"{probable} {chances}; {predicted}."
+
+
+def clause(sentence: str) -> str:
+    """A sentence as a clause."""
+    return _lower(sentence).rstrip(".")
+
+
+def _lower(sentence: str) -> str:
+    return f"{sentence[0].lower()}{sentence[1:]}"
