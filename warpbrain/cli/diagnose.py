@@ -116,8 +116,7 @@ _Way = tuple[Callable[..., Any], dict[str, Callable[[Path, Any], None]]]
 
 def _of_a_body() -> _Way:
     from warpbrain.diagnosis.diagnose import Diagnosing
-    from warpbrain.report.diagnosis.files import write_covariance, write_map, write_points
-    from warpbrain.report.state_files import write_diagnosed_state
+    from warpbrain.report.diagnosis.files import write_covariance, write_diagnosed_state, write_map, write_points
 
     return Diagnosing, {
         "map.vtu": write_map,

@@ -151,9 +151,8 @@ def _estimate(
     from warpbrain.estimation.fit import GaussNewtonStep
     from warpbrain.gp.trained import find_model
     from warpbrain.report import estimate_picture
-    from warpbrain.report.estimate import describe_estimate, estimate_lines, write_predictions
+    from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
     from warpbrain.report.files import write_summary
-    from warpbrain.report.state_files import write_estimated_state
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.result_folder import results_in
 

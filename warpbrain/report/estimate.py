@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
@@ -17,7 +18,8 @@ from warpbrain.inference.probability import percent
 from warpbrain.physics.words import tabled
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report.comparison import SHOWN
-from warpbrain.report.files import MILLIMETRES, fingerprints, picked, write_csv
+from warpbrain.report.diagnosis.files import seen
+from warpbrain.report.files import MILLIMETRES, body_file, fingerprints, picked, write_body, write_csv
 from warpbrain.report.summary import machine
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
@@ -380,3 +382,24 @@ def _predicted(one: Prediction, recording: Recording, number: int) -> list[Any]:
         shown = [f"{factor * value:.6g}" for value in np.atleast_1d(values)]
         cells += shown + [""] * (3 - len(shown))
     return cells
+
+
+def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | None = None) -> None:
+    """Write the most probable state of an estimate as VTU with coordinates in mm.
+
+    Point arrays: ``displacement`` [mm] and ``displacement_sd`` of its components [mm]: what is not known of the tissue,
+    to first order about that state. With a map of what is left ``significant`` and ``blind``, too, as in `map.vtu`.
+    """
+    file = file_of_estimate(posterior)
+    if where is not None:
+        file.point_data |= seen(where, posterior.case.remaining[0])
+    write_body(path, file)
+
+
+def file_of_estimate(posterior: Posterior) -> Any:
+    """What `write_estimated_state` writes, as a `meshio.Mesh`."""
+    du, covariance = posterior.best.linearised.du, posterior.covariance
+    variance = np.einsum("pnk,pq,qnk->nk", du, covariance, du)
+    deviation = MILLIMETRES * np.sqrt(np.maximum(variance, 0.0))
+    arrays = {"displacement": MILLIMETRES * posterior.best.point.state.u, "displacement_sd": deviation}
+    return body_file(posterior.case.remaining[0], arrays)
