@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.cli import warp
-from warpbrain.cli.options import WARPED, add_results, add_to, note_case
+from warpbrain.cli.options import WARPED, add_results, add_to, drawn, note_case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -152,6 +152,7 @@ def _estimate(
     from warpbrain.gp.trained import find_model
     from warpbrain.report import estimate_picture
     from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
+    from warpbrain.report.estimate_page import write_estimate_page
     from warpbrain.report.files import write_summary
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.result_folder import results_in
@@ -189,27 +190,9 @@ def _estimate(
         write_summary(out / "estimate.json", described)
         record.files += ["estimate.json", "predictions.csv", "state.vtu"]
         record.files += ["posterior.png", "predicted.png", "residuals.png"]
-        record.files += _illustrate(out, posterior, described, say)
+        record.files += drawn(write_estimate_page(out, described, posterior), say)
         if images is not None:
             record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
-
-
-def _illustrate(out: Path, posterior: Posterior, said: dict[str, Any], say: Callable[..., None]) -> list[str]:
-    """Write the picture of the estimated state and the page; returns the names of the files."""
-    from warpbrain.report.estimate_page import judged_of, moved_of, write_estimate_page
-    from warpbrain.report.picture import draw
-    from warpbrain.report.state_files import read_state
-
-    case, state = posterior.case, read_state(out / "state.vtu")
-    names = {label: tissue.name for label, tissue in case.tissues.items()}
-    lines = ["the most probable state of the estimate", *judged_of(said).sentences]
-    path = out / "deformation.png"
-    pictures = draw(path, case.mesh, state.mesh, state.u, names, moved_of(posterior), case.title, lines)
-    write_estimate_page(out / "report.html", said, posterior, state, pictures)
-    if isinstance(pictures, str):
-        say("", f"deformation.png is not drawn: {pictures}", sep="\n")
-        return ["report.html"]
-    return ["deformation.png", "report.html"]
 
 
 def _what_else(

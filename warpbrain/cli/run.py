@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import argparse
 import math
-import textwrap
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import warp
+from warpbrain.cli import run_specimen, warp
 from warpbrain.cli.options import (
     WARPED,
     add_results,
     add_to,
-    note_case,
+    drawn,
+    note_device,
     require_poisson,
     require_positive,
     require_tolerance,
@@ -35,10 +34,6 @@ if TYPE_CHECKING:
     from warpbrain.simulation.result import Result
     from warpbrain.simulation.system import System
     from warpbrain.terminal.record import Record
-
-
-#: Letters of a line of a picture's title.
-_LINE = 150
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -119,6 +114,7 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report import summary as tables
     from warpbrain.report.comparison import comparison_lines, describe_comparisons, mesh_error_lines, write_comparisons
     from warpbrain.report.files import write_result, write_summary
+    from warpbrain.report.run_page import write_run_page
     from warpbrain.report.summary import describe_prior, prior_lines
     from warpbrain.simulation.courses import Course
     from warpbrain.simulation.run import Running
@@ -134,8 +130,6 @@ def _run(options: argparse.Namespace) -> None:
     out = choose_folder(options.out, f"warpbrain-{safe_name(case.name)}-{options.tissue}", options.overwrite)
     prior = None if found is None else describe_prior(found)
     if case.specimen is not None:
-        from warpbrain.cli import run_specimen
-
         run_specimen.run(options, case, out, prior)
         return
     needed_by = () if options.mesh_error is None else ("--mesh-error",)
@@ -152,7 +146,7 @@ def _run(options: argparse.Namespace) -> None:
     chosen = "--mesh-error elements is about them" if about_elements else running.chosen
     described = tables.describe_case(case, model, chosen)
     say(*tables.case_lines(described), *prior_lines(prior), sep="\n")
-    note_device(options, case, system)
+    note_device(record, case, system, options.precision)
 
     with Progress("kernels", options.quiet) as loading:
         loading.show(0.0, "the first run on a machine compiles them")
@@ -176,7 +170,7 @@ def _run(options: argparse.Namespace) -> None:
     say("", *tables.timing_lines(seconds, counts), sep="\n")
 
     summary = {
-        **head_of_summary(options, case, described, prior, system),
+        **tables.describe_opening(case, described, prior, system, options.precision),
         "solution": outcome,
         "result": said,
         "recordings": compared,
@@ -188,7 +182,7 @@ def _run(options: argparse.Namespace) -> None:
     }
     with results_in(out, record, options.overwrite):
         write_result(out / "result.vtu", result, None if estimated is None else estimated.u)
-        record.files += ["result.vtu", "summary.json", *_illustrate(out, case, result, observed, summary, say)]
+        record.files += ["result.vtu", "summary.json", *drawn(write_run_page(out, summary, done), say)]
         if observed.comparisons:
             write_comparisons(out / "comparison.csv", case, observed)
             record.files.append("comparison.csv")
@@ -196,27 +190,6 @@ def _run(options: argparse.Namespace) -> None:
         write_summary(out / "summary.json", summary)
         if asked is not None:
             record.files += warp.warp(out / "result.vtu", out, asked, say, options.quiet)
-
-
-def note_device(options: argparse.Namespace, case: Case, system: System) -> None:
-    """Say in the log and in print where is computed."""
-    where = f"{system.device.name} ({system.device.alias}), {options.precision} precision"
-    note_case(options.record, case, where)
-    options.record.say(f"  device    {where}")
-
-
-def head_of_summary(
-    options: argparse.Namespace, case: Case, described: Mapping[str, Any], prior: dict[str, Any] | None, system: System
-) -> dict[str, Any]:
-    """How every summary of a run begins: what was computed, of which files, and where."""
-    from warpbrain.report.files import fingerprints
-
-    return {
-        "case": described,
-        "inputs_sha256": fingerprints(case),
-        **({} if prior is None else {"prior": prior}),
-        "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
-    }
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -352,33 +325,3 @@ def _mesh_error(
         return None, {"unknown": str(error)}
     without = observe_without(case, result, found, outcome.get("time_s"))
     return found, describe_mesh_error(found, system.model.elements, observed, without)
-
-
-def _illustrate(
-    out: Path, case: Case, result: Result, observed: Observed, summary: dict[str, Any], say: Callable[..., None]
-) -> list[str]:
-    """Write what people look at; returns the names of the files."""
-    from warpbrain.report.picture import Moved, draw
-    from warpbrain.report.run_page import write_run_page
-
-    moved = Moved.of(case.recordings, observed.comparisons)
-    names = {label: tissue.name for label, tissue in case.tissues.items()}
-    left_out = [line for text in summary["case"]["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
-    lines = [_subtitle(summary["case"], summary["solution"]), *summary["recordings"]["in_words"], *left_out]
-    pictures = draw(out / "deformation.png", case.mesh, result.mesh, result.u, names, moved, case.title, lines)
-    write_run_page(out / "report.html", summary, result, case.mesh, moved, pictures)
-    if isinstance(pictures, str):
-        say("", f"deformation.png is not drawn: {pictures}", sep="\n")
-        return ["report.html"]
-    return ["deformation.png", "report.html"]
-
-
-def _subtitle(case: Mapping[str, Any], outcome: Mapping[str, Any]) -> str:
-    laws = ", ".join(f"{one['name']} {one['law']} {one['shear_modulus_Pa']:g} Pa" for one in case["tissues"].values())
-    state = outcome["kind"]
-    if state == "motion":
-        state = f"after {1000 * outcome['time_s']:.0f} ms"
-    elif state == "slow change":
-        state = f"after {outcome['time_s']:g} s"
-    stand_in = "stand-in, not the patient's images; " if case["origin"] == "stand-in" else ""
-    return f"{stand_in}{laws}; {state}"

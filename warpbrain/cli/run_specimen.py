@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli.run import head_of_summary, note_device
+from warpbrain.cli.options import note_device
 from warpbrain.errors import InputError
 from warpbrain.terminal.progress import Progress
 
@@ -25,7 +25,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     from warpbrain.report.files import write_summary
     from warpbrain.report.run_page import write_specimen_page
     from warpbrain.report.specimen import write_tests_picture
-    from warpbrain.report.summary import machine, prior_lines, timing_lines
+    from warpbrain.report.summary import describe_opening, machine, prior_lines, timing_lines
     from warpbrain.simulation.observation import Observed
     from warpbrain.simulation.specimen_run import SpecimenRunning
     from warpbrain.terminal.result_folder import results_in
@@ -38,7 +38,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     in_time = any(rig.follows_time(recording) for recording in running.tests)
     described = text.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
     say(*text.specimen_lines(described), *prior_lines(prior), sep="\n")
-    note_device(options, case, system)
+    note_device(record, case, system, options.precision)
 
     seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}
     with Progress("tests", options.quiet) as progress:
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
         f"nu = {material.poisson:g}; {acting}"
     )
     summary = {
-        **head_of_summary(options, case, described, prior, system),
+        **describe_opening(case, described, prior, system, options.precision),
         "solution": {"kind": "tests", "tolerance": rig.solver.tolerance, "tests": text.describe_tests(done)},
         "recordings": describe_comparisons(Observed(tuple(test.comparison for test in done), ())),
         "seconds_by_phase": seconds,

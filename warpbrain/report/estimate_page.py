@@ -21,9 +21,9 @@ from warpbrain.report.estimate import checks, correlated, recorded_points
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
 from warpbrain.report.page import Top, document, sections_of, write_document
 from warpbrain.report.page.figures import inlined
-from warpbrain.report.picture import Moved, Pictures
+from warpbrain.report.picture import Moved, Pictures, draw
 from warpbrain.report.run_page import BADGES
-from warpbrain.report.state_files import SavedState
+from warpbrain.report.state_files import read_state
 from warpbrain.report.summary import left_out
 from warpbrain.simulation.of_case import model_of
 
@@ -54,16 +54,16 @@ def judged_of(summary: Mapping[str, Any]) -> Explained:
     return explained(entries, "this estimate")
 
 
-def write_estimate_page(
-    path: Path, summary: Mapping[str, Any], posterior: Posterior, state: SavedState, pictures: Pictures | str
-) -> None:
-    """Write the page.
+def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Posterior) -> Pictures | str:
+    """Write `deformation.png` and `report.html` beside `state.vtu`; `summary` is what `estimate.json` holds.
 
-    `summary` is what `estimate.json` holds, `state` the most probable one, with what is not known of it; without
-    pictures it is said why there are none.
+    Returns the pictures, or why there are none.
     """
     case, judged, nothing = summary["case"], judged_of(summary), summary["nothing_else"]
-    whole = posterior.case.mesh
+    whole, state, moved = posterior.case.mesh, read_state(folder / "state.vtu"), moved_of(posterior)
+    titles = {label: tissue.name for label, tissue in posterior.case.tissues.items()}
+    lines = ["the most probable state of the estimate", *judged.sentences]
+    pictures = draw(folder / "deformation.png", whole, state.mesh, state.u, titles, moved, case["title"], lines)
     places = views.places(whole)
     names = ", ".join(_name(one) for one in summary["parameters"])
     agreement = Markup()
@@ -88,7 +88,7 @@ def write_estimate_page(
         recorded=[_recorded(one) for one in summary["predictions"]],
         pictures=before_and_after(pictures),
         known=known_displacement(state, whole, places, _KNOWN),
-        view=body_view(state.mesh, state.u, fields_of(state), moved_of(posterior), places),
+        view=body_view(state.mesh, state.u, fields_of(state), moved, places),
         left_out=left_out(model_of(posterior.case)),
         seconds=[[name, f"{value:.1f}"] for name, value in summary["seconds"].items()],
         files=[[name, Markup("<code>{}</code>").format(value)] for name, value in summary["inputs_sha256"].items()],
@@ -104,7 +104,8 @@ def write_estimate_page(
         facts.append(("probability that nothing else acts", percent(nothing["probability"])))
     sentences = [*summary["identifiability"]["sentences"], *judged.sentences]
     top = Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts)
-    write_document(path, document(f"{case['name']}: tissue of {case['title']}", top, sections))
+    write_document(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))
+    return pictures
 
 
 def _name(one: Mapping[str, Any]) -> str:

@@ -5,11 +5,11 @@ Of tests of a specimen it is their curves in the place of a body. The words are 
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpbrain.mesh import TetMesh
 from warpbrain.physics.words import tabled
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view
@@ -26,13 +26,15 @@ from warpbrain.report.comparison import (
 from warpbrain.report.page import Top, document, sections_of, write_document
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
-from warpbrain.report.picture import Moved, Pictures
+from warpbrain.report.picture import Moved, Pictures, draw
 from warpbrain.report.specimen import tests_figure
 from warpbrain.report.summary import SET_TITLES
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, QUIET, VERMILLION
-from warpbrain.simulation.result import Result
+from warpbrain.simulation.run import Run
 from warpbrain.simulation.specimen_run import Tested
 
+#: Letters of a line of a picture's title.
+_LINE = 150
 #: Ground and letters of what stands on top.
 BADGES = {
     NEARER: (GREEN, "#ffffff"),
@@ -43,16 +45,18 @@ BADGES = {
 }
 
 
-def write_run_page(
-    path: Path, summary: Mapping[str, Any], result: Result, whole: TetMesh, moved: Moved, pictures: Pictures | str
-) -> None:
-    """Write the page of a run.
+def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictures | str:
+    """Write `deformation.png` and `report.html` of a run; `summary` is what `summary.json` holds.
 
-    `summary` is what `summary.json` holds, `whole` the anatomy before anything was resected; without pictures it is
-    said why there are none.
+    Returns the pictures, or why there are none.
     """
     case, described, solution = summary["case"], summary["result"], summary["solution"]
-    judged = explained_of(summary["recordings"]["compared"])
+    judged, result, whole = explained_of(summary["recordings"]["compared"]), run.result, run.case.mesh
+    moved = Moved.of(run.case.recordings, run.observed.comparisons)
+    names = {label: tissue.name for label, tissue in run.case.tissues.items()}
+    left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
+    lines = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
+    pictures = draw(folder / "deformation.png", whole, result.mesh, result.u, names, moved, run.case.title, lines)
     fields = [
         Field(
             name.replace("_", " "), f"{name.replace('_', ' ')} [Pa]", values, float(values.min()), float(values.max())
@@ -72,7 +76,7 @@ def write_run_page(
         facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
     sentences = judged.sentences or ["Nothing was recorded of this case that the simulation could be compared with."]
     _write(
-        path, summary, Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts),
+        folder / "report.html", summary, Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts),
         pictures=before_and_after(pictures),
         view=body_view(result.mesh, result.u, fields, moved, places),
         displacements=[
@@ -83,6 +87,18 @@ def write_run_page(
         mesh_error=mesh_error_lines(summary["mesh_error"]) if "mesh_error" in summary else [],
         solution=solved,
     )  # fmt: skip
+    return pictures
+
+
+def _subtitle(case: Mapping[str, Any], outcome: Mapping[str, Any]) -> str:
+    laws = ", ".join(f"{one['name']} {one['law']} {one['shear_modulus_Pa']:g} Pa" for one in case["tissues"].values())
+    state = outcome["kind"]
+    if state == "motion":
+        state = f"after {1000 * outcome['time_s']:.0f} ms"
+    elif state == "slow change":
+        state = f"after {outcome['time_s']:g} s"
+    stand_in = "stand-in, not the patient's images; " if case["origin"] == "stand-in" else ""
+    return f"{stand_in}{laws}; {state}"
 
 
 def write_specimen_page(path: Path, summary: Mapping[str, Any], tests: Sequence[Tested]) -> None:

@@ -12,13 +12,14 @@ from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.checking import NOTHING_ACTS
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import tabled
-from warpbrain.report.files import MILLIMETRES, picked
+from warpbrain.report.files import MILLIMETRES, fingerprints, picked
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
 
 if TYPE_CHECKING:
     from warpbrain.cases.drawn import FromPrior
+    from warpbrain.simulation.system import System
 
 #: Said wherever a stand-in is met.
 STAND_IN = "a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
@@ -83,6 +84,18 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
         "assumptions": list(case.assumptions),
         "left_out": left_out(model),
         "remarks": [*case.remarks, *([NOTHING_ACTS] if case.nothing_acts else [])],
+    }
+
+
+def describe_opening(
+    case: Case, described: Mapping[str, Any], prior: Mapping[str, Any] | None, system: System, precision: str
+) -> dict[str, Any]:
+    """How every summary of a run begins: what was computed, of which files, and where."""
+    return {
+        "case": described,
+        "inputs_sha256": fingerprints(case),
+        **({} if prior is None else {"prior": prior}),
+        "device": {"name": system.device.name, "alias": system.device.alias, "precision": precision},
     }
 
 
