@@ -94,7 +94,7 @@ def _run(options: argparse.Namespace) -> None:
         say(case.title)
         found = diagnosing.run()
     said = describe(found, asked, device)
-    say("", *diagnosis_lines(said), sep="\n")
+    say(*diagnosis_lines(said), sep="\n")
     with results_in(out, record, options.overwrite):
         for name, write in tables.items():
             write(out / name, found)

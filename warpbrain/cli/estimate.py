@@ -179,8 +179,8 @@ def _estimate(
         averaged, where = _what_else(posterior, options.device, on_stage)
     elif options.causes is None:
         say("", f"what else may act is left out on more than {_LARGEST} nodes; --causes computes it", sep="\n")
-    say("", *estimate_lines(posterior, averaged), sep="\n")
     described = describe_estimate(posterior, find_device(options.device).alias, averaged)
+    say(*estimate_lines(described), sep="\n")
     with results_in(out, record, options.overwrite):
         write_predictions(out / "predictions.csv", posterior)
         write_estimated_state(out / "state.vtu", posterior, where)

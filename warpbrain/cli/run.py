@@ -22,7 +22,7 @@ from warpbrain.cli.options import (
     require_tolerance,
     require_whole,
 )
-from warpbrain.cli.run_progress import ending_lines, watching
+from warpbrain.cli.run_progress import watching
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -112,10 +112,11 @@ def _run(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import safe_name
     from warpbrain.report import summary as tables
-    from warpbrain.report.comparison import comparison_lines, describe_comparisons, mesh_error_lines, write_comparisons
+    from warpbrain.report.comparison import describe_comparisons, recorded_rows, write_comparisons
     from warpbrain.report.files import write_result, write_summary
+    from warpbrain.report.page import lines
     from warpbrain.report.run_page import write_run_page
-    from warpbrain.report.summary import describe_prior, prior_lines
+    from warpbrain.report.summary import describe_prior
     from warpbrain.simulation.courses import Course
     from warpbrain.simulation.run import Running
     from warpbrain.simulation.system import begin_loading_kernels, find_device, find_precision
@@ -145,7 +146,7 @@ def _run(options: argparse.Namespace) -> None:
     model, system = running.model, running.system
     chosen = "--mesh-error elements is about them" if about_elements else running.chosen
     described = tables.describe_case(case, model, chosen)
-    say(*tables.case_lines(described), *prior_lines(prior), sep="\n")
+    say(*lines("run.txt", "case", described, prior, tables.STAND_IN), sep="\n")
     note_device(record, case, system, options.precision)
 
     with Progress("kernels", options.quiet) as loading:
@@ -153,7 +154,7 @@ def _run(options: argparse.Namespace) -> None:
         loaded = system.load_kernels()
     with watching(options, say) as watched:
         done = running.run(watched)
-    for line in ending_lines(done.followed.solution):
+    for line in lines("run.txt", "ending", done.followed.solution):
         say(line)
     outcome, counts = done.followed.solution, done.followed.calls
     first_step = done.followed.begun - start
@@ -161,13 +162,13 @@ def _run(options: argparse.Namespace) -> None:
     result, observed = done.result, done.observed
     said = tables.describe_result(result)
     compared = describe_comparisons(observed)
-    say("", *tables.displacement_lines(said), sep="\n")
-    if case.recordings:
-        say("", *comparison_lines(compared, options.legacy_rmse), sep="\n")
+    say(*lines("run.txt", "displacement", said, tables.displacement_rows(said)), sep="\n")
+    for line in lines("run.txt", "recordings", compared, recorded_rows(compared["compared"]), options.legacy_rmse):
+        say(line)
     estimated, doubt = _mesh_error(options, case, system, result, observed, outcome)
     if doubt is not None:
-        say("", *mesh_error_lines(doubt), sep="\n")
-    say("", *tables.timing_lines(seconds, counts), sep="\n")
+        say("", *lines("run.txt", "mesh_error", doubt), sep="\n")
+    say(*lines("run.txt", "times", seconds, counts), sep="\n")
 
     summary = {
         **tables.describe_opening(case, described, prior, system, options.precision),

@@ -23,9 +23,10 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     from warpbrain.report import specimen as text
     from warpbrain.report.comparison import describe_comparisons
     from warpbrain.report.files import write_summary
+    from warpbrain.report.page import lines
     from warpbrain.report.run_page import write_specimen_page
     from warpbrain.report.specimen import write_tests_picture
-    from warpbrain.report.summary import describe_opening, machine, prior_lines, timing_lines
+    from warpbrain.report.summary import describe_opening, machine
     from warpbrain.simulation.observation import Observed
     from warpbrain.simulation.specimen_run import SpecimenRunning
     from warpbrain.terminal.result_folder import results_in
@@ -37,15 +38,15 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     system = rig.system
     in_time = any(rig.follows_time(recording) for recording in running.tests)
     described = text.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
-    say(*text.specimen_lines(described), *prior_lines(prior), sep="\n")
+    say(*lines("run.txt", "specimen", described, prior), sep="\n")
     note_device(record, case, system, options.precision)
 
     seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}
     with Progress("tests", options.quiet) as progress:
         done = running.run(progress.show).tests
     seconds |= rig.solver.clock.seconds
-    say("", *text.tested_lines(done), sep="\n")
-    say("", *timing_lines(seconds, rig.solver.clock.counts), sep="\n")
+    say(*lines("run.txt", "tests", text.test_rows(done)), sep="\n")
+    say(*lines("run.txt", "times", seconds, rig.solver.clock.counts), sep="\n")
 
     [material] = system.model.materials.values()
     acting = ", ".join(mechanism.kind for mechanism in system.model.mechanisms) or "elastic"

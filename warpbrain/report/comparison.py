@@ -71,30 +71,29 @@ def _describe(comparison: Comparison) -> dict[str, Any]:
     return described
 
 
-def comparison_lines(summary: Mapping[str, Any], legacy: bool) -> list[str]:
-    """The table of errors, as printed."""
-    lines = []
-    if summary["compared"]:
-        more = "   legacy before    after [sqrt(mm)]" if legacy else ""
-        lines.append(f"RMSE at recordings       count   before    after    noise{more}")
-    for entry in summary["compared"]:
-        noise, role = entry["noise_root_mean_square"], "   check" if entry["role"] == "check" else ""
-        ways = [(entry["name"], entry["count"], "before", "after", "" if noise is None else tabled(noise))]
+def recorded_rows(compared: Sequence[Mapping[str, Any]]) -> list[list[Any]]:
+    """The table of errors: recording, rows, root mean square with nothing moved and here, 95th percentile and largest
+    here, what noise alone leaves, unit, whether it is only checked, and the paper's own error before and after.
+
+    Of a surface there is a second row, from the mesh to what was recorded.
+    """
+    rows = []
+    for entry in compared:
+        noise, unit = entry["noise_root_mean_square"], entry["unit"]
+        left = "" if noise is None else error_text(noise, unit)
+        ways = [(entry["name"], entry["count"], "", left)]
         if "mesh_to_recording_before" in entry:
             ways = [
-                (f"{entry['name']} to mesh", *ways[0][1:]),
-                (f"mesh to {entry['name']}", "", "mesh_to_recording_before", "mesh_to_recording_after", ""),
+                (f"{entry['name']} to mesh", entry["count"], "", left),
+                (f"mesh to {entry['name']}", "", "mesh_to_recording_", ""),
             ]
-        for name, count, before, after, left in ways:
-            errors = (entry[before]["root_mean_square"], entry[after]["root_mean_square"])
-            line = f"  {name:<20} {count:>7} {tabled(errors[0]):>8} {tabled(errors[1]):>8} {left:>8} {entry['unit']}"
-            if legacy and "legacy_sqrt_mm" in entry[before]:
-                line += f" {entry[before]['legacy_sqrt_mm']:>13.3f} {entry[after]['legacy_sqrt_mm']:>8.3f}"
-            lines.append(line + role)
-    if summary["compared"]:
-        lines.append("  before: nothing moved; after: this simulation; noise: what the stated noise alone would leave")
-        lines += [f"  {sentence}" for sentence in summary["in_words"]]
-    return lines + [f"  not compared: {reason}" for reason in summary["not_compared"]]
+        for name, count, way, left in ways:
+            before, after = entry[f"{way}before"], entry[f"{way}after"]
+            errors = (before["root_mean_square"], *(after[k] for k in ("root_mean_square", "percentile_95", "largest")))
+            legacy = (one.get("legacy_sqrt_mm") for one in (before, after))
+            check = "check" if entry["role"] == "check" else ""
+            rows.append([name, count, *(error_text(value, unit) for value in errors), left, unit, check, *legacy])
+    return rows
 
 
 def write_comparisons(path: Path, case: Case, observed: Observed) -> None:
@@ -233,30 +232,3 @@ def _sizes(vectors: Floats, factor: float) -> dict[str, float]:
     lengths = factor * np.linalg.norm(vectors, axis=1)
     high = float(np.percentile(lengths, 95.0))
     return {"median": float(np.median(lengths)), "percentile_95": high, "largest": float(lengths.max())}
-
-
-def mesh_error_lines(summary: Mapping[str, Any]) -> list[str]:
-    """The estimate, as printed."""
-    if "unknown" in summary:
-        return [f"error of the mesh: not known: {summary['unknown']}"]
-
-    def row(name: str, sizes: Mapping[str, float]) -> str:
-        columns = (tabled(sizes[key]) for key in ("median", "percentile_95", "largest"))
-        return f"  {name:<24} {' '.join(f'{column:>8}' for column in columns)}"
-
-    titles = {"all nodes": "displacement_mm", "locking": "locking_mm", "element size": "element_size_mm"}
-    lines = ["error of the mesh, estimated  median     95 %      max"]
-    lines += [f"{row(title, summary[key])} mm" for title, key in titles.items() if summary[key] is not None]
-    for entry in summary["recordings"]:
-        lines.append(
-            f"{row(entry['name'], entry)} {entry['unit']}; RMSE {tabled(entry['root_mean_square_after'])}, "
-            f"without it {tabled(entry['root_mean_square_without_it'])}"
-        )
-    share = summary["locking_share"]
-    if share is not None and share > 1.0:
-        lines.append(
-            "  elements that do not lock move too far on this mesh: all of it may be locking, but not what they say"
-        )
-    elif share is not None and not math.isnan(share):
-        lines.append(f"  {100.0 * share:.0f} % of it is likely to be locking, the rest the size of elements")
-    return [*lines, f"  {summary['how']}"]

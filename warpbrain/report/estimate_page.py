@@ -16,8 +16,16 @@ from warpbrain.estimation.posterior import Posterior
 from warpbrain.inference.probability import percent
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view, fields_of, known_displacement
-from warpbrain.report.comparison import Explained, error_text, explained
-from warpbrain.report.estimate import checks, correlated, recorded_points
+from warpbrain.report.comparison import Explained, explained
+from warpbrain.report.estimate import (
+    averaged_row,
+    checks,
+    correlated,
+    interval_of,
+    parameter_row,
+    prediction_row,
+    recorded_points,
+)
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
 from warpbrain.report.page import Top, document, sections_of, write_document
 from warpbrain.report.page.figures import inlined
@@ -75,17 +83,18 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     causes = [] if nothing is None else [one for one in nothing["causes"] if one["probability"] >= _LIKELY]
     sections = sections_of(
         "estimate.html", summary=summary, agreement=agreement,
-        tissue=[_parameter(one) for one in summary["parameters"]],
-        tied=correlated(posterior), checks=checks(posterior),
+        tissue=[parameter_row(one) for one in summary["parameters"]],
+        tied=correlated(summary), checks=checks(summary),
         densities=inlined(
             lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
             "Each parameter before (dashed, filled) and after (line); dotted: the ends of its 95 % interval.",
         ),
         causes=[[one["name"], percent(one["probability"])] for one in causes],
         averaged=[] if nothing is None else [
-            [_name(one), f"{one['middle']:.4g}", _interval(one), _unit(one)] for one in nothing["tissue"]
+            [f"{tissue}, {name}", middle, interval, unit]
+            for tissue, name, middle, _, interval, unit in map(averaged_row, nothing["tissue"])
         ],
-        recorded=[_recorded(one) for one in summary["predictions"]],
+        recorded=[prediction_row(one) for one in summary["predictions"]],
         pictures=before_and_after(pictures),
         known=known_displacement(state, whole, places, _KNOWN),
         view=body_view(state.mesh, state.u, fields_of(state), moved, places),
@@ -94,7 +103,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
         files=[[name, Markup("<code>{}</code>").format(value)] for name, value in summary["inputs_sha256"].items()],
     )  # fmt: skip
     facts = [
-        (_name(one), f"{one['estimate']:.4g} Pa ({_interval(one)})")
+        (_name(one), f"{one['estimate']:.4g} Pa ({interval_of(one)})")
         for one in summary["parameters"]
         if one["unit"] == "Pa"
     ]
@@ -110,32 +119,3 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
 
 def _name(one: Mapping[str, Any]) -> str:
     return f"{one['tissue']}, {one['name']}"
-
-
-def _interval(one: Mapping[str, Any]) -> str:
-    low, high = one["interval_95"]
-    return f"{low:.4g} to {high:.4g}"
-
-
-def _unit(one: Mapping[str, Any]) -> str:
-    return "" if one["unit"] == "1" else str(one["unit"])
-
-
-def _parameter(one: Mapping[str, Any]) -> list[str]:
-    estimate, deviation = f"{one['estimate']:.4g}", f"{one['standard_deviation']:.3g}"
-    gone = f"{100.0 * one['shrinkage']:.0f} %"
-    return [one["tissue"], one["name"], estimate, deviation, _interval(one), _interval(one["prior"]), gone, _unit(one)]
-
-
-def _recorded(one: Mapping[str, Any]) -> list[Any]:
-    unit, noise, cover = one["unit"], one["noise_root_mean_square"], one["coverage"] or {}
-    return [
-        one["name"],
-        one["count"],
-        *(error_text(one[f"root_mean_square_{which}"], unit) for which in ("before", "after", "of_run")),
-        "" if noise is None else error_text(noise, unit),
-        *(f"{100.0 * cover[key]:.0f} %" if key in cover else "" for key in ("50 %", "95 %")),
-        len(one["gross_errors"]),
-        unit,
-        "check" if one["role"] == "check" else "",
-    ]

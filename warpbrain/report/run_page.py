@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpbrain.physics.words import tabled
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view
 from warpbrain.report.comparison import (
@@ -19,16 +18,15 @@ from warpbrain.report.comparison import (
     NO_NEARER,
     UNKNOWN,
     WORSE,
-    error_text,
     explained_of,
-    mesh_error_lines,
+    recorded_rows,
 )
-from warpbrain.report.page import Top, document, sections_of, write_document
+from warpbrain.report.page import Top, document, lines, sections_of, write_document
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
 from warpbrain.report.picture import Moved, Pictures, draw
 from warpbrain.report.specimen import tests_figure
-from warpbrain.report.summary import SET_TITLES
+from warpbrain.report.summary import displacement_rows
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, QUIET, VERMILLION
 from warpbrain.simulation.run import Run
 from warpbrain.simulation.specimen_run import Tested
@@ -55,8 +53,8 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     moved = Moved.of(run.case.recordings, run.observed.comparisons)
     names = {label: tissue.name for label, tissue in run.case.tissues.items()}
     left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
-    lines = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
-    pictures = draw(folder / "deformation.png", whole, result.mesh, result.u, names, moved, run.case.title, lines)
+    subtitles = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
+    pictures = draw(folder / "deformation.png", whole, result.mesh, result.u, names, moved, run.case.title, subtitles)
     fields = [
         Field(
             name.replace("_", " "), f"{name.replace('_', ' ')} [Pa]", values, float(values.min()), float(values.max())
@@ -79,12 +77,8 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
         folder / "report.html", summary, Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts),
         pictures=before_and_after(pictures),
         view=body_view(result.mesh, result.u, fields, moved, places),
-        displacements=[
-            [SET_TITLES.get(name, name), s["nodes"]]
-            + [tabled(s[key]) for key in ("mean", "root_mean_square", "percentile_95", "largest")]
-            for name, s in described["displacement_mm"].items()
-        ],
-        mesh_error=mesh_error_lines(summary["mesh_error"]) if "mesh_error" in summary else [],
+        displacements=displacement_rows(described),
+        mesh_error=lines("run.txt", "mesh_error", summary["mesh_error"]) if "mesh_error" in summary else [],
         solution=solved,
     )  # fmt: skip
     return pictures
@@ -121,7 +115,7 @@ def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> N
     nothing = {"tests": "", "pictures": "", "view": "", "displacements": [], "mesh_error": [], "solution": []}
     sections = sections_of(
         "run.html", summary=summary, **{**nothing, **values},
-        recorded=[_recorded(one) for one in summary["recordings"]["compared"]],
+        recorded=[row[:9] for row in recorded_rows(summary["recordings"]["compared"])],
         tissues=[
             [label, one["name"], f"{one['law']} ({one['formulation']})", f"{one['shear_modulus_Pa']:.4g}"]
             for label, one in case["tissues"].items()
@@ -129,16 +123,3 @@ def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> N
         seconds=[[name, f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()],
     )  # fmt: skip
     write_document(path, document(f"{case['name']}: {case['title']}", top, sections))
-
-
-def _recorded(one: Mapping[str, Any]) -> list[Any]:
-    noise, after = one["noise_root_mean_square"], one["after"]
-    errors = (
-        one["before"]["root_mean_square"],
-        *(after[key] for key in ("root_mean_square", "percentile_95", "largest")),
-    )
-    return [
-        *(one["name"], one["count"], *(error_text(value, one["unit"]) for value in errors)),
-        *("" if noise is None else error_text(noise, one["unit"]), one["unit"]),
-        "check" if one["role"] == "check" else "",
-    ]

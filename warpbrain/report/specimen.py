@@ -6,7 +6,7 @@ The picture has one panel a test: over what was imposed, or over time, if the st
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES, picked, write_csv
-from warpbrain.report.summary import describe_case, elements_lines, sentence_lines, tissue_lines
+from warpbrain.report.summary import describe_case
 from warpbrain.report.views import BLACK, BLUE, VERMILLION
 from warpbrain.simulation.locking import largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model
@@ -84,27 +84,6 @@ def describe_specimen(
     }
 
 
-def specimen_lines(summary: Mapping[str, Any]) -> list[str]:
-    """The specimen and its assumptions, as printed."""
-    specimen = summary["specimen"]
-    lines = [
-        summary["title"],
-        f"  specimen  {_size(specimen)}, {summary['volume_cm3']:.3g} cm3; ends {specimen['grips']}",
-        f"  mesh      {summary['nodes']} nodes, {summary['tetrahedra']} tetrahedra"
-        if specimen["grips"] == "glued"
-        else "  mesh      one element: the state is homogeneous",
-        *(elements_lines(summary) if specimen["grips"] == "glued" else []),
-    ]
-    return lines + tissue_lines(summary) + sentence_lines(summary)
-
-
-def _size(specimen: Mapping[str, Any]) -> str:
-    x, y, z = specimen["size_mm"]
-    if specimen["shape"] == "cylinder":
-        return f"cylinder, radius {x / 2.0:.4g} mm, height {z:.4g} mm"
-    return f"block, {x:.4g} x {y:.4g} x {z:.4g} mm"
-
-
 def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
     """The computed curve of each test, with units."""
     described = []
@@ -127,26 +106,20 @@ def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
     return described
 
 
-def tested_lines(tests: Sequence[Tested]) -> list[str]:
-    """The table of tests, as printed."""
-    lines = [
-        "test                  mode       rows  role   RMSE before      after  unit       R2  states  Newton   min J"
-    ]
+def test_rows(tests: Sequence[Tested]) -> list[dict[str, Any]]:
+    """Cells of the table of tests: name, mode, rows, role, root mean square before and after with its unit, R2, states,
+    Newton iterations and least volume ratio; and in how many iterations the tangent was indefinite."""
+    rows = []
     for test in tests:
         recording, result, compared = test.recording, test.result, test.comparison
         scale, unit = SHOWN[recording.answer[0]]
-        before, after = (scale * error.root_mean_square for error in (compared.before, compared.after))
-        lines.append(
-            f"  {recording.name:<19} {recording.mode:<8} {compared.count:>6}  {recording.role:<5} "
-            f"{before:>12.4g} {after:>10.4g}  {unit:<5} "
-            f"{result.r_squared:>7.3f} {len(result.imposed):>7} {result.newton.sum():>7} {result.min_J.min():>7.3f}"
+        errors = (scale * error.root_mean_square for error in (compared.before, compared.after))
+        states = (len(result.imposed), int(result.newton.sum()), float(result.min_J.min()))
+        head = (recording.name, recording.mode, compared.count, recording.role)
+        rows.append(
+            {"cells": [*head, *errors, unit, result.r_squared, *states], "unstable": result.unstable_iterations}
         )
-        if result.unstable_iterations:
-            lines.append(
-                f"    note: the tangent was indefinite in {result.unstable_iterations} iterations: the specimen "
-                "buckles or its law softens, and the real one may reach another state"
-            )
-    return [*lines, "  before: a specimen that resists nothing; after: this simulation; R2: 1 is perfect"]
+    return rows
 
 
 def write_tests(path: Path, tests: Sequence[Tested]) -> None:

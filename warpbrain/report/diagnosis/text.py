@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterator, Mapping
+import sys
+from collections.abc import Mapping
 from typing import Any
 
 from warpbrain.inference.decide import NOTHING
@@ -11,16 +11,16 @@ from warpbrain.inference.probability import percent
 from warpbrain.physics.words import measured, number, place
 from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.page import lines
 
-_WIDTH = 110
-#: Times at which a size that changes is said; sets of causes and measurements that are.
-_TIMES, _SETS, _NEXT = 5, 6, 5
+#: Times at which a size that changes is said; and sets of causes that are.
+_TIMES, _SETS = 5, 6
 Summary = Mapping[str, Any]
 
 
 def diagnosis_lines(summary: Summary) -> list[str]:
     """The verdict on top, then sets of causes, each cause, the fit and what to do next."""
-    return [*_verdict(summary), "", *_causes(summary), "", *_fit(summary), *_further(summary)]
+    return lines("diagnosis.txt", "diagnosis", summary, sys.modules[__name__], NOTHING)
 
 
 def unit_of(summary: Summary) -> tuple[str, float, str]:
@@ -53,6 +53,13 @@ def candidate_rows(summary: Summary) -> list[list[str]]:
             words = one["says"], one["rejected_because"]
             rows.append([one["mechanism"], percent(one["probability"]), *numbers, change, *words])
     return rows
+
+
+def estimate_in_words(summary: Summary, mechanism: str) -> str:
+    """The first parameters of a candidate with their standard deviations."""
+    estimate = next(one["estimate"] for one in summary["ranking"] if one["mechanism"] == mechanism)
+    each = list(estimate.items())[:3]
+    return ", ".join(f"{key} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for key, v in each)
 
 
 def rejected_rows(summary: Summary) -> list[list[str]]:
@@ -128,58 +135,3 @@ def when_in_words(when: Summary) -> str:
     sure = "" if when["probability"] is None else f" (probability {percent(when['probability'])})"
     course = f", {when['course']}" if when["course"] else ""
     return f"it set in {between}{sure}{course}"
-
-
-def _wrapped(sentence: str, following: str = "  ") -> list[str]:
-    return textwrap.wrap(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
-
-
-def _verdict(summary: Summary) -> Iterator[str]:
-    yield f"VERDICT: {summary['verdict']}"
-    yield from _wrapped(summary["sentence"])
-    if summary["where"] is not None:
-        yield f"  where: {where_in_words(summary['where'])}"
-    if summary["when"] is not None:
-        yield f"  when: {when_in_words(summary['when'])}"
-
-
-def _causes(summary: Summary) -> Iterator[str]:
-    yield f"  p = {summary['p_value']:.2g} that nothing is missing; the most probable sets of causes:"
-    for causes, probability, evidence in set_rows(summary):
-        yield f"    {causes:<60} {probability:>10}   log evidence {evidence:>8}"
-    if summary["p_left"] is not None:
-        yield f"  p = {summary['p_left']:.2g} that nothing is left beside the causes that the verdict is about"
-    yield from ["", "  candidate          probability   log evidence        d    held-out RMSE    estimate"]
-    values = {one["mechanism"]: list(one["estimate"].items())[:3] for one in summary["ranking"]}
-    for name, probability, evidence, d, change, *_ in candidate_rows(summary):
-        each = (f"{key} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for key, v in values[name])
-        numbers = f"{probability:>11} {evidence:>14} {d:>8}   {change:>13}"
-        yield f"  {name:<18} {numbers}    {', '.join(each)}".rstrip()
-    if rejected := rejected_rows(summary):
-        yield from ["", "  not tried:", *(f"    {name}: {why}" for name, why in rejected)]
-
-
-def _fit(summary: Summary) -> Iterator[str]:
-    rows = [[f"RMSE [{unit_of(summary)[2]}]", "fitted", "held out", "check"], *fit_rows(summary)]
-    width = max(len(row[0]) for row in rows)
-    for name, *errors in rows:
-        inside, outside, check = errors if any(row[3] for row in rows[1:]) else (*errors[:2], "")
-        yield f"  {name:<{width}} {inside:>8}   {outside:>14}   {check}".rstrip()
-    if improvement := summary["fit"]["improvement"]:
-        part, low, high = (100.0 * value for value in (improvement["part"], *improvement["interval_95"]))
-        yield f"  held-out error falls by {part:.0f} % (95 %: {low:.0f} to {high:.0f} %)"
-    yield from (f"  {sentence}" for sentence in placebo_sentences(summary))
-    for one in summary["fit"]["confirmations"]:
-        held_out = f"of held-out rows {-one['heldout_log_density']:+.1f}"
-        yield f"  without {one['mechanism']}: log evidence {-one['log_evidence']:+.1f}, {held_out}"
-
-
-def _further(summary: Summary) -> Iterator[str]:
-    if summary["verdict"] != NOTHING and summary["smallest_detectable"]:
-        shown = "; ".join(f"{kind} {one['says']}" for kind, one in summary["smallest_detectable"].items())
-        yield from ["", *_wrapped(f"What these data would have shown: {shown}.", "    ")]
-    if summary["next_measurement"]:
-        yield from ["", "  what to measure next (expected log Bayes factor between the two most probable mechanisms):"]
-        yield from (f"    {one['expected_nats']:8.1f}  {one['what']}" for one in summary["next_measurement"][:_NEXT])
-    if summary.get("confusion"):
-        yield from ["", *(line for sentence in summary["confusion"]["says"] for line in _wrapped(sentence, "    "))]
