@@ -150,10 +150,11 @@ def _estimate(
     from warpbrain.estimation.estimate import Estimation, Listener
     from warpbrain.estimation.fit import GaussNewtonStep
     from warpbrain.gp.trained import find_model
-    from warpbrain.report import estimate_picture
     from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
     from warpbrain.report.estimate_page import write_estimate_page
+    from warpbrain.report.estimate_picture import agreement_figure, densities_figure, residuals_figure
     from warpbrain.report.files import write_summary
+    from warpbrain.report.views import save
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.result_folder import results_in
 
@@ -184,9 +185,9 @@ def _estimate(
     with results_in(out, record, options.overwrite):
         write_predictions(out / "predictions.csv", posterior)
         write_estimated_state(out / "state.vtu", posterior, where)
-        estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
-        estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
-        estimate_picture.write_residuals(out / "residuals.png", posterior)
+        save(densities_figure(posterior, narrow=False), out / "posterior.png", case.title, 10.0)
+        save(agreement_figure(posterior, narrow=False), out / "predicted.png", case.title, 10.0)
+        save(residuals_figure(posterior), out / "residuals.png", case.title)
         write_summary(out / "estimate.json", described)
         record.files += ["estimate.json", "predictions.csv", "state.vtu"]
         record.files += ["posterior.png", "predicted.png", "residuals.png"]

@@ -146,7 +146,7 @@ def _fit(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import check_new_folder, whole_folder
     from warpbrain.gp.trained import fit_model, write_model
-    from warpbrain.report.generative_text import fit_lines
+    from warpbrain.report.page import lines
 
     out = options.out or Path(f"warpbrain-gp-{options.gp}-{options.variant}")
     check_new_folder(out)
@@ -154,7 +154,7 @@ def _fit(options: argparse.Namespace) -> None:
         model, record = fit_model(
             options.gp, options.variant, options.add, climbs=options.climbs or 1, progress=bar.show
         )
-    print(*fit_lines(model, record), sep="\n")
+    print(*lines("gp.txt", "fit", model, record), sep="\n")
     if options.add is not None:
         _print_change(options, model)
     with whole_folder(out) as folder:

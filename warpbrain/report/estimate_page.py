@@ -21,7 +21,6 @@ from warpbrain.report.estimate import (
     averaged_row,
     checks,
     correlated,
-    interval_of,
     parameter_row,
     prediction_row,
     recorded_points,
@@ -73,7 +72,8 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     lines = ["the most probable state of the estimate", *judged.sentences]
     pictures = draw(folder / "deformation.png", whole, state.mesh, state.u, titles, moved, case["title"], lines)
     places = views.places(whole)
-    names = ", ".join(_name(one) for one in summary["parameters"])
+    tissue = [parameter_row(one) for one in summary["parameters"]]
+    names = ", ".join(f"{row[0]}, {row[1]}" for row in tissue)
     agreement = Markup()
     if any(one.kind != "surface" for one in posterior.predictions):
         words = "Every component that was recorded beside what the estimate makes of it; on the line they agree."
@@ -83,7 +83,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     causes = [] if nothing is None else [one for one in nothing["causes"] if one["probability"] >= _LIKELY]
     sections = sections_of(
         "estimate.html", summary=summary, agreement=agreement,
-        tissue=[parameter_row(one) for one in summary["parameters"]],
+        tissue=tissue,
         tied=correlated(summary), checks=checks(summary),
         densities=inlined(
             lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
@@ -103,9 +103,9 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
         files=[[name, Markup("<code>{}</code>").format(value)] for name, value in summary["inputs_sha256"].items()],
     )  # fmt: skip
     facts = [
-        (_name(one), f"{one['estimate']:.4g} Pa ({interval_of(one)})")
-        for one in summary["parameters"]
-        if one["unit"] == "Pa"
+        (f"{name}, {parameter}", f"{estimate} Pa ({interval})")
+        for name, parameter, estimate, _, interval, *_, unit in tissue
+        if unit == "Pa"
     ]
     if judged.before is not None:
         facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
@@ -115,7 +115,3 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     top = Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts)
     write_document(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))
     return pictures
-
-
-def _name(one: Mapping[str, Any]) -> str:
-    return f"{one['tissue']}, {one['name']}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,11 +19,6 @@ from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERM
 
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
-
-
-def write_prior_and_posterior(path: Path, posterior: Posterior) -> None:
-    """Draw the density of each parameter before and after."""
-    views.save(densities_figure(posterior, False), path, posterior.case.title, 10.0)
 
 
 def densities_figure(posterior: Posterior, narrow: bool) -> Any:
@@ -69,11 +63,6 @@ def _draw_marginal(axes: Any, marginal: Marginal, prior: Floats, draws: Floats |
     axes.set_ylim(0.0, 1.15)
 
 
-def write_observed_against_predicted(path: Path, posterior: Posterior) -> None:
-    """Draw every component of every recording beside what the estimate makes of it; a panel for each unit."""
-    views.save(agreement_figure(posterior, False), path, posterior.case.title, 10.0)
-
-
 def agreement_figure(posterior: Posterior, narrow: bool) -> Any:
     """Components as they were observed and as they are predicted, one unit below the other for a narrow window."""
     # a distance to a surface has no sign that was recorded: before, after is all there is to compare
@@ -113,8 +102,8 @@ def _draw_pairs(axes: Any, predictions: Sequence[Prediction], unit: str, columns
         axes.text(0.5, 0.5, "only surfaces were recorded", ha="center", transform=axes.transAxes)
 
 
-def write_residuals(path: Path, posterior: Posterior) -> None:
-    """Draw how far each recorded point is from its prediction, on the outlines of the anatomy from three sides."""
+def residuals_figure(posterior: Posterior) -> Any:
+    """How far each recorded point is from its prediction, on the outlines of the anatomy from three sides."""
     whole, mesh = posterior.case.mesh, posterior.case.remaining[0]
     residuals = [
         (recording.points[one.rows], MILLIMETRES * np.linalg.norm(one.after, axis=1))
@@ -137,4 +126,4 @@ def write_residuals(path: Path, posterior: Posterior) -> None:
         panel.set_title(f"outline at {views.heading(whole, view, place)}", fontsize=10)
     bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.03)
     bar.set_label("distance between observed and predicted [mm], points of all depths")
-    views.save(figure, path, posterior.case.title)
+    return figure

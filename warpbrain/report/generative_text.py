@@ -6,70 +6,25 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from warpbrain.gp.asymmetry import Asymmetry
 from warpbrain.gp.metamodels import Fit
-from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import CURVES, DrawnLaws, Moduli, rejection_rate
 from warpbrain.report.files import write_csv
+from warpbrain.report.page import lines
 
 
 def asymmetry_lines(found: Sequence[Asymmetry], papers: Mapping[str, tuple[float, bool]]) -> list[str]:
     """Compression and tension, a line for each group, and one of the literature, as of `asymmetries_of_papers`."""
-    width = max(len(one.group) for one in found)
-    lines = [
-        f"{'tension over compression, secant moduli':<{width + 20}}  mean of papers (95 % interval)   "
-        "a new study (95 %)   stiffer in tension"
-    ]
+    rows = []
     for one in found:
         mean, low, high, new_low, new_high = np.exp([one.mean, one.low, one.high, one.new_low, one.new_high]).tolist()
-        lines.append(
-            f"{one.group:<{width + 2}}strain to {one.strain:<8.2g}  {f'{mean:.2f} ({low:.2f} to {high:.2f})':<32}"
-            f"{f'{new_low:.2f} to {new_high:.2f}':<18}{100.0 * one.tension:>17.0f} %"
-        )
-    compression = sum(value < 0.0 for value, _ in papers.values())
-    tension = sum(value > 0.0 for value, _ in papers.values())
-    lines.append(
-        f"of {len(papers)} hyperelastic papers {compression} are stiffer in compression, {tension} in tension; "
-        f"{sum(not able for _, able in papers.values())} have symmetric forms only, which say nothing of it"
-    )
-    return lines
-
-
-def fit_lines(model: Process, record: Mapping[str, Any]) -> list[str]:
-    """Objective, convergence, restarts, conditioning and time of a record of `warpbrain.gp.trained.fit_model`."""
-    lines = [f"{model.name} model of the literature as {model.variant}, {record['studies']} studies"]
-    if "climbs" not in record:
-        lines += [
-            f"  objective   {record['objective']:.3f} (negative log of likelihood times prior)",
-            f"  {_converged(record)} after {record['iterations']} iterations: {record['message']}",
-            f"  condition   {record['condition']:.2g} of the covariance; no jitter: what studies leave open is in it",
-        ]
-    else:
-        starts = record["starts"]
-        apart = starts[0]["apart"]
-        lines += [
-            f"  objective   {record['negative log likelihood']:.3f} (negative log marginal likelihood of "
-            f"{record['points']} points, {record['means of replicates']} means)",
-            f"  jitter      {record['jitter']:g} on the diagonal",
-            f"  starts      {len(starts)} on every {starts[0]['every']}th stretch, values "
-            f"{starts[0]['value']:.2f} to {starts[-1]['value']:.2f}; best: "
-            + ("all groups together" if apart is None else f"{apart} apart"),
-        ]
-        for index, climb in enumerate(record["climbs"], 1):
-            lines.append(
-                f"  climb {index}     {climb['value']:.3f}, {_converged(climb)} after {climb['iterations']} "
-                f"iterations, last gain {climb['gain']:.1g}, largest derivative {climb['gradient']:.2g}, "
-                f"condition {climb['condition']:.1g}"
-            )
-    return [*lines, f"  time        {record['seconds']:.1f} s"]
-
-
-def _converged(record: Mapping[str, Any]) -> str:
-    return "converged" if record["converged"] else "NOT converged"
+        intervals = f"{mean:.2f} ({low:.2f} to {high:.2f})", f"{new_low:.2f} to {new_high:.2f}"
+        rows.append([one.group, one.strain, *intervals, 100.0 * one.tension])
+    width = 2 + max(len(one.group) for one in found)
+    return lines("gp.txt", "asymmetry", rows, width, list(papers.values()))
 
 
 def moduli_lines(found: Sequence[Moduli]) -> list[str]:
