@@ -106,8 +106,8 @@ def _run(options: argparse.Namespace) -> None:
         write_summary(out / "diagnosis.json", said)
         state = None if case.specimen is not None else read_state(out / "state.vtu")
         write_page(out / "report.html", found, said, state)
-        if images is not None:
-            record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
+        if images is not None and state is not None:
+            warp.warp(state, out, images, record, options.quiet)
 
 
 #: What diagnoses a case, and what is written of it beside what all cases have.

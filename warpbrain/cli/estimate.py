@@ -154,6 +154,7 @@ def _estimate(
     from warpbrain.report.estimate_page import write_estimate_page
     from warpbrain.report.estimate_picture import agreement_figure, densities_figure, residuals_figure
     from warpbrain.report.files import write_summary
+    from warpbrain.report.state_files import read_state
     from warpbrain.report.views import save
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.result_folder import results_in
@@ -193,7 +194,7 @@ def _estimate(
         record.files += ["posterior.png", "predicted.png", "residuals.png"]
         record.files += drawn(write_estimate_page(out, described, posterior), say)
         if images is not None:
-            record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
+            warp.warp(read_state(out / "state.vtu"), out, images, record, options.quiet)
 
 
 def _what_else(

@@ -116,6 +116,7 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report.files import write_result, write_summary
     from warpbrain.report.page import lines
     from warpbrain.report.run_page import write_run_page
+    from warpbrain.report.state_files import read_state
     from warpbrain.report.summary import describe_prior
     from warpbrain.simulation.courses import Course
     from warpbrain.simulation.run import Running
@@ -190,7 +191,7 @@ def _run(options: argparse.Namespace) -> None:
         # after all that it speaks of: whoever finds it finds the others
         write_summary(out / "summary.json", summary)
         if asked is not None:
-            record.files += warp.warp(out / "result.vtu", out, asked, say, options.quiet)
+            warp.warp(read_state(out / "result.vtu"), out, asked, record, options.quiet)
 
 
 def _check(options: argparse.Namespace) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.cli.options import WARPED, add_to
 from warpbrain.errors import InputError
+from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
@@ -55,21 +55,14 @@ def check_place(asked: Asked | None, case: Case) -> None:
     check_place(asked, case.mesh, case.path)
 
 
-def warp(result: Path, out: Path, asked: Asked, say: Callable[..., None], quiet: bool) -> list[str]:
-    """Warp by a result, say what there is to say; returns the names of the files."""
-    from warpbrain.report.state_files import read_state
-
-    return _write(read_state(result), out, asked, say, quiet)
-
-
-def _write(state: SavedState, out: Path, asked: Asked, say: Callable[..., None], quiet: bool) -> list[str]:
+def warp(state: SavedState, out: Path, asked: Asked, record: Record, quiet: bool) -> None:
+    """Warp by the body of a result, say what there is to say and note the names of the files."""
     from warpbrain.report.warped import write_warped
-    from warpbrain.terminal.progress import Progress
 
     with Progress("warping", quiet) as progress:
         lines, files = write_warped(out, state, asked, progress.show)
-    say("", *lines, sep="\n")
-    return files
+    record.say("", *lines, sep="\n")
+    record.files += files
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -92,4 +85,4 @@ def _run(options: argparse.Namespace) -> None:
     record.note(result=str(state.path))
     # beside the result and what else was made of it
     with results_in(out, record, replace=False):
-        record.files += _write(state, out, asked, record.say, options.quiet)
+        warp(state, out, asked, record, options.quiet)

@@ -24,7 +24,7 @@ def asymmetry_lines(found: Sequence[Asymmetry], papers: Mapping[str, tuple[float
         intervals = f"{mean:.2f} ({low:.2f} to {high:.2f})", f"{new_low:.2f} to {new_high:.2f}"
         rows.append([one.group, one.strain, *intervals, 100.0 * one.tension])
     width = 2 + max(len(one.group) for one in found)
-    return lines("gp.txt", "asymmetry", rows, width, list(papers.values()))
+    return lines("gp.txt", "tension_over_compression", rows, width, list(papers.values()))
 
 
 def moduli_lines(found: Sequence[Moduli]) -> list[str]:

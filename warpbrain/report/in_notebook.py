@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import singledispatch
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from warpbrain.report.case_text import show_lines
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.ensemble import describe_ensemble, ensemble_lines
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.page import part
 from warpbrain.report.summary import SET_TITLES, describe_result, left_out
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.run import Run
@@ -38,12 +38,7 @@ def html(what: Any) -> str:
     InputError
         If it is none of these.
     """
-    title, rows = _told(what)
-    body = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(value)}</td></tr>'
-        for name, value in rows
-    )
-    return f"<div><strong>{escape(title)}</strong><table>{body}</table></div>"
+    return str(part("notebook", *_told(what)))
 
 
 @singledispatch
