@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from warpbrain.estimation.options import EstimationOptions
     from warpbrain.estimation.posterior import Posterior
     from warpbrain.recordings.registration import Registration
-    from warpbrain.report.warped import Asked
+    from warpbrain.report.warped import WarpRequest
     from warpbrain.terminal.record import Record
     from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
@@ -90,7 +90,7 @@ def _run(options: argparse.Namespace) -> None:
 
     start_warp_quietly()
     device = find_device(options.device).alias
-    images = warp.asked_for(options)
+    images = warp.requested(options)
     if images is not None and options.method == "grid":
         raise InputError("--method grid: has no state that --image, --labels and --points could be warped by")
     case = find_case(options.case, options.tissue)
@@ -145,7 +145,7 @@ def _options(options: argparse.Namespace) -> EstimationOptions:
 
 
 def _estimate(
-    options: argparse.Namespace, settings: EstimationOptions, case: Case, images: Asked | None, out: Path
+    options: argparse.Namespace, settings: EstimationOptions, case: Case, images: WarpRequest | None, out: Path
 ) -> None:
     from warpbrain.estimation.estimate import Estimation, Listener
     from warpbrain.estimation.fit import GaussNewtonStep

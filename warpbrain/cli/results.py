@@ -77,13 +77,13 @@ def _compare(options: argparse.Namespace) -> None:
         check_writable(options.json.absolute())
     first, second = read_result(options.first), read_result(options.second)
     try:
-        said = describe_two(first, second)
+        comparison = describe_two(first, second)
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(
             f"{options.first} and {options.second}: not as this version writes results: {type(error).__name__} {error}"
         ) from None
-    print(*lines("compare.txt", "compare", said), sep="\n")
+    print(*lines("compare.txt", "compare", comparison), sep="\n")
     if options.json is not None:
-        write_summary(options.json.absolute(), said)
+        write_summary(options.json.absolute(), comparison)

@@ -126,11 +126,11 @@ def _run(options: argparse.Namespace) -> None:
 
     start_warp_quietly()
     begin_loading_kernels(find_device(options.device), find_precision(options.precision))
-    asked = warp.asked_for(options)
-    case, found = _case(options)
-    warp.check_place(asked, case)
+    to_warp = warp.requested(options)
+    case, drawn_laws = _case(options)
+    warp.check_place(to_warp, case)
     out = choose_folder(options.out, f"warpbrain-{safe_name(case.name)}-{options.tissue}", options.overwrite)
-    prior = None if found is None else describe_prior(found)
+    prior = None if drawn_laws is None else describe_prior(drawn_laws)
     if case.specimen is not None:
         run_specimen.run(options, case, out, prior)
         return
@@ -161,9 +161,9 @@ def _run(options: argparse.Namespace) -> None:
     first_step = done.followed.begun - start
     seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **done.followed.seconds}
     result, observed = done.result, done.observed
-    said = tables.describe_result(result)
+    displacements = tables.describe_result(result)
     compared = describe_comparisons(observed)
-    say(*lines("run.txt", "displacement", said, tables.displacement_rows(said)), sep="\n")
+    say(*lines("run.txt", "displacement", displacements, tables.displacement_rows(displacements)), sep="\n")
     for line in lines("run.txt", "recordings", compared, recorded_rows(compared["compared"]), options.legacy_rmse):
         say(line)
     estimated, doubt = _mesh_error(options, case, system, result, observed, outcome)
@@ -174,7 +174,7 @@ def _run(options: argparse.Namespace) -> None:
     summary = {
         **tables.describe_opening(case, described, prior, system, options.precision),
         "solution": outcome,
-        "result": said,
+        "result": displacements,
         "recordings": compared,
         **({} if doubt is None else {"mesh_error": doubt}),
         "seconds_by_phase": seconds,
@@ -190,8 +190,8 @@ def _run(options: argparse.Namespace) -> None:
             record.files.append("comparison.csv")
         # after all that it speaks of: whoever finds it finds the others
         write_summary(out / "summary.json", summary)
-        if asked is not None:
-            warp.warp(read_state(out / "result.vtu"), out, asked, record, options.quiet)
+        if to_warp is not None:
+            warp.warp(read_state(out / "result.vtu"), out, to_warp, record, options.quiet)
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -232,11 +232,11 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     case = case.with_shear_moduli(moduli)
     if options.poisson is not None:
         case = replace(case, poisson=options.poisson)
-    for said in options.assumed:
-        case = assume(case, said)
-    found = _from_prior(options, case)
-    if found is not None:
-        case = found.case
+    for text in options.assumed:
+        case = assume(case, text)
+    prior = _from_prior(options, case)
+    if prior is not None:
+        case = prior.case
     if not options.allow_unstable:
         for label, tissue in sorted(case.tissues.items()):
             try:
@@ -245,7 +245,7 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
                 raise UnstableLawError(
                     f"{case.path}: [tissue.{label}] {error}; --allow-unstable computes with it all the same"
                 ) from None
-    return case, found
+    return case, prior
 
 
 def _from_prior(options: argparse.Namespace, case: Case) -> FromPrior | None:
@@ -313,7 +313,7 @@ def _mesh_error(
     smaller = options.mesh_error == "size"
     try:
         with Progress("mesh error", options.quiet) as progress:
-            found = mesh_error(
+            estimated_error = mesh_error(
                 case,
                 system.model,
                 result,
@@ -325,5 +325,5 @@ def _mesh_error(
     except SolveError as error:
         # the run itself is sound
         return None, {"unknown": str(error)}
-    without = observe_without(case, result, found, outcome.get("time_s"))
-    return found, describe_mesh_error(found, system.model.elements, observed, without)
+    without = observe_without(case, result, estimated_error, outcome.get("time_s"))
+    return estimated_error, describe_mesh_error(estimated_error, system.model.elements, observed, without)

@@ -77,8 +77,8 @@ def _check(options: argparse.Namespace, case: Case) -> None:
             f"--mesh-error: {case.path} has a [specimen], which has no one state: compare --elements tet4-averaged"
         )
     motions = {"--steps": options.steps is not None, "--to-rest": options.to_rest, "--until": options.until is not None}
-    for option, given in motions.items():
-        if given:
+    for option, asked_of in motions.items():
+        if asked_of:
             raise InputError(
                 f"{option}: {case.path} has a [specimen], whose tests are quasi-static: there is no motion"
             )

@@ -81,16 +81,16 @@ def recorded_rows(compared: Sequence[Mapping[str, Any]]) -> list[list[Any]]:
     for entry in compared:
         noise, unit = entry["noise_root_mean_square"], entry["unit"]
         left = "" if noise is None else error_text(noise, unit)
-        ways = [(entry["name"], entry["count"], "", left)]
+        directions = [(entry["name"], entry["count"], "", left)]
         if "mesh_to_recording_before" in entry:
-            ways = [
+            directions = [
                 (f"{entry['name']} to mesh", entry["count"], "", left),
                 (f"mesh to {entry['name']}", "", "mesh_to_recording_", ""),
             ]
-        for name, count, way, left in ways:
-            before, after = entry[f"{way}before"], entry[f"{way}after"]
+        for name, count, key, left in directions:
+            before, after = entry[f"{key}before"], entry[f"{key}after"]
             errors = (before["root_mean_square"], *(after[k] for k in ("root_mean_square", "percentile_95", "largest")))
-            legacy = (one.get("legacy_sqrt_mm") for one in (before, after))
+            legacy = (error.get("legacy_sqrt_mm") for error in (before, after))
             check = "check" if entry["role"] == "check" else ""
             rows.append([name, count, *(error_text(value, unit) for value in errors), left, unit, check, *legacy])
     return rows
@@ -102,7 +102,7 @@ def write_comparisons(path: Path, case: Case, observed: Observed) -> None:
 
 
 def _rows(case: Case, observed: Observed) -> Iterator[list[Any]]:
-    vectors = [f"{what}_{axis}" for what in ("recorded", "computed", "difference") for axis in "xyz"]
+    vectors = [f"{quantity}_{axis}" for quantity in ("recorded", "computed", "difference") for axis in "xyz"]
     yield ["recording", "kind", "unit", "row", "id", "x_mm", "y_mm", "z_mm", *vectors]
     recordings = {recording.name: recording for recording in case.recordings}
     for comparison in observed.comparisons:
@@ -157,18 +157,17 @@ def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation
     Of each recording they have ``name``, ``unit``, ``count``, and root mean squares ``before`` and ``after`` in that
     unit.
     """
-    lengths = [one for one in entries if one["unit"] == "mm" and one["count"]]
-    count = sum(one["count"] for one in lengths)
+    lengths = [entry for entry in entries if entry["unit"] == "mm" and entry["count"]]
+    count = sum(entry["count"] for entry in lengths)
     before, after = (
-        math.sqrt(sum(one["count"] * one[key] ** 2 for one in lengths) / count) if count else None
+        math.sqrt(sum(entry["count"] * entry[key] ** 2 for entry in lengths) / count) if count else None
         for key in ("before", "after")
     )
-    worse = [one for one in entries if one["after"] > one["before"]]
+    worse = [(entry, entry["unit"]) for entry in entries if entry["after"] > entry["before"]]
     sentences = [
-        f"It explains '{one['name']}' worse than {_NOTHING.get(one['unit'], 'nothing')} at all: RMSE "
-        f"{error_text(one['after'], one['unit'])} {one['unit']} with it, {error_text(one['before'], one['unit'])} "
-        f"{one['unit']} without."
-        for one in worse
+        f"It explains '{entry['name']}' worse than {_NOTHING.get(unit, 'nothing')} at all: RMSE "
+        f"{error_text(entry['after'], unit)} {unit} with it, {error_text(entry['before'], unit)} {unit} without."
+        for entry, unit in worse
     ]
     if before is None or after is None:
         return Explained(UNKNOWN, before, after, tuple(sentences))
@@ -201,11 +200,13 @@ def describe_mesh_error(error: MeshError, elements: str, observed: Observed, wit
 
     `observed` is recordings beside the state, `without` beside the state with the estimated error taken off.
     """
-    ways, linear = [], elements == "tet4"
+    references, linear = [], elements == "tet4"
     if linear:
-        ways.append("elements of averaged gradients on the same mesh, which lock less")
+        references.append("elements of averaged gradients on the same mesh, which lock less")
     if error.size is not None:
-        ways.append("such elements of half the size, whose difference is taken for three quarters of what is left")
+        references.append(
+            "such elements of half the size, whose difference is taken for three quarters of what is left"
+        )
     recordings = []
     for here, there in zip(observed.comparisons, without.comparisons, strict=True):
         factor, unit = SHOWN[here.unit]
@@ -219,7 +220,7 @@ def describe_mesh_error(error: MeshError, elements: str, observed: Observed, wit
             }
         )
     return {
-        "how": f"compared with {' and '.join(ways)}",
+        "how": f"compared with {' and '.join(references)}",
         "displacement_mm": _sizes(error.u, MILLIMETRES),
         "locking_mm": _sizes(error.locking, MILLIMETRES) if linear else None,
         "element_size_mm": None if error.size is None else _sizes(error.size, MILLIMETRES),

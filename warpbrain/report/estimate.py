@@ -37,8 +37,8 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     noise, laplace = best.point.noise, best.laplace
     each = zip(laplace.gains.tolist(), laplace.combinations, laplace.directions, strict=True)
     directions = [
-        {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": told, "undone": undone}
-        for gain, told, undone in each
+        {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": constrained, "undone": undone}
+        for gain, constrained, undone in each
     ]
     drawn = None
     if chain is not None:
@@ -69,7 +69,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
         ],
         "predictions": [_describe_prediction(prediction) for prediction in posterior.predictions],
-        "all_recordings": [picked(one, "role", "count") | _errors_mm(one) for one in posterior.overall_errors],
+        "all_recordings": [picked(errors, "role", "count") | _errors_mm(errors) for errors in posterior.overall_errors],
         "likelihood": {
             "density": "normal, shared by neighbours" + ("" if noise.outliers is None else ", with gross errors"),
             "degrees_of_freedom": None,
@@ -95,8 +95,8 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     }
 
 
-def _errors_mm(one: OverallErrors) -> dict[str, float]:
-    return {f"root_mean_square_{key}_mm": MILLIMETRES * getattr(one, key) for key in ("before", "after", "of_run")}
+def _errors_mm(errors: OverallErrors) -> dict[str, float]:
+    return {f"root_mean_square_{key}_mm": MILLIMETRES * getattr(errors, key) for key in ("before", "after", "of_run")}
 
 
 def _describe(marginal: Marginal, posterior: Posterior) -> dict[str, Any]:
@@ -150,7 +150,8 @@ def describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
         "probability": averaged.nothing,
         "most_probable": bool(averaged.nothing >= averaged.probabilities.max()),
         "causes": [
-            {"name": one.name, "kind": one.kind.value, "probability": one.probability} for one in averaged.causes
+            {"name": cause.name, "kind": cause.kind.value, "probability": cause.probability}
+            for cause in averaged.causes
         ],
         "tissue": [
             {
@@ -214,33 +215,33 @@ def describe_registration(posterior: Posterior) -> dict[str, Any] | None:
     if not posterior.options.registration:
         return None
     declared = registration_of(posterior.case)
-    found = posterior.nuisances[-6:]
+    registration = posterior.nuisances[-6:]
     return {
         "prior_shift_mm": MILLIMETRES * declared.shift,
         "prior_turn_degrees": math.degrees(declared.turn),
-        "shift_mm": [MILLIMETRES * value for _, value, _ in found[:3]],
-        "shift_standard_deviation_mm": [MILLIMETRES * deviation for _, _, deviation in found[:3]],
-        "turn_degrees": [math.degrees(value) for _, value, _ in found[3:]],
-        "turn_standard_deviation_degrees": [math.degrees(deviation) for _, _, deviation in found[3:]],
+        "shift_mm": [MILLIMETRES * value for _, value, _ in registration[:3]],
+        "shift_standard_deviation_mm": [MILLIMETRES * deviation for _, _, deviation in registration[:3]],
+        "turn_degrees": [math.degrees(value) for _, value, _ in registration[3:]],
+        "turn_standard_deviation_degrees": [math.degrees(deviation) for _, _, deviation in registration[3:]],
     }
 
 
 def remarks_of(posterior: Posterior) -> list[str]:
     """With what a user must know of recordings that no parameters explain."""
     return list(posterior.remarks) + [
-        f"{int(one.gross.sum())} of {len(one.rows)} rows of '{one.name}' are gross errors, farther from the prediction "
-        "than its noise allows: what moved them is not in this case"
-        for one in posterior.predictions
-        if one.gross.mean() > _UNEXPLAINED
+        f"{int(prediction.gross.sum())} of {len(prediction.rows)} rows of '{prediction.name}' are gross errors, "
+        "farther from the prediction than its noise allows: what moved them is not in this case"
+        for prediction in posterior.predictions
+        if prediction.gross.mean() > _UNEXPLAINED
     ]
 
 
 def recorded_points(posterior: Posterior, surfaces: bool = True) -> Iterator[tuple[Prediction, Any]]:
     """Predictions at places, with their recordings: of points, and of surfaces unless these are left out."""
     recordings = {recording.name: recording for recording in posterior.case.recordings}
-    for one in posterior.predictions:
-        if isinstance(recordings[one.name], PointsRecording | SurfaceRecording if surfaces else PointsRecording):
-            yield one, recordings[one.name]
+    for prediction in posterior.predictions:
+        if isinstance(recordings[prediction.name], PointsRecording | SurfaceRecording if surfaces else PointsRecording):
+            yield prediction, recordings[prediction.name]
 
 
 # as printed and on the page -------------------------------------------------------------------------------------------
@@ -254,44 +255,47 @@ def estimate_lines(summary: Mapping[str, Any]) -> list[str]:
     return lines("estimate.txt", "estimate", summary, *tables)
 
 
-def parameter_row(one: Mapping[str, Any]) -> list[str]:
+def parameter_row(parameter: Mapping[str, Any]) -> list[str]:
     """Tissue, parameter, estimate, standard deviation, 95 % interval, that of the prior, how much of its spread is
     gone, unit."""
-    numbers = _number(one["estimate"]), _number(one["standard_deviation"])
-    intervals = interval_of(one), interval_of(one["prior"])
-    return [one["tissue"], one["name"], *numbers, *intervals, f"{100.0 * one['shrinkage']:.0f} %", unit_of(one)]
+    numbers = _number(parameter["estimate"]), _number(parameter["standard_deviation"])
+    intervals = interval_of(parameter), interval_of(parameter["prior"])
+    gone = f"{100.0 * parameter['shrinkage']:.0f} %"
+    return [parameter["tissue"], parameter["name"], *numbers, *intervals, gone, unit_of(parameter)]
 
 
-def averaged_row(one: Mapping[str, Any]) -> list[str]:
+def averaged_row(parameter: Mapping[str, Any]) -> list[str]:
     """Tissue, parameter, middle, standard deviation, 95 % interval and unit."""
-    deviation = one["coordinate"]["standard_deviation"] * (one["middle"] if one["unit"] == "Pa" else 1.0)
-    return [one["tissue"], one["name"], _number(one["middle"]), _number(deviation), interval_of(one), unit_of(one)]
+    middle, deviation = parameter["middle"], parameter["coordinate"]["standard_deviation"]
+    deviation *= middle if parameter["unit"] == "Pa" else 1.0
+    numbers = _number(middle), _number(deviation)
+    return [parameter["tissue"], parameter["name"], *numbers, interval_of(parameter), unit_of(parameter)]
 
 
-def interval_of(one: Mapping[str, Any]) -> str:
+def interval_of(parameter: Mapping[str, Any]) -> str:
     """The 95 % interval of a parameter."""
-    low, high = one["interval_95"]
+    low, high = parameter["interval_95"]
     return f"{_number(low)} to {_number(high)}"
 
 
-def unit_of(one: Mapping[str, Any]) -> str:
+def unit_of(parameter: Mapping[str, Any]) -> str:
     """The unit of a parameter, if it has one."""
-    return "" if one["unit"] == "1" else str(one["unit"])
+    return "" if parameter["unit"] == "1" else str(parameter["unit"])
 
 
-def prediction_row(one: Mapping[str, Any]) -> list[Any]:
+def prediction_row(prediction: Mapping[str, Any]) -> list[Any]:
     """Recording, rows, root mean square with nothing moved, of the estimate and of its state as a run, what noise alone
     leaves, parts in the 50 % and 95 % intervals, gross errors, unit, whether it is only checked."""
-    unit, noise, cover = one["unit"], one["noise_root_mean_square"], one["coverage"] or {}
+    unit, noise, cover = prediction["unit"], prediction["noise_root_mean_square"], prediction["coverage"] or {}
     return [
-        one["name"],
-        one["count"],
-        *(error_text(one[f"root_mean_square_{which}"], unit) for which in ("before", "after", "of_run")),
+        prediction["name"],
+        prediction["count"],
+        *(error_text(prediction[f"root_mean_square_{which}"], unit) for which in ("before", "after", "of_run")),
         "" if noise is None else error_text(noise, unit),
         *(f"{100.0 * cover[key]:.0f} %" if key in cover else "" for key in ("50 %", "95 %")),
-        len(one["gross_errors"]),
+        len(prediction["gross_errors"]),
         unit,
-        "check" if one["role"] == "check" else "",
+        "check" if prediction["role"] == "check" else "",
     ]
 
 
@@ -344,23 +348,23 @@ def _number(value: float) -> str:
 def write_predictions(path: Path, posterior: Posterior) -> None:
     """Write every row, in mm or N, axes RAS; of a surface the distance stands in the first of three components."""
     recordings = {recording.name: recording for recording in posterior.case.recordings}
-    vectors = [f"{what}_{axis}" for what in ("observed", "predicted", "standard_deviation") for axis in "xyz"]
+    vectors = [f"{quantity}_{axis}" for quantity in ("observed", "predicted", "standard_deviation") for axis in "xyz"]
     rows = [["recording", "kind", "role", "unit", "row", "gross_error", "x_mm", "y_mm", "z_mm", *vectors]]
-    for one in posterior.predictions:
-        rows += [_predicted(one, recordings[one.name], number) for number in range(len(one.rows))]
+    for prediction in posterior.predictions:
+        rows += [_predicted(prediction, recordings[prediction.name], number) for number in range(len(prediction.rows))]
     write_csv(path, rows)
 
 
-def _predicted(one: Prediction, recording: Recording, number: int) -> list[Any]:
-    factor, unit = SHOWN[one.unit]
-    row = int(one.rows[number])
-    cells = [one.name, one.kind, one.role, unit, row, int(one.gross[number])]
+def _predicted(prediction: Prediction, recording: Recording, number: int) -> list[Any]:
+    factor, unit = SHOWN[prediction.unit]
+    row = int(prediction.rows[number])
+    cells = [prediction.name, prediction.kind, prediction.role, unit, row, int(prediction.gross[number])]
     if isinstance(recording, PointsRecording | SurfaceRecording):
         cells += [f"{MILLIMETRES * value:.6g}" for value in recording.points[row]]
     else:
         cells += [""] * 3
-    before = one.before[number]
-    for values in (before, before - one.after[number], one.deviation[number]):
+    before = prediction.before[number]
+    for values in (before, before - prediction.after[number], prediction.deviation[number]):
         shown = [f"{factor * value:.6g}" for value in np.atleast_1d(values)]
         cells += shown + [""] * (3 - len(shown))
     return cells

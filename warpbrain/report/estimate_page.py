@@ -46,8 +46,8 @@ _KNOWN = (
 def moved_of(posterior: Posterior) -> Moved:
     """Points that were recorded, and where the estimate, with its nuisances, has them."""
     points = [
-        np.column_stack([recording.points[one.rows], one.before, one.before - one.after])
-        for one, recording in recorded_points(posterior, surfaces=False)
+        np.column_stack([recording.points[prediction.rows], prediction.before, prediction.before - prediction.after])
+        for prediction, recording in recorded_points(posterior, surfaces=False)
     ]
     return Moved(*np.split(np.concatenate([np.zeros((0, 9)), *points]), 3, axis=1))
 
@@ -55,8 +55,8 @@ def moved_of(posterior: Posterior) -> Moved:
 def judged_of(summary: Mapping[str, Any]) -> Explained:
     """Whether an estimate explains its recordings better than no motion at all."""
     entries = [
-        {**one, "before": one["root_mean_square_before"], "after": one["root_mean_square_after"]}
-        for one in summary["predictions"]
+        {**prediction, "before": prediction["root_mean_square_before"], "after": prediction["root_mean_square_after"]}
+        for prediction in summary["predictions"]
     ]
     return explained(entries, "this estimate")
 
@@ -72,15 +72,15 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     lines = ["the most probable state of the estimate", *judged.sentences]
     pictures = draw(folder / "deformation.png", whole, state.mesh, state.u, titles, moved, case["title"], lines)
     places = views.places(whole)
-    tissue = [parameter_row(one) for one in summary["parameters"]]
+    tissue = [parameter_row(parameter) for parameter in summary["parameters"]]
     names = ", ".join(f"{row[0]}, {row[1]}" for row in tissue)
     agreement = Markup()
-    if any(one.kind != "surface" for one in posterior.predictions):
+    if any(prediction.kind != "surface" for prediction in posterior.predictions):
         words = "Every component that was recorded beside what the estimate makes of it; on the line they agree."
         agreement = inlined(
             lambda narrow: agreement_figure(posterior, narrow), "Observed beside predicted components.", words
         )
-    causes = [] if nothing is None else [one for one in nothing["causes"] if one["probability"] >= _LIKELY]
+    causes = [] if nothing is None else [cause for cause in nothing["causes"] if cause["probability"] >= _LIKELY]
     sections = sections_of(
         "estimate.html", summary=summary, agreement=agreement,
         tissue=tissue,
@@ -89,12 +89,12 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
             lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
             "Each parameter before (dashed, filled) and after (line); dotted: the ends of its 95 % interval.",
         ),
-        causes=[[one["name"], percent(one["probability"])] for one in causes],
+        causes=[[cause["name"], percent(cause["probability"])] for cause in causes],
         averaged=[] if nothing is None else [
             [f"{tissue}, {name}", middle, interval, unit]
             for tissue, name, middle, _, interval, unit in map(averaged_row, nothing["tissue"])
         ],
-        recorded=[prediction_row(one) for one in summary["predictions"]],
+        recorded=[prediction_row(prediction) for prediction in summary["predictions"]],
         pictures=before_and_after(pictures),
         known=known_displacement(state, whole, places, _KNOWN),
         view=body_view(state.mesh, state.u, fields_of(state), moved, places),

@@ -16,34 +16,36 @@ from warpbrain.report.files import write_csv
 from warpbrain.report.page import lines
 
 
-def asymmetry_lines(found: Sequence[Asymmetry], papers: Mapping[str, tuple[float, bool]]) -> list[str]:
+def asymmetry_lines(asymmetries: Sequence[Asymmetry], papers: Mapping[str, tuple[float, bool]]) -> list[str]:
     """Compression and tension, a line for each group, and one of the literature, as of `asymmetries_of_papers`."""
     rows = []
-    for one in found:
-        mean, low, high, new_low, new_high = np.exp([one.mean, one.low, one.high, one.new_low, one.new_high]).tolist()
+    for asymmetry in asymmetries:
+        mean, low, high, new_low, new_high = np.exp(
+            [asymmetry.mean, asymmetry.low, asymmetry.high, asymmetry.new_low, asymmetry.new_high]
+        ).tolist()
         intervals = f"{mean:.2f} ({low:.2f} to {high:.2f})", f"{new_low:.2f} to {new_high:.2f}"
-        rows.append([one.group, one.strain, *intervals, 100.0 * one.tension])
-    width = 2 + max(len(one.group) for one in found)
+        rows.append([asymmetry.group, asymmetry.strain, *intervals, 100.0 * asymmetry.tension])
+    width = 2 + max(len(asymmetry.group) for asymmetry in asymmetries)
     return lines("gp.txt", "tension_over_compression", rows, width, list(papers.values()))
 
 
-def moduli_lines(found: Sequence[Moduli]) -> list[str]:
+def moduli_lines(moduli: Sequence[Moduli]) -> list[str]:
     """A line for each group and law; a modulus in brackets is that of a curve whose law is unstable."""
-    width = max(len(one.group) for one in found)
+    width = max(len(tissue.group) for tissue in moduli)
     curves = "".join(f"{f'k = {k:+g}' if k else 'mean':>11}" for k in CURVES)
     lines = [
         f"{'shear modulus at rest [Pa]':<{width + 16}}{curves}   draws: median (95 % of them)        redrawn   "
         "law of the mean curve"
     ]
-    for one in found:
+    for tissue in moduli:
         cells = "".join(
             f"{f'({fitted.shear_modulus:.4g})' if reason else f'{fitted.shear_modulus:.4g}':>11}"
-            for fitted, reason in zip(one.fits, one.unstable, strict=True)
+            for fitted, reason in zip(tissue.fits, tissue.unstable, strict=True)
         )
-        drawn = f"{one.median:.4g} ({one.low:.3g} to {one.high:.3g})"
+        drawn = f"{tissue.median:.4g} ({tissue.low:.3g} to {tissue.high:.3g})"
         lines.append(
-            f"{one.group:<{width + 2}}{one.law:<14}{cells}   {drawn:<34} {100 * one.rejection_rate:>5.1f} %   "
-            f"{_law_text(one.fits[CURVES.index(0.0)])}"
+            f"{tissue.group:<{width + 2}}{tissue.law:<14}{cells}   {drawn:<34} {100 * tissue.rejection_rate:>5.1f} %   "
+            f"{_law_text(tissue.fits[CURVES.index(0.0)])}"
         )
     return lines
 
@@ -56,7 +58,7 @@ def _law_text(fitted: Fit) -> str:
     )
 
 
-def write_moduli(path: Path, found: Sequence[Moduli]) -> None:
+def write_moduli(path: Path, moduli: Sequence[Moduli]) -> None:
     """Write what `moduli_lines` says, a row for each group, law and curve."""
     head = (
         *("group", "law", "k", "shear modulus [Pa]", "parameters", "rms of fit [log units]", "unstable"),
@@ -64,11 +66,11 @@ def write_moduli(path: Path, found: Sequence[Moduli]) -> None:
     )
     rows = [
         [
-            *(one.group, one.law, k, repr(fitted.shear_modulus), _law_text(fitted), repr(fitted.rms), reason),
-            *(repr(one.median), repr(one.low), repr(one.high), one.draws, repr(one.rejection_rate)),
+            *(tissue.group, tissue.law, k, repr(fitted.shear_modulus), _law_text(fitted), repr(fitted.rms), reason),
+            *(repr(tissue.median), repr(tissue.low), repr(tissue.high), tissue.draws, repr(tissue.rejection_rate)),
         ]
-        for one in found
-        for k, fitted, reason in zip(CURVES, one.fits, one.unstable, strict=True)
+        for tissue in moduli
+        for k, fitted, reason in zip(CURVES, tissue.fits, tissue.unstable, strict=True)
     ]
     write_csv(path, [head, *rows])
 

@@ -49,14 +49,14 @@ class Moved:
     @classmethod
     def of(cls, recordings: Sequence[Recording], comparisons: Sequence[Comparison]) -> Moved:
         """Of all recordings of displacements at points."""
-        by_name = {one.name: one for one in recordings}
-        found = [np.zeros((0, 9))]
-        for one in comparisons:
-            recording = by_name[one.name]
+        by_name = {recording.name: recording for recording in recordings}
+        moves = [np.zeros((0, 9))]
+        for comparison in comparisons:
+            recording = by_name[comparison.name]
             if isinstance(recording, PointsRecording):
-                moved = one.residuals_before - one.residuals_after
-                found.append(np.column_stack([recording.points[one.rows], one.residuals_before, moved]))
-        return cls(*np.split(np.concatenate(found), 3, axis=1))
+                moved = comparison.residuals_before - comparison.residuals_after
+                moves.append(np.column_stack([recording.points[comparison.rows], comparison.residuals_before, moved]))
+        return cls(*np.split(np.concatenate(moves), 3, axis=1))
 
 
 @dataclass(frozen=True, eq=False)

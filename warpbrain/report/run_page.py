@@ -85,7 +85,9 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
 
 
 def _subtitle(case: Mapping[str, Any], outcome: Mapping[str, Any]) -> str:
-    laws = ", ".join(f"{one['name']} {one['law']} {one['shear_modulus_Pa']:g} Pa" for one in case["tissues"].values())
+    laws = ", ".join(
+        f"{tissue['name']} {tissue['law']} {tissue['shear_modulus_Pa']:g} Pa" for tissue in case["tissues"].values()
+    )
     state = outcome["kind"]
     if state == "motion":
         state = f"after {1000 * outcome['time_s']:.0f} ms"
@@ -117,8 +119,8 @@ def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> N
         "run.html", summary=summary, **{**nothing, **values},
         recorded=[row[:9] for row in recorded_rows(summary["recordings"]["compared"])],
         tissues=[
-            [label, one["name"], f"{one['law']} ({one['formulation']})", f"{one['shear_modulus_Pa']:.4g}"]
-            for label, one in case["tissues"].items()
+            [label, tissue["name"], f"{tissue['law']} ({tissue['formulation']})", f"{tissue['shear_modulus_Pa']:.4g}"]
+            for label, tissue in case["tissues"].items()
         ],
         seconds=[[name, f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()],
     )  # fmt: skip

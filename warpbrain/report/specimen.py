@@ -88,14 +88,14 @@ def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
     """The computed curve of each test, with units."""
     described = []
     for recording, result in ((test.recording, test.result) for test in tests):
-        what, answer = recording.quantities
-        (factor, unit), (scale, answer_unit) = SHOWN[what], SHOWN[answer]
+        quantity, answer = recording.quantities
+        (factor, unit), (scale, answer_unit) = SHOWN[quantity], SHOWN[answer]
         described.append(
             {
                 **picked(recording, "name", "mode", "role"),
                 "rows": len(recording.imposed),
                 **({} if result.time is None else {"time_s": result.time}),
-                "imposed": {"quantity": what, "unit": unit, "values": factor * result.imposed},
+                "imposed": {"quantity": quantity, "unit": unit, "values": factor * result.imposed},
                 "response": {"quantity": answer, "unit": answer_unit, "values": scale * result.response},
                 "newton_iterations": result.newton,
                 "smallest_volume_ratio_J": result.min_J,
@@ -173,7 +173,7 @@ def tests_figure(tests: Sequence[Tested], most: int) -> Any:
 
 def _draw(axes: Any, test: Tested) -> None:
     recording, result = test.recording, test.result
-    (what, answer), (factor, unit) = recording.quantities, SHOWN[recording.quantities[0]]
+    (quantity, answer), (factor, unit) = recording.quantities, SHOWN[recording.quantities[0]]
     scale, answer_unit = _readable(recording.response, SHOWN[answer][1])
     colour, shape = _STYLES[recording.role]
     through_time = result.time is not None and recording.time is not None
@@ -188,7 +188,7 @@ def _draw(axes: Any, test: Tested) -> None:
         axes.plot(factor * result.imposed, scale * result.response, ".", color=BLACK, markersize=6.0)
     axes.axhline(0.0, color="#bbbbbb", linewidth=0.7, zorder=0)
     axes.locator_params(axis="x", nbins=6)
-    axes.set_xlabel("time [s]" if through_time else f"{what} [{unit}]" if unit else what)
+    axes.set_xlabel("time [s]" if through_time else f"{quantity} [{unit}]" if unit else quantity)
     axes.set_ylabel(f"{'nominal ' if answer == 'stress' else ''}{answer} [{answer_unit}]")
     error = f"{scale * test.comparison.after.root_mean_square:.3g} {answer_unit}"
     if recording.force_controlled:

@@ -139,16 +139,16 @@ def displacement_rows(described: Mapping[str, Any]) -> list[list[Any]]:
     ]
 
 
-def describe_prior(found: FromPrior) -> dict[str, Any]:
+def describe_prior(prior: FromPrior) -> dict[str, Any]:
     """Model, draw and laws, with units; the draw is None where the laws are those of middle curves."""
-    drawn, draw = found.drawn, None
+    drawn, draw = prior.drawn, None
     tissues: dict[str, dict[str, Any]] = {}
-    for label in found.labels:
-        tissue = found.case.tissues[label]
+    for label in prior.labels:
+        tissue = prior.case.tissues[label]
         known = {"name": tissue.name, "group": tissue.prior, "law": tissue.known_law.name}
         tissues[str(label)] = known | _law(tissue)
     if drawn is not None:
         draw = {"sample": drawn.number, "seed": drawn.seed, "redrawn": len(drawn.rejected), "reasons": drawn.rejected}
         for described, fitted in zip(tissues.values(), drawn.fits, strict=True):
             described["rms_of_fit"] = fitted.rms
-    return {"model": found.model.name, "variant": found.model.variant, "draw": draw, "tissues": tissues}
+    return {"model": prior.model.name, "variant": prior.model.variant, "draw": draw, "tissues": tissues}

@@ -44,14 +44,14 @@ class SavedResult:
     def inputs(self) -> dict[str, str]:
         """What it was made from and how, as text by name."""
         summary = self.summary
-        found = {"command": self.command}
-        found |= {f"sha256 of {name}": digest[:16] for name, digest in (summary.get("inputs_sha256") or {}).items()}
+        inputs = {"command": self.command}
+        inputs |= {f"sha256 of {name}": digest[:16] for name, digest in (summary.get("inputs_sha256") or {}).items()}
         for part in ("case", *_INPUTS):
             value = summary.get(part)
             if isinstance(value, dict):
                 value = {key: item for key, item in value.items() if key not in _NO_INPUT and "iterations" not in key}
-            found |= dict(_flat(part, value))
-        return found | dict(_flat("version of", summary.get("versions", {})))
+            inputs |= dict(_flat(part, value))
+        return inputs | dict(_flat("version of", summary.get("versions", {})))
 
     def errors(self) -> dict[str, Quantity]:
         """Root mean square differences from what was recorded, by what they are of."""
@@ -61,14 +61,14 @@ class SavedResult:
             by_name[f"{name}, nothing moved"] = Quantity(before, unit)
             by_name[name] = Quantity(after, unit, interval)
 
-        for one in (self.summary.get("recordings") or {}).get("compared", []):
-            add(one["name"], one["unit"], one["before"]["root_mean_square"], one["after"]["root_mean_square"])
-        for one in self.summary.get("predictions", []):
-            add(one["name"], one["unit"], one["root_mean_square_before"], one["root_mean_square_of_run"])
-            by_name[f"{one['name']}, moved back"] = Quantity(one["root_mean_square_after"], one["unit"])
-        for name, one in ((self.summary.get("result") or {}).get("rmse_at_recordings") or {}).items():
-            after = one["after"]
-            add(name, one["unit"], one["before"], after["p50"], (after["p05"], after["p95"]))
+        for entry in (self.summary.get("recordings") or {}).get("compared", []):
+            add(entry["name"], entry["unit"], entry["before"]["root_mean_square"], entry["after"]["root_mean_square"])
+        for entry in self.summary.get("predictions", []):
+            add(entry["name"], entry["unit"], entry["root_mean_square_before"], entry["root_mean_square_of_run"])
+            by_name[f"{entry['name']}, moved back"] = Quantity(entry["root_mean_square_after"], entry["unit"])
+        for name, entry in ((self.summary.get("result") or {}).get("rmse_at_recordings") or {}).items():
+            after = entry["after"]
+            add(name, entry["unit"], entry["before"], after["p50"], (after["p05"], after["p95"]))
         for kind, where in (("rmse_m", "all fitted"), ("heldout_rmse_m", "held out"), ("check_rmse_m", "check")):
             for stage, value in ((self.summary.get("fit") or {}).get(kind) or {}).items():
                 if value is not None:
@@ -78,18 +78,24 @@ class SavedResult:
     def tissue(self) -> dict[str, Quantity]:
         """Parameters of the tissues, by tissue and name."""
         by_name: dict[str, Quantity] = {}
-        for one in ((self.summary.get("case") or {}).get("tissues") or {}).values():
-            by_name[f"{one['name']}, shear modulus"] = Quantity(one["shear_modulus_Pa"], "Pa")
+        for parameter in ((self.summary.get("case") or {}).get("tissues") or {}).values():
+            by_name[f"{parameter['name']}, shear modulus"] = Quantity(parameter["shear_modulus_Pa"], "Pa")
         estimated = [
-            *((one, "estimate", "") for one in self.summary.get("parameters") or [] if self.command == "estimate"),
             *(
-                (one, "middle", ", over what may act")
-                for one in (self.summary.get("nothing_else") or {}).get("tissue") or []
+                (parameter, "estimate", "")
+                for parameter in self.summary.get("parameters") or []
+                if self.command == "estimate"
+            ),
+            *(
+                (parameter, "middle", ", over what may act")
+                for parameter in (self.summary.get("nothing_else") or {}).get("tissue") or []
             ),
         ]
-        for one, key, more in estimated:
-            low, high = one["interval_95"]
-            by_name[f"{one['tissue']}, {one['name']}{more}"] = Quantity(one[key], one["unit"], (low, high))
+        for parameter, key, more in estimated:
+            low, high = parameter["interval_95"]
+            by_name[f"{parameter['tissue']}, {parameter['name']}{more}"] = Quantity(
+                parameter[key], parameter["unit"], (low, high)
+            )
         return by_name
 
 
@@ -160,15 +166,17 @@ def difference(first: SavedState, second: SavedState) -> Difference:
     InputError
         If they are nowhere in one place.
     """
-    mesh, other = first.mesh, second.mesh
+    mesh, second_mesh = first.mesh, second.mesh
     size = float(np.ptp(mesh.points, axis=0).max())
-    same = mesh.tetrahedra.shape == other.tetrahedra.shape and np.array_equal(mesh.tetrahedra, other.tetrahedra)
-    same = same and mesh.points.shape == other.points.shape
-    same = same and bool(np.abs(mesh.points - other.points).max() <= _SAME * size)
+    same = mesh.tetrahedra.shape == second_mesh.tetrahedra.shape and np.array_equal(
+        mesh.tetrahedra, second_mesh.tetrahedra
+    )
+    same = same and mesh.points.shape == second_mesh.points.shape
+    same = same and bool(np.abs(mesh.points - second_mesh.points).max() <= _SAME * size)
     if same:
         there, inside = second.u, np.ones(len(mesh.points), dtype=bool)
     else:
-        location = locate(other.points, other.tetrahedra, mesh.points)
+        location = locate(second_mesh.points, second_mesh.tetrahedra, mesh.points)
         inside = location.distance <= _SAME * size
         there = location.interpolate(second.u)
     if not inside.any():
@@ -195,12 +203,12 @@ def difference(first: SavedState, second: SavedState) -> Difference:
 
 def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
     """Everything that is compared, as plain values; RMSE are of the simulation alone, but those "moved back"."""
-    one, two = first.inputs(), second.inputs()
-    names = dict.fromkeys([*one, *two])
+    inputs, two = first.inputs(), second.inputs()
+    names = dict.fromkeys([*inputs, *two])
     bodies = first.state is not None and second.state is not None
     return {
         "folders": [str(first.folder), str(second.folder)],
-        "inputs_that_differ": {n: [one.get(n), two.get(n)] for n in names if one.get(n) != two.get(n)},
+        "inputs_that_differ": {n: [inputs.get(n), two.get(n)] for n in names if inputs.get(n) != two.get(n)},
         "rmse": _pairs(first.errors(), second.errors()),
         "displacement": asdict(difference(first.state, second.state)) if bodies else None,  # type: ignore[arg-type]
         "tissue": _pairs(first.tissue(), second.tissue()),
@@ -209,10 +217,10 @@ def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
     }
 
 
-def _pairs(one: dict[str, Quantity], two: dict[str, Quantity]) -> dict[str, Any]:
+def _pairs(first: dict[str, Quantity], two: dict[str, Quantity]) -> dict[str, Any]:
     pairs = {}
-    for name in dict.fromkeys([*one, *two]):
-        both = [one.get(name), two.get(name)]
+    for name in dict.fromkeys([*first, *two]):
+        both = [first.get(name), two.get(name)]
         pairs[name] = {
             "unit": next(each.unit for each in both if each is not None),
             "values": [None if each is None else each.value for each in both],

@@ -231,8 +231,8 @@ def write_covariance(path: Path, diagnosis: Diagnosis) -> None:
 
 def write_explained(folder: Path, case: Case) -> None:
     """Write the case with what was named; one that is there of an earlier diagnosis is replaced."""
-    beside = folder.with_name(f"{UNFINISHED}{folder.name}")
-    shutil.rmtree(beside, ignore_errors=True)
-    write_case(beside, case)
+    unfinished = folder.with_name(f"{UNFINISHED}{folder.name}")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    write_case(unfinished, case)
     shutil.rmtree(folder, ignore_errors=True)
-    beside.rename(folder)
+    unfinished.rename(folder)

@@ -137,7 +137,7 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
     counted, shown, points = ~vectors.aside, list(vectors.left), anatomy.mesh.points
     first = vectors.left[shown[0]][counted]
     # the cut in whose plane most of the mismatch lies
-    view = max(VIEWS, key=lambda one: float(np.sum(first[:, one.plane] ** 2)))
+    view = max(VIEWS, key=lambda cut_plane: float(np.sum(first[:, cut_plane.plane] ** 2)))
     large = float(np.quantile(np.linalg.norm(first, axis=1), 0.95)) or 1e-3
     enlarged = _LONG * float(np.ptp(points, axis=0).max()) / large
     across, high = np.ptp(points[:, view.plane], axis=0)
@@ -271,8 +271,10 @@ def confusion_figure(rows: dict[str, dict[str, float]]) -> str:
         "Percent of the visible effect of each mechanism, at its middling place, that the best place of another cause "
         "imitates: near 100 these data cannot tell the two apart, however large the effect is."
     )
-    pairs = [(part, kind, other) for kind, row in rows.items() for other, part in row.items()]
-    most = ", ".join(f"{kind} by {other} {percent(part)}" for part, kind, other in sorted(pairs, reverse=True)[:4])
+    pairs = [(part, kind, imitator) for kind, row in rows.items() for imitator, part in row.items()]
+    most = ", ".join(
+        f"{kind} by {imitator} {percent(part)}" for part, kind, imitator in sorted(pairs, reverse=True)[:4]
+    )
     return inlined(draw, f"How much of each mechanism others imitate; most: {most}.", caption)
 
 

@@ -44,27 +44,31 @@ def candidate_rows(summary: Summary) -> list[list[str]]:
     held-out error, what it says, and why it is behind."""
     suffix, factor, unit = unit_of(summary)
     rows = []
-    for one in summary["ranking"]:
-        if one["log_evidence"] is not None:
-            held = one["heldout_rmse_change" if suffix == "m" else "heldout_rmse_change_pa"]
-            d = one["detectability"] if one["physics"] else None
-            numbers = f"{one['log_evidence']:+.1f}", "" if d is None else f"{d:.1f}"
+    for candidate in summary["ranking"]:
+        if candidate["log_evidence"] is not None:
+            held = candidate["heldout_rmse_change" if suffix == "m" else "heldout_rmse_change_pa"]
+            d = candidate["detectability"] if candidate["physics"] else None
+            numbers = f"{candidate['log_evidence']:+.1f}", "" if d is None else f"{d:.1f}"
             change = "" if held is None else f"{factor * held:+.3g} {unit}"
-            words = one["says"], one["rejected_because"]
-            rows.append([one["mechanism"], percent(one["probability"]), *numbers, change, *words])
+            words = candidate["says"], candidate["rejected_because"]
+            rows.append([candidate["mechanism"], percent(candidate["probability"]), *numbers, change, *words])
     return rows
 
 
 def estimate_in_words(summary: Summary, mechanism: str) -> str:
     """The first parameters of a candidate with their standard deviations."""
-    estimate = next(one["estimate"] for one in summary["ranking"] if one["mechanism"] == mechanism)
+    estimate = next(candidate["estimate"] for candidate in summary["ranking"] if candidate["mechanism"] == mechanism)
     each = list(estimate.items())[:3]
     return ", ".join(f"{key} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for key, v in each)
 
 
 def rejected_rows(summary: Summary) -> list[list[str]]:
     """What was not tried, and why."""
-    return [[one["mechanism"], one["rejected_because"]] for one in summary["ranking"] if one["log_evidence"] is None]
+    return [
+        [candidate["mechanism"], candidate["rejected_because"]]
+        for candidate in summary["ranking"]
+        if candidate["log_evidence"] is None
+    ]
 
 
 def fit_rows(summary: Summary) -> list[list[str]]:
@@ -73,7 +77,7 @@ def fit_rows(summary: Summary) -> list[list[str]]:
 
     def cell(value: Any) -> str:
         if isinstance(value, dict):
-            return ", ".join(f"{name} {cell(one)}" for name, one in value.items())
+            return ", ".join(f"{name} {cell(error)}" for name, error in value.items())
         return "" if value is None else f"{factor * value:.4g}"
 
     columns = [fit[f"{key}_{suffix}"] or {} for key in ("rmse", "heldout_rmse", "check_rmse")]
@@ -92,11 +96,11 @@ def fit_rows(summary: Summary) -> list[list[str]]:
 def smallest_rows(summary: Summary) -> list[list[str]]:
     """What these data would have shown of each mechanism, and from which size half would be named."""
     rows = []
-    for kind, one in summary["smallest_detectable"].items():
-        named = one.get("named_from")
+    for kind, effect in summary["smallest_detectable"].items():
+        named = effect.get("named_from")
         # of what is there or not there is no size
-        of_size = named is not None and one["unit"] != "of being there"
-        rows.append([kind, one["says"], f"{named:.2g} {one['unit']}" if of_size else ""])
+        of_size = named is not None and effect["unit"] != "of being there"
+        rows.append([kind, effect["says"], f"{named:.2g} {effect['unit']}" if of_size else ""])
     return rows
 
 
@@ -104,7 +108,10 @@ def placebo_sentences(summary: Summary) -> list[str]:
     """How often patterns that mean nothing do as well as what was added."""
     fit, words = summary["fit"], "pattern that means nothing does as well with p ="
     together = [] if fit.get("placebo_p") is None else [f"A {words} {fit['placebo_p']:.2g}."]
-    return together or [f"{one['mechanism']}: a {words} {one['placebo_p']:.2g}." for one in fit["confirmations"]]
+    return together or [
+        f"{confirmation['mechanism']}: a {words} {confirmation['placebo_p']:.2g}."
+        for confirmation in fit["confirmations"]
+    ]
 
 
 def where_in_words(where: Summary) -> str:

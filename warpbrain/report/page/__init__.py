@@ -95,7 +95,7 @@ def sections_of(template: str, **values: Any) -> list[Section]:
 
 def document(title: str, top: Top, sections: Sequence[Section]) -> str:
     """A page as one HTML file; `title` is of the window, sections without a body are left out."""
-    return str(part("frame", title, top, [one for one in sections if one.body])) + "\n"
+    return str(part("frame", title, top, [section for section in sections if section.body])) + "\n"
 
 
 def write_document(path: Path, page: str) -> None:

@@ -27,9 +27,9 @@ def panels(narrow: bool, height: float, count: int = 1, width: float = WIDTH, **
         if narrow
         else views.panels(1, count, (width, height), **options)
     )
-    for one in axes:
-        one.tick_params(labelsize=TEXT - 1)
-        one.spines[["top", "right"]].set_visible(False)
+    for panel in axes:
+        panel.tick_params(labelsize=TEXT - 1)
+        panel.spines[["top", "right"]].set_visible(False)
     return figure, axes
 
 
