@@ -71,6 +71,11 @@ def lines(template: str, macro: str, *values: Any) -> list[str]:
     return [line.rstrip() for line in text.splitlines()]
 
 
+def rendered(template: str, **values: Any) -> str:
+    """A whole text template of values."""
+    return _environment().get_template(template).render(**values)
+
+
 def _wrapped(sentence: str, following: str) -> str:
     """A sentence on lines of the width of a terminal, all but the first indented as is said."""
     return textwrap.fill(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
