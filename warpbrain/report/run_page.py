@@ -119,7 +119,7 @@ def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> N
         "run.html", summary=summary, **{**nothing, **values},
         recorded=[row[:9] for row in recorded_rows(summary["recordings"]["compared"])],
         tissues=[
-            [label, tissue["name"], f"{tissue['law']} ({tissue['formulation']})", f"{tissue['shear_modulus_Pa']:.4g}"]
+            [label, tissue["name"], f"{tissue['law']} ({tissue['formulation']})", f"{tissue['shear_modulus_Pa']:g}"]
             for label, tissue in case["tissues"].items()
         ],
         seconds=[[name, f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()],
