@@ -139,6 +139,6 @@ def write_spread_picture(path: Path, fields: Fields, title: str, subtitle: str) 
             if row == 0:
                 panel.set_title(views.heading(mesh, view, place), fontsize=11)
         axes[row].set_ylabel(name, fontsize=13)
-        bar = figure.colorbar(drawn, ax=axes[row : row + 3], location="right", shrink=0.8, aspect=30, pad=0.01)
-        bar.set_label(f"{name} of the displacement [mm]")
+        label = f"{name} of the displacement [mm]"
+        figure.colorbar(drawn, ax=axes[row : row + 3], location="right", shrink=0.8, aspect=30, pad=0.01, label=label)
     views.save(figure, path, f"{title}\n{subtitle}", 13.0)

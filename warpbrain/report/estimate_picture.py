@@ -128,6 +128,6 @@ def residuals_figure(posterior: Posterior) -> Any:
         )  # fmt: skip
         views.frame(panel, whole, view)
         panel.set_title(f"outline at {views.heading(whole, view, place)}", fontsize=10)
-    bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.03)
-    bar.set_label("distance between observed and predicted [mm], points of all depths")
+    label = "distance between observed and predicted [mm], points of all depths"
+    figure.colorbar(shown, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.03, label=label)
     return figure

@@ -212,8 +212,8 @@ def draw(
         panel.set_title(heading(pictures, name), fontsize=10)
     shades = ScalarMappable(cmap="viridis")
     shades.set_clim(0.0, scene.top)
-    bar = figure.colorbar(shades, ax=axes, location="bottom", shrink=0.7, aspect=45, pad=0.01)
-    bar.set_label("displacement [mm]; red: where it was before")
+    label = "displacement [mm]; red: where it was before"
+    figure.colorbar(shades, ax=axes, location="bottom", shrink=0.7, aspect=45, pad=0.01, label=label)
     entries = views.tissue_entries(names, whole, pictures.resected)
     entries += [(views.line(color=colour, linewidth=2.5), name) for name, colour in arrow_colours(scene).items()]
     views.legend(figure, entries, loc="outside lower center", fontsize=9, ncols=6)

@@ -200,6 +200,12 @@ def draw_part(axes: Any, section: Cut, part: Bools, **style: Any) -> None:
         axes.add_artist(PathPatch(Shape.make_compound_path(*chosen), **style))
 
 
+def draw_hatching(axes: Any, section: Cut, mesh: TetMesh, nodes: Any, hatch: str, colour: str) -> None:
+    """Hatch the elements of a cut of which most nodes are among those (n,) that are true."""
+    inside = nodes[mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
+    draw_part(axes, section, inside, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.0, zorder=2.0)
+
+
 def draw_outline(axes: Any, mesh: TetMesh, view: View, place: float, colour: str = TISSUE_EDGE) -> None:
     """Draw where the surface of a body crosses the plane of a cut."""
     from matplotlib.collections import LineCollection
