@@ -46,14 +46,13 @@ def write_page(
 def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None) -> str:
     """The page; `summary` is its `diagnosis.json`, `state` its `state.vtu`: how well the displacement is known."""
     recorded = Recorded.of(diagnosis) if isinstance(diagnosis, Diagnosis) else None
+    shown = text.shown_of(summary)
     sections = sections_of(
         "diagnosis.html",
         summary=summary,
         pictures=defaultdict(str, _pictures(diagnosis, summary, recorded, state)),
-        text=text,
-        next=[
-            [measurement["what"], f"{measurement['expected_nats']:.1f}"] for measurement in summary["next_measurement"]
-        ],
+        shown=shown,
+        candidates=[row[:7] for row in shown["candidates"]],
         aside=[] if recorded is None else recorded.aside,
         chances={candidate["mechanism"]: candidate["probability"] for candidate in summary["ranking"]},
     )

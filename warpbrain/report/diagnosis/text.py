@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -20,7 +19,23 @@ Summary = Mapping[str, Any]
 
 def diagnosis_lines(summary: Summary) -> list[str]:
     """The verdict on top, then sets of causes, each cause, the fit and what to do next."""
-    return lines("diagnosis.txt", "diagnosis", summary, sys.modules[__name__], NOTHING)
+    return lines("diagnosis.txt", "diagnosis", summary, shown_of(summary), NOTHING)
+
+
+def shown_of(summary: Summary) -> dict[str, Any]:
+    """What templates of printed lines and of the page show: rows of tables, sentences, and the unit of errors."""
+    return {
+        "unit": unit_of(summary)[2],
+        "sets": _set_rows(summary),
+        "candidates": _candidate_rows(summary),
+        "rejected": _rejected_rows(summary),
+        "fit": _fit_rows(summary),
+        "placebos": _placebo_sentences(summary),
+        "smallest": _smallest_rows(summary),
+        "measurements": [[m["what"], f"{m['expected_nats']:.1f}"] for m in summary["next_measurement"]],
+        "where": summary["where"] and _where_in_words(summary["where"]),
+        "when": summary["when"] and when_in_words(summary["when"]),
+    }
 
 
 def unit_of(summary: Summary) -> tuple[str, float, str]:
@@ -28,7 +43,7 @@ def unit_of(summary: Summary) -> tuple[str, float, str]:
     return ("m", MILLIMETRES, "mm") if "rmse_m" in summary["fit"] else ("pa", 1.0, "Pa")
 
 
-def set_rows(summary: Summary) -> list[list[str]]:
+def _set_rows(summary: Summary) -> list[list[str]]:
     """The most probable sets of causes: which, with what probability, and the log evidence against nothing."""
     sets = summary.get("combinations", summary.get("hypotheses"))
     # of a specimen it is against nothing already
@@ -39,9 +54,9 @@ def set_rows(summary: Summary) -> list[list[str]]:
     ]
 
 
-def candidate_rows(summary: Summary) -> list[list[str]]:
+def _candidate_rows(summary: Summary) -> list[list[str]]:
     """Every candidate that was tried, the most probable first: name, probability, log evidence, `d`, change of the
-    held-out error, what it says, and why it is behind."""
+    held-out error, what it says, why it is behind, and its first parameters with their standard deviations."""
     suffix, factor, unit = unit_of(summary)
     rows = []
     for candidate in summary["ranking"]:
@@ -51,18 +66,14 @@ def candidate_rows(summary: Summary) -> list[list[str]]:
             numbers = f"{candidate['log_evidence']:+.1f}", "" if d is None else f"{d:.1f}"
             change = "" if held is None else f"{factor * held:+.3g} {unit}"
             words = candidate["says"], candidate["rejected_because"]
-            rows.append([candidate["mechanism"], percent(candidate["probability"]), *numbers, change, *words])
+            values = [(name, v, v["unit"]) for name, v in list(candidate["estimate"].items())[:3]]
+            estimate = ", ".join(f"{name} {v['value']:.3g} ± {v['sd']:.2g} {unit}".rstrip() for name, v, unit in values)
+            head = candidate["mechanism"], percent(candidate["probability"])
+            rows.append([*head, *numbers, change, *words, estimate])
     return rows
 
 
-def estimate_in_words(summary: Summary, mechanism: str) -> str:
-    """The first parameters of a candidate with their standard deviations."""
-    estimate = next(candidate["estimate"] for candidate in summary["ranking"] if candidate["mechanism"] == mechanism)
-    each = list(estimate.items())[:3]
-    return ", ".join(f"{key} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for key, v in each)
-
-
-def rejected_rows(summary: Summary) -> list[list[str]]:
+def _rejected_rows(summary: Summary) -> list[list[str]]:
     """What was not tried, and why."""
     return [
         [candidate["mechanism"], candidate["rejected_because"]]
@@ -71,7 +82,7 @@ def rejected_rows(summary: Summary) -> list[list[str]]:
     ]
 
 
-def fit_rows(summary: Summary) -> list[list[str]]:
+def _fit_rows(summary: Summary) -> list[list[str]]:
     """Errors of each state, at what was fitted, held out, and only checked; beside them what others would reach."""
     (suffix, factor, _), fit = unit_of(summary), summary["fit"]
 
@@ -93,7 +104,7 @@ def fit_rows(summary: Summary) -> list[list[str]]:
     return rows
 
 
-def smallest_rows(summary: Summary) -> list[list[str]]:
+def _smallest_rows(summary: Summary) -> list[list[str]]:
     """What these data would have shown of each mechanism, and from which size half would be named."""
     rows = []
     for kind, effect in summary["smallest_detectable"].items():
@@ -104,7 +115,7 @@ def smallest_rows(summary: Summary) -> list[list[str]]:
     return rows
 
 
-def placebo_sentences(summary: Summary) -> list[str]:
+def _placebo_sentences(summary: Summary) -> list[str]:
     """How often patterns that mean nothing do as well as what was added."""
     fit, words = summary["fit"], "pattern that means nothing does as well with p ="
     together = [] if fit.get("placebo_p") is None else [f"A {words} {fit['placebo_p']:.2g}."]
@@ -114,7 +125,7 @@ def placebo_sentences(summary: Summary) -> list[str]:
     ]
 
 
-def where_in_words(where: Summary) -> str:
+def _where_in_words(where: Summary) -> str:
     """Where a mismatch is largest: a place in a body, or a part of a test."""
     if "test" in where:
         low, high = where["strain"]
