@@ -112,7 +112,7 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
         write_explained(beside / "explained", found.explained)
     write_summary(beside / "diagnosis.json", said)
     write_page(beside / "report.html", found, said)
-    print("", *diagnosis_lines(said), "", sep="\n", flush=True)
+    print(*diagnosis_lines(said), "", sep="\n", flush=True)
     return found, said
 
 

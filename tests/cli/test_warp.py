@@ -17,7 +17,7 @@ from folders import write_folder
 from landmark_files import fcsv, markup
 
 from warpbrain.report.state_files import LEFT, TRUST, UNSEEN, read_state
-from warpbrain.report.warped import read_asked, write_warped
+from warpbrain.report.warped import read_request, write_warped
 
 nibabel = pytest.importorskip("nibabel")
 
@@ -157,7 +157,7 @@ def test_the_scene_loads_maps_of_where_not_to_believe_it(folder, warped, tmp_pat
     state = read_state(warped)
     trust = np.where(state.mesh.points[:, 2] > 0.015, LEFT, UNSEEN)
     known = replace(state, deviation=np.full(len(trust), 1e-4), trust=trust)
-    asked = read_asked(folder / "T1.nii.gz", None, [])
+    asked = read_request(folder / "T1.nii.gz", None, [])
     lines, files = write_warped(tmp_path, known, asked)
     assert {"displacement_sd.nii.gz", "trust.nii.gz"} <= set(files)
     assert any("standard deviation of the displacement: up to 0.1 mm" in line for line in lines)

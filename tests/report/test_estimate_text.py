@@ -7,7 +7,8 @@ from synthetic import WHITE, block
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.probability import percent
-from warpbrain.report.estimate import averaged_lines
+from warpbrain.report.estimate import averaged_row, describe_nothing_else
+from warpbrain.report.page import lines
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue, LikelyCause
 
 
@@ -23,8 +24,13 @@ def averaged(nothing: float) -> AveragedTissue:
     )
 
 
+def printed(known: AveragedTissue) -> list[str]:
+    said = describe_nothing_else(known)
+    return lines("estimate.txt", "nothing_else", said, [averaged_row(one) for one in said["tissue"]])
+
+
 def test_what_is_more_probable_than_nothing_is_printed():
-    first, causes, _, row = averaged_lines(averaged(0.0))
+    first, causes, _, row = printed(averaged(0.0))
     assert first.endswith(f"case says: {percent(0.0)}")
     assert causes == f"  what may act: pressure {percent(1.0)}"
     assert row.split()[:3] == ["brain", "shear", "modulus"] and row.split()[-1] == "Pa"
@@ -32,4 +38,4 @@ def test_what_is_more_probable_than_nothing_is_printed():
 
 
 def test_where_nothing_is_the_most_probable_only_that_is_printed():
-    assert averaged_lines(averaged(0.6)) == ["  probability that nothing acts but what the case says: 60 %"]
+    assert printed(averaged(0.6)) == ["  probability that nothing acts but what the case says: 60 %"]

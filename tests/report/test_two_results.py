@@ -9,8 +9,9 @@ from folders import block, write_recorded
 from shapes import box
 
 from warpbrain.errors import InputError
+from warpbrain.report.page import lines
 from warpbrain.report.state_files import SavedState
-from warpbrain.report.two_results import SavedResult, describe_two, difference, read_result, two_lines
+from warpbrain.report.two_results import SavedResult, describe_two, difference, read_result
 
 pytestmark = pytest.mark.usefixtures("undrawn")
 
@@ -34,7 +35,7 @@ def test_the_same_run_twice_differs_in_nothing(results):
     assert said["inputs_that_differ"] == {}
     assert said["displacement"]["largest_mm"] == 0.0
     assert said["rmse"]["beads"]["values"][0] == said["rmse"]["beads"]["values"][1] > 0.0
-    assert "inputs that differ: none" in two_lines(said)
+    assert "inputs that differ: none" in lines("compare.txt", "compare", said)
 
 
 def test_another_tissue(results, tmp_path):
@@ -81,7 +82,7 @@ def test_verdicts_and_intervals_are_side_by_side(tmp_path):
     diagnosis = base | {"verdict": "named", "sentence": "Gravity is missing.", "fit": {"rmse_m": {"declared": 0.002}}}
     first = SavedResult(tmp_path, "estimate", estimate, None)
     second = SavedResult(tmp_path, "diagnose", diagnosis, None)
-    text = "\n".join(two_lines(describe_two(first, second)))
+    text = "\n".join(lines("compare.txt", "compare", describe_two(first, second)))
     assert "700 (400 to 1200)" in text
     assert "A  none: no diagnosis" in text and "B  named: Gravity is missing." in text
     assert "all fitted, declared" in text and "displacement" not in text

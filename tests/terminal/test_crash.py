@@ -8,7 +8,7 @@ from command import run, warpbrain
 from folders import write_folder
 
 from warpbrain.errors import InputError
-from warpbrain.terminal import crash
+from warpbrain.terminal import command
 from warpbrain.terminal.command import exit_status
 from warpbrain.terminal.record import Record
 
@@ -67,15 +67,15 @@ def test_a_folder_that_cannot_be_written_to(monkeypatch, tmp_path, capsys):
     away = tmp_path / "away"
     away.mkdir()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(crash.Path, "cwd", lambda: tmp_path / "none")
-    monkeypatch.setattr(crash.tempfile, "gettempdir", lambda: str(away))
+    monkeypatch.setattr(command.Path, "cwd", lambda: tmp_path / "none")
+    monkeypatch.setattr(command.tempfile, "gettempdir", lambda: str(away))
 
     def fail():
         raise ZeroDivisionError("x")
 
     assert exit_status("warpbrain", fail) == 70
     assert len(list(away.iterdir())) == 1
-    monkeypatch.setattr(crash.tempfile, "gettempdir", lambda: str(tmp_path / "none"))
+    monkeypatch.setattr(command.tempfile, "gettempdir", lambda: str(tmp_path / "none"))
     assert exit_status("warpbrain", fail) == 70
     assert "its report could not be saved" in capsys.readouterr().err
 

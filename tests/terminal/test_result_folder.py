@@ -28,7 +28,7 @@ def test_a_folder_with_results_is_refused(tmp_path, mark):
     with pytest.raises(InputError, match=rf"out: has results already \({mark}\): --overwrite replaces them"):
         choose_folder(tmp_path / "out", "usual", overwrite=False)
     assert choose_folder(tmp_path / "out", "usual", overwrite=True) == tmp_path / "out"
-    assert choose_folder(tmp_path / "out", "usual", overwrite=False, beside=[mark]) == tmp_path / "out"
+    assert choose_folder(tmp_path / "out", "usual", overwrite=False, allowed_marks=[mark]) == tmp_path / "out"
 
 
 def test_without_out_the_next_free_name_is_taken(tmp_path, monkeypatch):

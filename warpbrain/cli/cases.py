@@ -173,8 +173,8 @@ def _new(options: argparse.Namespace) -> None:
         if getattr(options, name) is not None:
             raise InputError(f"--{name} means nothing with {'--labels' if options.labels else '--mesh'}")
     if options.labels:
-        given = (options.folder, options.labels, options.tissue, options.others, options.size, print)
-        case = start_from_labels(*given, program=options.preset, overwrite=options.overwrite)
+        arguments = (options.folder, options.labels, options.tissue, options.others, options.size, print)
+        case = start_from_labels(*arguments, program=options.preset, overwrite=options.overwrite)
     else:
         frame = Frame(options.units or "mm", options.axes or "RAS")
         case = start_from_mesh(

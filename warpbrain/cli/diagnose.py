@@ -52,7 +52,7 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.worlds.options import DiagnosisOptions
 
     kinds = None if options.candidates == "all" else tuple(options.candidates.split(","))
-    asked = DiagnosisOptions(
+    chosen = DiagnosisOptions(
         kinds,
         options.alpha,
         options.seed,
@@ -77,31 +77,31 @@ def _run(options: argparse.Namespace) -> None:
 
     start_warp_quietly()
     device = find_device(options.device).alias
-    images = warp.asked_for(options)
+    images = warp.requested(options)
     case = find_case(options.case, options.tissue)
     warp.check_place(images, case)
     run, tables = _of_a_body() if case.specimen is None else _of_a_specimen()
 
-    diagnosing = run(case, asked, device, Listener(lambda text: say(f"  {text}")))
+    diagnosing = run(case, chosen, device, Listener(lambda text: say(f"  {text}")))
     out = choose_folder(options.out, f"warpbrain-diagnose-{safe_name(case.name)}", options.overwrite)
     note_case(record, case, device)
     say(case.title)
-    found = diagnosing.run()
-    said = describe(found, asked, device)
-    say("", *diagnosis_lines(said), sep="\n")
+    diagnosis = diagnosing.run()
+    summary = describe(diagnosis, chosen, device)
+    say(*diagnosis_lines(summary), sep="\n")
     with results_in(out, record, options.overwrite):
         for name, write in tables.items():
-            write(out / name, found)
+            write(out / name, diagnosis)
         record.files += ["report.html", "diagnosis.json", *tables]
-        if found.explained is not None:
-            write_explained(out / "explained", found.explained)
+        if diagnosis.explained is not None:
+            write_explained(out / "explained", diagnosis.explained)
             record.files.append("explained")
         # after all that it speaks of: whoever finds it finds the others
-        write_summary(out / "diagnosis.json", said)
+        write_summary(out / "diagnosis.json", summary)
         state = None if case.specimen is not None else read_state(out / "state.vtu")
-        write_page(out / "report.html", found, said, state)
-        if images is not None:
-            record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
+        write_page(out / "report.html", diagnosis, summary, state)
+        if images is not None and state is not None:
+            warp.warp(state, out, images, record, options.quiet)
 
 
 #: What diagnoses a case, and what is written of it beside what all cases have.
@@ -110,8 +110,7 @@ _Way = tuple[Callable[..., Any], dict[str, Callable[[Path, Any], None]]]
 
 def _of_a_body() -> _Way:
     from warpbrain.diagnosis.diagnose import Diagnosing
-    from warpbrain.report.diagnosis.files import write_covariance, write_map, write_points
-    from warpbrain.report.state_files import write_diagnosed_state
+    from warpbrain.report.diagnosis.files import write_covariance, write_diagnosed_state, write_map, write_points
 
     return Diagnosing, {
         "map.vtu": write_map,

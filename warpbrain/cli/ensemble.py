@@ -108,8 +108,8 @@ def _ensemble(options: argparse.Namespace) -> None:
         _warn(model, samples, options, say)
     # the same command goes on with what is there, so its folder is that of before
     out = options.out or Path(f"warpbrain-ensemble-{safe_name(case.name)}-{options.tissue}")
-    beside = ("ensemble.json", "summary.json") if (out / "ensemble.json").exists() else ()
-    choose_folder(out, "", options.overwrite, beside)
+    earlier = ("ensemble.json", "summary.json") if (out / "ensemble.json").exists() else ()
+    choose_folder(out, "", options.overwrite, earlier)
     if options.overwrite:
         discard(out)
     processes = options.processes or processors()
@@ -124,8 +124,8 @@ def _ensemble(options: argparse.Namespace) -> None:
     with Progress("summing up", options.quiet) as progress:
         to_rest, outcomes = options.steps is None, store.outcomes()
         result = results_of(case, model.mesh, samples, outcomes, to_rest, lambda n: progress.show(n / len(samples)))
-    said = describe_ensemble(result)
-    say("", *ensemble_lines(said), sep="\n")
+    result_summary = describe_ensemble(result)
+    say("", *ensemble_lines(result_summary), sep="\n")
     summary = {
         "case": described,
         "inputs_sha256": fingerprints(case),
@@ -133,7 +133,7 @@ def _ensemble(options: argparse.Namespace) -> None:
         "course": course,
         "precision": options.precision,
         "workers": workers.name,
-        "result": said,
+        "result": result_summary,
         "seconds": seconds,
         "samples_computed_in_these_seconds": computed,
         "versions": tables.machine(),

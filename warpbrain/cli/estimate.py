@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.cli import warp
-from warpbrain.cli.options import WARPED, add_results, add_to, note_case
+from warpbrain.cli.options import WARPED, add_results, add_to, drawn, note_case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from warpbrain.estimation.options import EstimationOptions
     from warpbrain.estimation.posterior import Posterior
     from warpbrain.recordings.registration import Registration
-    from warpbrain.report.warped import Asked
+    from warpbrain.report.warped import WarpRequest
     from warpbrain.terminal.record import Record
     from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
@@ -90,7 +90,7 @@ def _run(options: argparse.Namespace) -> None:
 
     start_warp_quietly()
     device = find_device(options.device).alias
-    images = warp.asked_for(options)
+    images = warp.requested(options)
     if images is not None and options.method == "grid":
         raise InputError("--method grid: has no state that --image, --labels and --points could be warped by")
     case = find_case(options.case, options.tissue)
@@ -145,16 +145,18 @@ def _options(options: argparse.Namespace) -> EstimationOptions:
 
 
 def _estimate(
-    options: argparse.Namespace, settings: EstimationOptions, case: Case, images: Asked | None, out: Path
+    options: argparse.Namespace, settings: EstimationOptions, case: Case, images: WarpRequest | None, out: Path
 ) -> None:
     from warpbrain.estimation.estimate import Estimation
     from warpbrain.estimation.fit import GaussNewtonStep
     from warpbrain.estimation.options import Listener
     from warpbrain.gp.trained import find_model
-    from warpbrain.report import estimate_picture
-    from warpbrain.report.estimate import describe_estimate, estimate_lines, write_predictions
+    from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
+    from warpbrain.report.estimate_page import write_estimate_page
+    from warpbrain.report.estimate_picture import agreement_figure, densities_figure, residuals_figure
     from warpbrain.report.files import write_summary
-    from warpbrain.report.state_files import write_estimated_state
+    from warpbrain.report.state_files import read_state
+    from warpbrain.report.views import save
     from warpbrain.simulation.system import find_device
     from warpbrain.terminal.result_folder import results_in
 
@@ -180,38 +182,20 @@ def _estimate(
         averaged, where = _what_else(posterior, options.device, on_stage)
     elif options.causes is None:
         say("", f"what else may act is left out on more than {_LARGEST} nodes; --causes computes it", sep="\n")
-    say("", *estimate_lines(posterior, averaged), sep="\n")
     described = describe_estimate(posterior, find_device(options.device).alias, averaged)
+    say(*estimate_lines(described), sep="\n")
     with results_in(out, record, options.overwrite):
         write_predictions(out / "predictions.csv", posterior)
         write_estimated_state(out / "state.vtu", posterior, where)
-        estimate_picture.write_prior_and_posterior(out / "posterior.png", posterior)
-        estimate_picture.write_observed_against_predicted(out / "predicted.png", posterior)
-        estimate_picture.write_residuals(out / "residuals.png", posterior)
+        save(densities_figure(posterior, narrow=False), out / "posterior.png", case.title, 10.0)
+        save(agreement_figure(posterior, narrow=False), out / "predicted.png", case.title, 10.0)
+        save(residuals_figure(posterior), out / "residuals.png", case.title)
         write_summary(out / "estimate.json", described)
         record.files += ["estimate.json", "predictions.csv", "state.vtu"]
         record.files += ["posterior.png", "predicted.png", "residuals.png"]
-        record.files += _illustrate(out, posterior, described, say)
+        record.files += drawn(write_estimate_page(out, described, posterior), say)
         if images is not None:
-            record.files += warp.warp(out / "state.vtu", out, images, say, options.quiet)
-
-
-def _illustrate(out: Path, posterior: Posterior, said: dict[str, Any], say: Callable[..., None]) -> list[str]:
-    """Write the picture of the estimated state and the page; returns the names of the files."""
-    from warpbrain.report.estimate_page import judged_of, moved_of, write_estimate_page
-    from warpbrain.report.picture import draw
-    from warpbrain.report.state_files import read_state
-
-    case, state = posterior.case, read_state(out / "state.vtu")
-    names = {label: tissue.name for label, tissue in case.tissues.items()}
-    lines = ["the most probable state of the estimate", *judged_of(said).sentences]
-    path = out / "deformation.png"
-    pictures = draw(path, case.mesh, state.mesh, state.u, names, moved_of(posterior), case.title, lines)
-    write_estimate_page(out / "report.html", said, posterior, state, pictures)
-    if isinstance(pictures, str):
-        say("", f"deformation.png is not drawn: {pictures}", sep="\n")
-        return ["report.html"]
-    return ["deformation.png", "report.html"]
+            warp.warp(read_state(out / "state.vtu"), out, images, record, options.quiet)
 
 
 def _what_else(

@@ -96,22 +96,22 @@ def _show(options: argparse.Namespace) -> None:
         f"{model.name} model of the literature as {model.variant}: {len(studies)} studies of {len(groups)} group"
         + "s" * (len(groups) > 1)
     )
-    found = []
+    rows = []
     with Progress("moduli") as bar:
         for index, (group, law) in enumerate(wanted):
             bar.show(index / len(wanted), f"{group}, {law}")
-            found.append(moduli(model, group, law, options.draws, options.seed, options.poisson))
-    print("", *moduli_lines(found), sep="\n")
-    if any(reason for one in found for reason in one.unstable):
+            rows.append(moduli(model, group, law, options.draws, options.seed, options.poisson))
+    print("", *moduli_lines(rows), sep="\n")
+    if any(reason for row in rows for reason in row.unstable):
         print("(a modulus in brackets is of a law that is unstable)")
-    error = 100.0 * max(one.median_error for one in found)
+    error = 100.0 * max(row.median_error for row in rows)
     print(f"{options.draws} draws each: their medians are known to {error:.0f} % or better")
     curved = [group for group in groups if group.startswith("hyperelastic/")]
     if curved and isinstance(model, Hierarchical):
         papers = asymmetries_of_papers(model.studies)
         print("", *asymmetry_lines([asymmetry(model, group) for group in curved], papers), sep="\n")
     other = trained("coregionalised" if model.name == KINDS[0] else "hierarchical", options.variant or VARIANTS[0])
-    write_moduli(out / "moduli.csv", found)
+    write_moduli(out / "moduli.csv", rows)
     save(draw_studies(model, options.group), out / "studies.png")
     save(draw_draws(model, options.group, options.seed), out / "draws.png")
     save(draw_extrapolation(model, other, options.group), out / "extrapolation.png")
@@ -146,7 +146,7 @@ def _fit(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import check_new_folder, whole_folder
     from warpbrain.gp.trained import fit_model, write_model
-    from warpbrain.report.generative_text import fit_lines
+    from warpbrain.report.page import lines
 
     out = options.out or Path(f"warpbrain-gp-{options.gp}-{options.variant}")
     check_new_folder(out)
@@ -154,7 +154,7 @@ def _fit(options: argparse.Namespace) -> None:
         model, record = fit_model(
             options.gp, options.variant, options.add, climbs=options.climbs or 1, progress=bar.show
         )
-    print(*fit_lines(model, record), sep="\n")
+    print(*lines("gp.txt", "fit", model, record), sep="\n")
     if options.add is not None:
         _print_change(options, model)
     with whole_folder(out) as folder:
@@ -171,18 +171,18 @@ def _print_change(options: argparse.Namespace, model: Process) -> None:
 
     added = model.studies[len(read_studies(options.variant)) :]
     for group in dict.fromkeys(study.group for study in added):
-        found = {
-            said: moduli(one, group, "neo-hookean")
-            for said, one in (("before", trained(options.gp, options.variant)), ("after", model))
-            if group in one.groups
+        tables = {
+            when: moduli(process, group, "neo-hookean")
+            for when, process in (("before", trained(options.gp, options.variant)), ("after", model))
+            if group in process.groups
         }
-        head, *lines = moduli_lines(list(found.values()))
+        head, *lines = moduli_lines(list(tables.values()))
         print(
             "", f"with {', '.join(study.name for study in added if study.group == group)}:", f"{'':10}{head}", sep="\n"
         )
-        for said, line in zip(found, lines, strict=True):
-            print(f"  {said:<8}{line}")
-        if len(found) == 1:
+        for when, line in zip(tables, lines, strict=True):
+            print(f"  {when:<8}{line}")
+        if len(tables) == 1:
             print("  (there was no study of this group before)")
 
 
@@ -231,19 +231,19 @@ def _sample(options: argparse.Namespace) -> None:
     model = _chosen_model(options)
     if options.sweep is None:
         first: tuple[str, ...] = ("draw", "attempts")
-        rows, said = _drawn(options, model)
+        rows, sentences = _drawn(options, model)
         last = "why attempts were redrawn"
     else:
         first = tuple(f"k of {group}" for group in options.group)
-        rows, said = _swept(options, model)
+        rows, sentences = _swept(options, model)
         last = "unstable"
     if options.csv is None:
         shown = first if options.sweep is None else tuple(f"k {i}" for i in range(1, len(first) + 1))
         print(*law_lines(shown, options.group, rows), sep="\n")
     else:
         write_laws(options.csv, first, options.group, rows, last)
-        said.append(f"written to {options.csv}")
-    print("", *said, sep="\n")
+        sentences.append(f"written to {options.csv}")
+    print("", *sentences, sep="\n")
 
 
 def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
@@ -255,7 +255,7 @@ def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
         for drawn in draw_many(model, options.group, options.model, options.number, seed, options.poisson):
             draws.append(drawn)
             bar.show(len(draws) / options.number)
-    rows = [LawRow((str(one.number), str(1 + len(one.rejected))), one.fits, one.rejected) for one in draws]
+    rows = [LawRow((str(draw.number), str(1 + len(draw.rejected))), draw.fits, draw.rejected) for draw in draws]
     return rows, redrawn_lines(draws)
 
 
@@ -273,8 +273,8 @@ def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
         wrong = tuple(f"{key[0]}: {reasons[key]}" for key in keys if reasons[key])
         rows.append(LawRow(tuple(f"{k:g}" for k in combination), tuple(fits[key] for key in keys), wrong))
     count = sum(bool(row.reasons) for row in rows)
-    said = [f"unstable: {count} of {len(rows)}"]
-    return rows, said + sorted({f"  {reason}" for row in rows for reason in row.reasons})
+    sentences = [f"unstable: {count} of {len(rows)}"]
+    return rows, sentences + sorted({f"  {reason}" for row in rows for reason in row.reasons})
 
 
 def _add_compare(actions: argparse._SubParsersAction[Any]) -> None:

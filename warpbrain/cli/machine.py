@@ -35,9 +35,9 @@ def _doctor(options: argparse.Namespace) -> None:
     record: Record = options.record
     start_warp_quietly()
     with Progress("self-test", options.json) as progress:
-        found = health(lambda device: progress.show(0.0, device))
-    record.say(*([json.dumps(found, indent=1)] if options.json else health_lines(found)), sep="\n")
-    failed = [test["device"] for test in found["self_test"] if test["problem"]]
+        report = health(lambda device: progress.show(0.0, device))
+    record.say(*([json.dumps(report, indent=1)] if options.json else health_lines(report)), sep="\n")
+    failed = [test["device"] for test in report["self_test"] if test["problem"]]
     if failed:
         raise SolveError(f"doctor: the self-test failed on {', '.join(failed)}")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,8 @@ from warpbrain.errors import InputError
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
+    from warpbrain.report.picture import Pictures
+    from warpbrain.simulation.system import System
     from warpbrain.terminal.record import Record
 
 _RESULT = "folder that run, estimate, diagnose or ensemble has written, or its .vtu file"
@@ -107,3 +110,18 @@ def note_case(record: Record, case: Case, device: str) -> None:
         device=device,
         versions=", ".join(f"{name} {version}" for name, version in machine().items()),
     )
+
+
+def note_device(record: Record, case: Case, system: System, precision: str) -> None:
+    """Say in the log and in print where is computed."""
+    where = f"{system.device.name} ({system.device.alias}), {precision} precision"
+    note_case(record, case, where)
+    record.say(f"  device    {where}")
+
+
+def drawn(pictures: Pictures | str, say: Callable[..., None]) -> list[str]:
+    """Names of the files that a page and its pictures are in; says why there are no pictures, if there are none."""
+    if isinstance(pictures, str):
+        say("", f"deformation.png is not drawn: {pictures}", sep="\n")
+        return ["report.html"]
+    return ["deformation.png", "report.html"]

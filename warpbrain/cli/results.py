@@ -70,19 +70,20 @@ def add_compare(commands: argparse._SubParsersAction[Any]) -> None:
 
 def _compare(options: argparse.Namespace) -> None:
     from warpbrain.report.files import write_summary
-    from warpbrain.report.two_results import describe_two, read_result, two_lines
+    from warpbrain.report.page import lines
+    from warpbrain.report.two_results import describe_two, read_result
 
     if options.json is not None:
         check_writable(options.json.absolute())
     first, second = read_result(options.first), read_result(options.second)
     try:
-        said = describe_two(first, second)
+        comparison = describe_two(first, second)
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(
             f"{options.first} and {options.second}: not as this version writes results: {type(error).__name__} {error}"
         ) from None
-    print(*two_lines(said), sep="\n")
+    print(*lines("compare.txt", "compare", comparison), sep="\n")
     if options.json is not None:
-        write_summary(options.json.absolute(), said)
+        write_summary(options.json.absolute(), comparison)

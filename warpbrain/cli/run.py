@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import argparse
 import math
-import textwrap
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli import warp
+from warpbrain.cli import run_specimen, warp
 from warpbrain.cli.options import (
     WARPED,
     add_results,
     add_to,
-    note_case,
+    drawn,
+    note_device,
     require_poisson,
     require_positive,
     require_tolerance,
     require_whole,
 )
-from warpbrain.cli.run_progress import ending_lines, watching
+from warpbrain.cli.run_progress import watching
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
@@ -35,10 +34,6 @@ if TYPE_CHECKING:
     from warpbrain.simulation.result import Result
     from warpbrain.simulation.system import System
     from warpbrain.terminal.record import Record
-
-
-#: Letters of a line of a picture's title.
-_LINE = 150
 
 
 def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
@@ -117,9 +112,12 @@ def _run(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import safe_name
     from warpbrain.report import summary as tables
-    from warpbrain.report.comparison import comparison_lines, describe_comparisons, mesh_error_lines, write_comparisons
+    from warpbrain.report.comparison import describe_comparisons, recorded_rows, write_comparisons
     from warpbrain.report.files import write_result, write_summary
-    from warpbrain.report.summary import describe_prior, prior_lines
+    from warpbrain.report.page import lines
+    from warpbrain.report.run_page import write_run_page
+    from warpbrain.report.state_files import read_state
+    from warpbrain.report.summary import describe_prior
     from warpbrain.simulation.courses import Course
     from warpbrain.simulation.run import Running
     from warpbrain.simulation.system import begin_loading_kernels, find_device, find_precision
@@ -128,14 +126,12 @@ def _run(options: argparse.Namespace) -> None:
 
     start_warp_quietly()
     begin_loading_kernels(find_device(options.device), find_precision(options.precision))
-    asked = warp.asked_for(options)
-    case, found = _case(options)
-    warp.check_place(asked, case)
+    to_warp = warp.requested(options)
+    case, drawn_laws = _case(options)
+    warp.check_place(to_warp, case)
     out = choose_folder(options.out, f"warpbrain-{safe_name(case.name)}-{options.tissue}", options.overwrite)
-    prior = None if found is None else describe_prior(found)
+    prior = None if drawn_laws is None else describe_prior(drawn_laws)
     if case.specimen is not None:
-        from warpbrain.cli import run_specimen
-
         run_specimen.run(options, case, out, prior)
         return
     needed_by = () if options.mesh_error is None else ("--mesh-error",)
@@ -151,34 +147,34 @@ def _run(options: argparse.Namespace) -> None:
     model, system = running.model, running.system
     chosen = "--mesh-error elements is about them" if about_elements else running.chosen
     described = tables.describe_case(case, model, chosen)
-    say(*tables.case_lines(described), *prior_lines(prior), sep="\n")
-    note_device(options, case, system)
+    say(*lines("run.txt", "case", described, prior, tables.STAND_IN), sep="\n")
+    note_device(record, case, system, options.precision)
 
     with Progress("kernels", options.quiet) as loading:
         loading.show(0.0, "the first run on a machine compiles them")
         loaded = system.load_kernels()
     with watching(options, say) as watched:
         done = running.run(watched)
-    for line in ending_lines(done.followed.solution):
+    for line in lines("run.txt", "ending", done.followed.solution):
         say(line)
     outcome, counts = done.followed.solution, done.followed.calls
     first_step = done.followed.begun - start
     seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **done.followed.seconds}
     result, observed = done.result, done.observed
-    said = tables.describe_result(result)
+    displacements = tables.describe_result(result)
     compared = describe_comparisons(observed)
-    say("", *tables.displacement_lines(said), sep="\n")
-    if case.recordings:
-        say("", *comparison_lines(compared, options.legacy_rmse), sep="\n")
+    say(*lines("run.txt", "displacement", displacements, tables.displacement_rows(displacements)), sep="\n")
+    for line in lines("run.txt", "recordings", compared, recorded_rows(compared["compared"]), options.legacy_rmse):
+        say(line)
     estimated, doubt = _mesh_error(options, case, system, result, observed, outcome)
     if doubt is not None:
-        say("", *mesh_error_lines(doubt), sep="\n")
-    say("", *tables.timing_lines(seconds, counts), sep="\n")
+        say("", *lines("run.txt", "mesh_error", doubt), sep="\n")
+    say(*lines("run.txt", "times", seconds, counts), sep="\n")
 
     summary = {
-        **head_of_summary(options, case, described, prior, system),
+        **tables.describe_opening(case, described, prior, system, options.precision),
         "solution": outcome,
-        "result": said,
+        "result": displacements,
         "recordings": compared,
         **({} if doubt is None else {"mesh_error": doubt}),
         "seconds_by_phase": seconds,
@@ -188,35 +184,14 @@ def _run(options: argparse.Namespace) -> None:
     }
     with results_in(out, record, options.overwrite):
         write_result(out / "result.vtu", result, None if estimated is None else estimated.u)
-        record.files += ["result.vtu", "summary.json", *_illustrate(out, case, result, observed, summary, say)]
+        record.files += ["result.vtu", "summary.json", *drawn(write_run_page(out, summary, done), say)]
         if observed.comparisons:
             write_comparisons(out / "comparison.csv", case, observed)
             record.files.append("comparison.csv")
         # after all that it speaks of: whoever finds it finds the others
         write_summary(out / "summary.json", summary)
-        if asked is not None:
-            record.files += warp.warp(out / "result.vtu", out, asked, say, options.quiet)
-
-
-def note_device(options: argparse.Namespace, case: Case, system: System) -> None:
-    """Say in the log and in print where is computed."""
-    where = f"{system.device.name} ({system.device.alias}), {options.precision} precision"
-    note_case(options.record, case, where)
-    options.record.say(f"  device    {where}")
-
-
-def head_of_summary(
-    options: argparse.Namespace, case: Case, described: Mapping[str, Any], prior: dict[str, Any] | None, system: System
-) -> dict[str, Any]:
-    """How every summary of a run begins: what was computed, of which files, and where."""
-    from warpbrain.report.files import fingerprints
-
-    return {
-        "case": described,
-        "inputs_sha256": fingerprints(case),
-        **({} if prior is None else {"prior": prior}),
-        "device": {"name": system.device.name, "alias": system.device.alias, "precision": options.precision},
-    }
+        if to_warp is not None:
+            warp.warp(read_state(out / "result.vtu"), out, to_warp, record, options.quiet)
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -257,11 +232,11 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     case = case.with_shear_moduli(moduli)
     if options.poisson is not None:
         case = replace(case, poisson=options.poisson)
-    for said in options.assumed:
-        case = assume(case, said)
-    found = _from_prior(options, case)
-    if found is not None:
-        case = found.case
+    for text in options.assumed:
+        case = assume(case, text)
+    prior = _from_prior(options, case)
+    if prior is not None:
+        case = prior.case
     if not options.allow_unstable:
         for label, tissue in sorted(case.tissues.items()):
             try:
@@ -270,7 +245,7 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
                 raise UnstableLawError(
                     f"{case.path}: [tissue.{label}] {error}; --allow-unstable computes with it all the same"
                 ) from None
-    return case, found
+    return case, prior
 
 
 def _from_prior(options: argparse.Namespace, case: Case) -> FromPrior | None:
@@ -338,7 +313,7 @@ def _mesh_error(
     smaller = options.mesh_error == "size"
     try:
         with Progress("mesh error", options.quiet) as progress:
-            found = mesh_error(
+            estimated_error = mesh_error(
                 case,
                 system.model,
                 result,
@@ -350,35 +325,5 @@ def _mesh_error(
     except SolveError as error:
         # the run itself is sound
         return None, {"unknown": str(error)}
-    without = observe_without(case, result, found, outcome.get("time_s"))
-    return found, describe_mesh_error(found, system.model.elements, observed, without)
-
-
-def _illustrate(
-    out: Path, case: Case, result: Result, observed: Observed, summary: dict[str, Any], say: Callable[..., None]
-) -> list[str]:
-    """Write what people look at; returns the names of the files."""
-    from warpbrain.report.picture import Moved, draw
-    from warpbrain.report.run_page import write_run_page
-
-    moved = Moved.of(case.recordings, observed.comparisons)
-    names = {label: tissue.name for label, tissue in case.tissues.items()}
-    left_out = [line for text in summary["case"]["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
-    lines = [_subtitle(summary["case"], summary["solution"]), *summary["recordings"]["in_words"], *left_out]
-    pictures = draw(out / "deformation.png", case.mesh, result.mesh, result.u, names, moved, case.title, lines)
-    write_run_page(out / "report.html", summary, result, case.mesh, moved, pictures)
-    if isinstance(pictures, str):
-        say("", f"deformation.png is not drawn: {pictures}", sep="\n")
-        return ["report.html"]
-    return ["deformation.png", "report.html"]
-
-
-def _subtitle(case: Mapping[str, Any], outcome: Mapping[str, Any]) -> str:
-    laws = ", ".join(f"{one['name']} {one['law']} {one['shear_modulus_Pa']:g} Pa" for one in case["tissues"].values())
-    state = outcome["kind"]
-    if state == "motion":
-        state = f"after {1000 * outcome['time_s']:.0f} ms"
-    elif state == "slow change":
-        state = f"after {outcome['time_s']:g} s"
-    stand_in = "stand-in, not the patient's images; " if case["origin"] == "stand-in" else ""
-    return f"{stand_in}{laws}; {state}"
+    without = observe_without(case, result, estimated_error, outcome.get("time_s"))
+    return estimated_error, describe_mesh_error(estimated_error, system.model.elements, observed, without)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -82,22 +82,3 @@ def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[
 
     with Progress(name, options.quiet) as progress:
         yield Watching(on_newton, on_relaxation, on_motion, on_slow_newton, on_moment)
-
-
-def ending_lines(solution: Mapping[str, Any]) -> list[str]:
-    """How closely the state was found."""
-    if solution["kind"] == "at rest":
-        residual, goal = solution["relative_residual"], solution["tolerance"]
-        return [f"  at rest: relative out-of-balance force {residual:.1e} (goal {goal:.1e})"]
-    if solution["kind"] != "equilibrium":
-        return []
-    lines = [
-        f"  converged: relative out-of-balance force {solution['relative_residual']:.1e} "
-        f"(goal {solution['tolerance']:.1e}), stored energy {1000 * solution['stored_energy_J']:.4g} mJ"
-    ]
-    if unstable := solution["iterations_with_indefinite_tangent"]:
-        lines.append(
-            f"  note: the tangent was indefinite in {unstable} iterations; this may be another "
-            "equilibrium than the one that a slowly growing load reaches first"
-        )
-    return lines

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpbrain.cli.run import head_of_summary, note_device
+from warpbrain.cli.options import note_device
 from warpbrain.errors import InputError
 from warpbrain.terminal.progress import Progress
 
@@ -23,9 +23,10 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     from warpbrain.report import specimen as text
     from warpbrain.report.comparison import describe_comparisons
     from warpbrain.report.files import write_summary
+    from warpbrain.report.page import lines
     from warpbrain.report.run_page import write_specimen_page
     from warpbrain.report.specimen import write_tests_picture
-    from warpbrain.report.summary import machine, prior_lines, timing_lines
+    from warpbrain.report.summary import describe_opening, machine
     from warpbrain.simulation.observation import Observed
     from warpbrain.simulation.specimen_run import SpecimenRunning
     from warpbrain.terminal.result_folder import results_in
@@ -37,15 +38,15 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     system = rig.system
     in_time = any(rig.follows_time(recording) for recording in running.tests)
     described = text.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
-    say(*text.specimen_lines(described), *prior_lines(prior), sep="\n")
-    note_device(options, case, system)
+    say(*lines("run.txt", "specimen", described, prior), sep="\n")
+    note_device(record, case, system, options.precision)
 
     seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}
     with Progress("tests", options.quiet) as progress:
         done = running.run(progress.show).tests
     seconds |= rig.solver.clock.seconds
-    say("", *text.tested_lines(done), sep="\n")
-    say("", *timing_lines(seconds, rig.solver.clock.counts), sep="\n")
+    say(*lines("run.txt", "tests", text.test_rows(done)), sep="\n")
+    say(*lines("run.txt", "times", seconds, rig.solver.clock.counts), sep="\n")
 
     [material] = system.model.materials.values()
     acting = ", ".join(mechanism.kind for mechanism in system.model.mechanisms) or "elastic"
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
         f"nu = {material.poisson:g}; {acting}"
     )
     summary = {
-        **head_of_summary(options, case, described, prior, system),
+        **describe_opening(case, described, prior, system, options.precision),
         "solution": {"kind": "tests", "tolerance": rig.solver.tolerance, "tests": text.describe_tests(done)},
         "recordings": describe_comparisons(Observed(tuple(test.comparison for test in done), ())),
         "seconds_by_phase": seconds,
@@ -76,8 +77,8 @@ def _check(options: argparse.Namespace, case: Case) -> None:
             f"--mesh-error: {case.path} has a [specimen], which has no one state: compare --elements tet4-averaged"
         )
     motions = {"--steps": options.steps is not None, "--to-rest": options.to_rest, "--until": options.until is not None}
-    for option, given in motions.items():
-        if given:
+    for option, asked_of in motions.items():
+        if asked_of:
             raise InputError(
                 f"{option}: {case.path} has a [specimen], whose tests are quasi-static: there is no motion"
             )

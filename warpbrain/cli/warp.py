@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.cli.options import WARPED, add_to
 from warpbrain.errors import InputError
+from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
     from warpbrain.report.state_files import SavedState
-    from warpbrain.report.warped import Asked
+    from warpbrain.report.warped import WarpRequest
     from warpbrain.terminal.record import Record
 
 
@@ -35,41 +35,34 @@ def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
     parser.set_defaults(call=_run)
 
 
-def asked_for(options: argparse.Namespace) -> Asked | None:
+def requested(options: argparse.Namespace) -> WarpRequest | None:
     """What is to be warped, read before long work so that what is wrong with it is known then; None if nothing is."""
     if options.image is None and options.labels is None and not options.points:
         return None
-    from warpbrain.report.warped import read_asked
+    from warpbrain.report.warped import read_request
 
-    return read_asked(options.image, options.labels, options.points)
+    return read_request(options.image, options.labels, options.points)
 
 
-def check_place(asked: Asked | None, case: Case) -> None:
+def check_place(request: WarpRequest | None, case: Case) -> None:
     """`InputError` if what is to be warped is not of the case, before anything is computed."""
-    if asked is None:
+    if request is None:
         return
     if case.specimen is not None:
         raise InputError(f"{case.path}: [specimen]: --image, --labels and --points are of a body, not of tests")
     from warpbrain.report.warped import check_place
 
-    check_place(asked, case.mesh, case.path)
+    check_place(request, case.mesh, case.path)
 
 
-def warp(result: Path, out: Path, asked: Asked, say: Callable[..., None], quiet: bool) -> list[str]:
-    """Warp by a result, say what there is to say; returns the names of the files."""
-    from warpbrain.report.state_files import read_state
-
-    return _write(read_state(result), out, asked, say, quiet)
-
-
-def _write(state: SavedState, out: Path, asked: Asked, say: Callable[..., None], quiet: bool) -> list[str]:
+def warp(state: SavedState, out: Path, request: WarpRequest, record: Record, quiet: bool) -> None:
+    """Warp by the body of a result, say what there is to say and note the names of the files."""
     from warpbrain.report.warped import write_warped
-    from warpbrain.terminal.progress import Progress
 
     with Progress("warping", quiet) as progress:
-        lines, files = write_warped(out, state, asked, progress.show)
-    say("", *lines, sep="\n")
-    return files
+        lines, files = write_warped(out, state, request, progress.show)
+    record.say("", *lines, sep="\n")
+    record.files += files
 
 
 def _run(options: argparse.Namespace) -> None:
@@ -78,18 +71,18 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report.state_files import read_state
     from warpbrain.terminal.result_folder import results_in
 
-    asked = asked_for(options)
-    if asked is None:
+    request = requested(options)
+    if request is None:
         raise InputError("expected --image, --labels or --points: what is to be warped")
     record: Record = options.record
     out = options.out or (options.result if options.result.is_dir() else options.result.parent)
     # no folder is made for a result that is none, or an image of another body
     state = read_state(options.result)
-    warped.check_place(asked, state.mesh, state.path)
-    if not options.overwrite and (there := warped.in_the_way(out, asked)):
+    warped.check_place(request, state.mesh, state.path)
+    if not options.overwrite and (there := warped.in_the_way(out, request)):
         raise InputError(f"{out}: has {', '.join(there)} already: --overwrite replaces them, --out writes elsewhere")
     check_output_folder(out)
     record.note(result=str(state.path))
     # beside the result and what else was made of it
     with results_in(out, record, replace=False):
-        record.files += _write(state, out, asked, record.say, options.quiet)
+        warp(state, out, request, record, options.quiet)

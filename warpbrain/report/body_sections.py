@@ -15,7 +15,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page import Section, Top, document, part, write_document
-from warpbrain.report.page.figures import TEXT, data, inlined, panels
+from warpbrain.report.page.figures import TEXT, colour_bar, data, inlined, panels
 from warpbrain.report.page.scene import Arrows, Field, View, viewer
 from warpbrain.report.picture import Moved, Pictures, annotations_of, arrow_colours, heading, round_factor, scene_of
 from warpbrain.report.slices import cut
@@ -143,14 +143,10 @@ def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float
                 left = (state.trust == LEFT).astype(np.float64)
                 section = cut(state.mesh.points, state.mesh.tetrahedra, left, view.axis, place)
                 for value, hatch, colour in ((UNSEEN, "//////", "white"), (LEFT, "....", VERMILLION)):
-                    inside = (state.trust == value)[state.mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
-                    style = {"facecolor": "none", "edgecolor": colour, "hatch": hatch, "linewidth": 0.0, "zorder": 2.0}
-                    views.draw_part(panel, section, inside, **style)
+                    views.draw_hatching(panel, section, state.mesh, state.trust == value, hatch, colour)
                 views.draw_level(panel, section, 0.5, VERMILLION, zorder=2.5)
             panel.set_title(views.heading(whole, view, place), fontsize=TEXT)
-        bar = figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.9 if narrow else 0.5, aspect=40, pad=0.02)
-        bar.set_label("standard deviation of the displacement [mm]", fontsize=TEXT - 1)
-        bar.ax.tick_params(labelsize=TEXT - 2)
+        colour_bar(figure, drawn, axes, narrow, "standard deviation of the displacement [mm]")
         return figure
 
     return inlined(draw, "Three cuts with the deviation.", words)

@@ -255,7 +255,7 @@ def _render(scene: _Scene) -> tuple[Any, Camera]:
     whole = scene.mesh
     left = whole.without(scene.resected)[0] if scene.resected.any() else whole
     recorded: list[PointsRecording | SurfaceRecording] = [*scene.tracked, *scene.surfaces]
-    where = np.concatenate([np.zeros((0, 3)), *(one.points for one in recorded)])
+    where = np.concatenate([np.zeros((0, 3)), *(recording.points for recording in recorded)])
     still = np.zeros_like(where)
     drawn = scene_of(whole, left, np.zeros_like(left.points), scene.names, Moved(where, still, still))
     camera = cameras_of(drawn)[BEFORE]
@@ -303,9 +303,9 @@ def _recordings(scene: _Scene) -> list[tuple[Any, str]]:
     kinds: tuple[tuple[Sequence[Recording], Any, tuple[str, ...]], ...]
     kinds = ((scene.tracked, arrow, _ARROWS), (scene.surfaces, cross, _CROSSES))
     entries = [
-        (_mark(color=colours[number % len(colours)], **style), f"{_short(one.name)}: {count_of(one)}")
+        (_mark(color=colours[number % len(colours)], **style), f"{_short(recording.name)}: {count_of(recording)}")
         for recordings, style, colours in kinds
-        for number, one in enumerate(recordings)
+        for number, recording in enumerate(recordings)
     ]
     length = "true length" if scene.enlarged == 1.0 else f"drawn {scene.enlarged:g} times as long"
     return _first(entries) + ([(_mark(), f"arrows: {length}")] if scene.tracked else [])

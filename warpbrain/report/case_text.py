@@ -6,7 +6,7 @@ import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.checking import Checked
-from warpbrain.mesh import Quality, measure
+from warpbrain.mesh import measure
 from warpbrain.physics.words import length
 from warpbrain.recordings.recording import (
     ForceRecording,
@@ -17,40 +17,8 @@ from warpbrain.recordings.recording import (
     count_of,
 )
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.page import lines
 from warpbrain.report.summary import SET_TITLES, STAND_IN
-
-
-def show_lines(case: Case) -> list[str]:
-    """Everything a case says, as printed."""
-    origin = STAND_IN if case.origin == "stand-in" else case.origin
-    lines = [case.title, f"  file      {case.path}", f"  origin    {origin}"]
-    lines += [f"  {line}" for line in _mesh_lines(case, measure(case.mesh))]
-    for label, tissue in sorted(case.tissues.items()):
-        law = f"mu = {tissue.law.shear_modulus:g} Pa" if tissue.law is not None else f"from the prior '{tissue.prior}'"
-        lines.append(
-            f"  tissue {label}  {tissue.name}: {tissue.model} ({tissue.formulation}), {law}, nu = {case.poisson:g}"
-        )
-    lines += [f"  assumed   {sentence}" for sentence in case.assumptions]
-    lines += [f"  recorded  {sentence}" for sentence in map(recording_line, case.recordings)]
-    lines += [f"  remark    {sentence}" for sentence in case.remarks]
-    return lines
-
-
-def _mesh_lines(case: Case, quality: Quality) -> list[str]:
-    units = f"files in {case.frame.unit}, {case.frame.axes}"
-    volume, edge = 1e6 * quality.volume, MILLIMETRES * quality.mean_edge
-    lines = [
-        f"mesh      {quality.nodes} nodes, {quality.tetrahedra} tetrahedra of {edge:.3g} mm edge; {units}",
-        f"volume    {volume:.4g} cm3, {case.density * quality.volume:.4g} kg at {case.density:g} kg/m3",
-        f"quality   dihedral angles from {quality.min_dihedral:.1f} to {quality.max_dihedral:.1f} degrees, first "
-        f"percentile of each tetrahedron's smallest {quality.first_percentile_dihedral:.1f}; "
-        f"{quality.components} part(s)",
-    ]
-    for kind, members in (("node sets", case.mesh.node_sets), ("elements ", case.mesh.element_sets)):
-        if members:
-            counts = ", ".join(f"{SET_TITLES.get(name, name)} ({inside.sum()})" for name, inside in members.items())
-            lines.append(f"{kind} {counts}")
-    return lines
 
 
 def recording_line(recording: Recording) -> str:
@@ -73,21 +41,13 @@ def recording_line(recording: Recording) -> str:
     return f"{head}rows of a test in {recording.mode}: {' and '.join(recording.quantities)}{noise}{role}"
 
 
+def show_lines(case: Case) -> list[str]:
+    """Everything a case says, as printed."""
+    recorded = list(map(recording_line, case.recordings))
+    return lines("case.txt", "show", case, measure(case.mesh), recorded, SET_TITLES, STAND_IN)
+
+
 def check_lines(checked: Checked, cannot: str) -> list[str]:
     """What checking found, as printed: problems first; `cannot` says why a sound case cannot be run yet."""
-    lines = [str(checked.file)]
-    for problem in checked.problems:
-        place = f"{problem.file.name}: {problem.place}: " if problem.place else f"{problem.file.name}: "
-        lines.append(f"  problem   {place}{problem.message}")
-        if problem.cure:
-            lines.append(f"            -> {problem.cure}")
-    if checked.case is not None and checked.quality is not None:
-        lines += [f"  {line}" for line in _mesh_lines(checked.case, checked.quality)]
-        lines.append(f"  plausible {1e6 * checked.quality.volume:.4g} cm3: {checked.plausible}")
-        lines += [f"  recorded  {sentence}" for sentence in map(recording_line, checked.case.recordings)]
-    lines += [f"  look at   {sentence}" for sentence in checked.remarks]
-    if cannot:
-        lines.append(f"  not yet   it cannot be run as it stands: {cannot}")
-    if not checked.problems:
-        lines.append("  nothing is wrong with it" + (" otherwise" if cannot else ""))
-    return lines
+    recorded = [] if checked.case is None else list(map(recording_line, checked.case.recordings))
+    return lines("case.txt", "check", checked, cannot, recorded, SET_TITLES)

@@ -71,30 +71,29 @@ def _describe(comparison: Comparison) -> dict[str, Any]:
     return described
 
 
-def comparison_lines(summary: Mapping[str, Any], legacy: bool) -> list[str]:
-    """The table of errors, as printed."""
-    lines = []
-    if summary["compared"]:
-        more = "   legacy before    after [sqrt(mm)]" if legacy else ""
-        lines.append(f"RMSE at recordings       count   before    after    noise{more}")
-    for entry in summary["compared"]:
-        noise, role = entry["noise_root_mean_square"], "   check" if entry["role"] == "check" else ""
-        ways = [(entry["name"], entry["count"], "before", "after", "" if noise is None else tabled(noise))]
+def recorded_rows(compared: Sequence[Mapping[str, Any]]) -> list[list[Any]]:
+    """The table of errors: recording, rows, root mean square with nothing moved and here, 95th percentile and largest
+    here, what noise alone leaves, unit, whether it is only checked, and the paper's own error before and after.
+
+    Of a surface there is a second row, from the mesh to what was recorded.
+    """
+    rows = []
+    for entry in compared:
+        noise, unit = entry["noise_root_mean_square"], entry["unit"]
+        left = "" if noise is None else error_text(noise, unit)
+        directions = [(entry["name"], entry["count"], "", left)]
         if "mesh_to_recording_before" in entry:
-            ways = [
-                (f"{entry['name']} to mesh", *ways[0][1:]),
-                (f"mesh to {entry['name']}", "", "mesh_to_recording_before", "mesh_to_recording_after", ""),
+            directions = [
+                (f"{entry['name']} to mesh", entry["count"], "", left),
+                (f"mesh to {entry['name']}", "", "mesh_to_recording_", ""),
             ]
-        for name, count, before, after, left in ways:
-            errors = (entry[before]["root_mean_square"], entry[after]["root_mean_square"])
-            line = f"  {name:<20} {count:>7} {tabled(errors[0]):>8} {tabled(errors[1]):>8} {left:>8} {entry['unit']}"
-            if legacy and "legacy_sqrt_mm" in entry[before]:
-                line += f" {entry[before]['legacy_sqrt_mm']:>13.3f} {entry[after]['legacy_sqrt_mm']:>8.3f}"
-            lines.append(line + role)
-    if summary["compared"]:
-        lines.append("  before: nothing moved; after: this simulation; noise: what the stated noise alone would leave")
-        lines += [f"  {sentence}" for sentence in summary["in_words"]]
-    return lines + [f"  not compared: {reason}" for reason in summary["not_compared"]]
+        for name, count, key, left in directions:
+            before, after = entry[f"{key}before"], entry[f"{key}after"]
+            errors = (before["root_mean_square"], *(after[k] for k in ("root_mean_square", "percentile_95", "largest")))
+            legacy = (error.get("legacy_sqrt_mm") for error in (before, after))
+            check = "check" if entry["role"] == "check" else ""
+            rows.append([name, count, *(error_text(value, unit) for value in errors), left, unit, check, *legacy])
+    return rows
 
 
 def write_comparisons(path: Path, case: Case, observed: Observed) -> None:
@@ -103,7 +102,7 @@ def write_comparisons(path: Path, case: Case, observed: Observed) -> None:
 
 
 def _rows(case: Case, observed: Observed) -> Iterator[list[Any]]:
-    vectors = [f"{what}_{axis}" for what in ("recorded", "computed", "difference") for axis in "xyz"]
+    vectors = [f"{quantity}_{axis}" for quantity in ("recorded", "computed", "difference") for axis in "xyz"]
     yield ["recording", "kind", "unit", "row", "id", "x_mm", "y_mm", "z_mm", *vectors]
     recordings = {recording.name: recording for recording in case.recordings}
     for comparison in observed.comparisons:
@@ -158,18 +157,17 @@ def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation
     Of each recording they have ``name``, ``unit``, ``count``, and root mean squares ``before`` and ``after`` in that
     unit.
     """
-    lengths = [one for one in entries if one["unit"] == "mm" and one["count"]]
-    count = sum(one["count"] for one in lengths)
+    lengths = [entry for entry in entries if entry["unit"] == "mm" and entry["count"]]
+    count = sum(entry["count"] for entry in lengths)
     before, after = (
-        math.sqrt(sum(one["count"] * one[key] ** 2 for one in lengths) / count) if count else None
+        math.sqrt(sum(entry["count"] * entry[key] ** 2 for entry in lengths) / count) if count else None
         for key in ("before", "after")
     )
-    worse = [one for one in entries if one["after"] > one["before"]]
+    worse = [(entry, entry["unit"]) for entry in entries if entry["after"] > entry["before"]]
     sentences = [
-        f"It explains '{one['name']}' worse than {_NOTHING.get(one['unit'], 'nothing')} at all: RMSE "
-        f"{error_text(one['after'], one['unit'])} {one['unit']} with it, {error_text(one['before'], one['unit'])} "
-        f"{one['unit']} without."
-        for one in worse
+        f"It explains '{entry['name']}' worse than {_NOTHING.get(unit, 'nothing')} at all: RMSE "
+        f"{error_text(entry['after'], unit)} {unit} with it, {error_text(entry['before'], unit)} {unit} without."
+        for entry, unit in worse
     ]
     if before is None or after is None:
         return Explained(UNKNOWN, before, after, tuple(sentences))
@@ -202,11 +200,13 @@ def describe_mesh_error(error: MeshError, elements: str, observed: Observed, wit
 
     `observed` is recordings beside the state, `without` beside the state with the estimated error taken off.
     """
-    ways, linear = [], elements == "tet4"
+    references, linear = [], elements == "tet4"
     if linear:
-        ways.append("elements of averaged gradients on the same mesh, which lock less")
+        references.append("elements of averaged gradients on the same mesh, which lock less")
     if error.size is not None:
-        ways.append("such elements of half the size, whose difference is taken for three quarters of what is left")
+        references.append(
+            "such elements of half the size, whose difference is taken for three quarters of what is left"
+        )
     recordings = []
     for here, there in zip(observed.comparisons, without.comparisons, strict=True):
         factor, unit = SHOWN[here.unit]
@@ -220,7 +220,7 @@ def describe_mesh_error(error: MeshError, elements: str, observed: Observed, wit
             }
         )
     return {
-        "how": f"compared with {' and '.join(ways)}",
+        "how": f"compared with {' and '.join(references)}",
         "displacement_mm": _sizes(error.u, MILLIMETRES),
         "locking_mm": _sizes(error.locking, MILLIMETRES) if linear else None,
         "element_size_mm": None if error.size is None else _sizes(error.size, MILLIMETRES),
@@ -233,30 +233,3 @@ def _sizes(vectors: Floats, factor: float) -> dict[str, float]:
     lengths = factor * np.linalg.norm(vectors, axis=1)
     high = float(np.percentile(lengths, 95.0))
     return {"median": float(np.median(lengths)), "percentile_95": high, "largest": float(lengths.max())}
-
-
-def mesh_error_lines(summary: Mapping[str, Any]) -> list[str]:
-    """The estimate, as printed."""
-    if "unknown" in summary:
-        return [f"error of the mesh: not known: {summary['unknown']}"]
-
-    def row(name: str, sizes: Mapping[str, float]) -> str:
-        columns = (tabled(sizes[key]) for key in ("median", "percentile_95", "largest"))
-        return f"  {name:<24} {' '.join(f'{column:>8}' for column in columns)}"
-
-    titles = {"all nodes": "displacement_mm", "locking": "locking_mm", "element size": "element_size_mm"}
-    lines = ["error of the mesh, estimated  median     95 %      max"]
-    lines += [f"{row(title, summary[key])} mm" for title, key in titles.items() if summary[key] is not None]
-    for entry in summary["recordings"]:
-        lines.append(
-            f"{row(entry['name'], entry)} {entry['unit']}; RMSE {tabled(entry['root_mean_square_after'])}, "
-            f"without it {tabled(entry['root_mean_square_without_it'])}"
-        )
-    share = summary["locking_share"]
-    if share is not None and share > 1.0:
-        lines.append(
-            "  elements that do not lock move too far on this mesh: all of it may be locking, but not what they say"
-        )
-    elif share is not None and not math.isnan(share):
-        lines.append(f"  {100.0 * share:.0f} % of it is likely to be locking, the rest the size of elements")
-    return [*lines, f"  {summary['how']}"]

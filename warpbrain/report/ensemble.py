@@ -11,10 +11,10 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.ensemble.results import EnsembleResult, Fields, Row, Spread
-from warpbrain.physics.words import tabled
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES, body_file, sets_of, write_body, write_csv
+from warpbrain.report.page import lines
 from warpbrain.report.summary import SET_TITLES, sizes_mm
 
 #: Failures that are printed; all are in the table.
@@ -52,33 +52,7 @@ def _numbers(spread: Spread, factor: float) -> dict[str, float]:
 
 def ensemble_lines(described: Mapping[str, Any]) -> list[str]:
     """What is printed at the end."""
-    failed, done = described["failed"], described["done"]
-    lines = [f"samples: {done} done, {len(failed)} failed of {described['samples']}"]
-    lines += [f"  sample {number} failed: {reason}" for number, reason in list(failed.items())[:_SHOWN_FAILURES]]
-    if len(failed) > _SHOWN_FAILURES:
-        lines.append(f"  and {len(failed) - _SHOWN_FAILURES} more, each with its reason in samples.csv")
-    if failed and done:
-        lines.append(
-            f"  all that follows is of the {done} that have an answer; those that failed are not in it, and may be the "
-            "softest"
-        )
-    head = "    mean       sd      5 %     50 %     95 %   "
-    if described["mean_displacement_mm"]:
-        lines += ["", f"{'mean displacement [mm]':<26}{head}over {done} samples"]
-    for name, s in described["mean_displacement_mm"].items():
-        lines.append(f"  {SET_TITLES.get(name, name):<22}{_columns(s)}")
-    if described["rmse_at_recordings"]:
-        lines += ["", f"{'RMSE at recordings':<26}{head}before   nearest sample, over {done} samples"]
-    for name, errors in described["rmse_at_recordings"].items():
-        lines.append(
-            f"  {name:<22}{_columns(errors['after'])}{tabled(errors['before']):>9} {errors['unit']:<3}"
-            f"{errors['nearest_sample']:>8}"
-        )
-    return lines + [f"  not compared: {reason}" for reason in described["not_compared"]]
-
-
-def _columns(s: Mapping[str, float]) -> str:
-    return "".join(f"{tabled(s[key]):>9}" for key in ("mean", "sd", "p05", "p50", "p95")).rjust(50)
+    return lines("ensemble.txt", "ensemble", described, SET_TITLES, _SHOWN_FAILURES)
 
 
 def table_of(result: EnsembleResult) -> list[dict[str, Any]]:
@@ -165,6 +139,6 @@ def write_spread_picture(path: Path, fields: Fields, title: str, subtitle: str) 
             if row == 0:
                 panel.set_title(views.heading(mesh, view, place), fontsize=11)
         axes[row].set_ylabel(name, fontsize=13)
-        bar = figure.colorbar(drawn, ax=axes[row : row + 3], location="right", shrink=0.8, aspect=30, pad=0.01)
-        bar.set_label(f"{name} of the displacement [mm]")
+        label = f"{name} of the displacement [mm]"
+        figure.colorbar(drawn, ax=axes[row : row + 3], location="right", shrink=0.8, aspect=30, pad=0.01, label=label)
     views.save(figure, path, f"{title}\n{subtitle}", 13.0)

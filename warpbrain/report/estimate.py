@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
 from warpbrain.estimation.registration import registration_of
-from warpbrain.inference.probability import percent
 from warpbrain.physics.words import tabled
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
-from warpbrain.report.comparison import SHOWN
-from warpbrain.report.files import MILLIMETRES, fingerprints, picked, write_csv
+from warpbrain.report.comparison import SHOWN, error_text
+from warpbrain.report.diagnosis.files import seen
+from warpbrain.report.files import MILLIMETRES, body_file, fingerprints, picked, write_body, write_csv
+from warpbrain.report.page import lines
 from warpbrain.report.summary import machine
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue
 
 #: More than this part of a recording being gross errors is said.
 _UNEXPLAINED = 0.3
-#: Correlations that are smaller are not told, nor are causes that are less probable.
-_TIED, _LIKELY = 0.3, 0.05
+#: Correlations that are smaller are not told.
+_TIED = 0.3
 _METHODS = {"laplace": "Laplace's approximation", "chain": "a Markov chain"}
 
 
@@ -35,8 +37,8 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     noise, laplace = best.point.noise, best.laplace
     each = zip(laplace.gains.tolist(), laplace.combinations, laplace.directions, strict=True)
     directions = [
-        {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": told, "undone": undone}
-        for gain, told, undone in each
+        {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": constrained, "undone": undone}
+        for gain, constrained, undone in each
     ]
     drawn = None
     if chain is not None:
@@ -50,7 +52,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             "directions": directions,
         },
         "parameters": [_describe(marginal, posterior) for marginal in posterior.marginals],
-        "nothing_else": None if averaged is None else _describe_nothing_else(averaged),
+        "nothing_else": None if averaged is None else describe_nothing_else(averaged),
         "correlation": {"names": list(parameters.names), "matrix": posterior.correlation},
         "covariance": {"names": list(parameters.names), "matrix": posterior.covariance},
         "method": posterior.method,
@@ -67,7 +69,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
         ],
         "predictions": [_describe_prediction(prediction) for prediction in posterior.predictions],
-        "all_recordings": [picked(one, "role", "count") | _errors_mm(one) for one in posterior.overall_errors],
+        "all_recordings": [picked(errors, "role", "count") | _errors_mm(errors) for errors in posterior.overall_errors],
         "likelihood": {
             "density": "normal, shared by neighbours" + ("" if noise.outliers is None else ", with gross errors"),
             "degrees_of_freedom": None,
@@ -93,8 +95,8 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     }
 
 
-def _errors_mm(one: OverallErrors) -> dict[str, float]:
-    return {f"root_mean_square_{key}_mm": MILLIMETRES * getattr(one, key) for key in ("before", "after", "of_run")}
+def _errors_mm(errors: OverallErrors) -> dict[str, float]:
+    return {f"root_mean_square_{key}_mm": MILLIMETRES * getattr(errors, key) for key in ("before", "after", "of_run")}
 
 
 def _describe(marginal: Marginal, posterior: Posterior) -> dict[str, Any]:
@@ -140,13 +142,16 @@ def _shown(parameter: Parameter) -> Callable[[float], float]:
     return math.exp if parameter.is_modulus else float
 
 
-def _describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
+def describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
+    """How probable it is that nothing else acts, and tissue averaged over what may."""
     deviations = np.sqrt(np.diag(averaged.covariance)).tolist()
     each = list(zip(averaged.parameters, averaged.mean.tolist(), deviations, averaged.interval(0.95), strict=True))
     return {
         "probability": averaged.nothing,
+        "most_probable": bool(averaged.nothing >= averaged.probabilities.max()),
         "causes": [
-            {"name": one.name, "kind": one.kind.value, "probability": one.probability} for one in averaged.causes
+            {"name": cause.name, "kind": cause.kind.value, "probability": cause.probability}
+            for cause in averaged.causes
         ],
         "tissue": [
             {
@@ -210,143 +215,126 @@ def describe_registration(posterior: Posterior) -> dict[str, Any] | None:
     if not posterior.options.registration:
         return None
     declared = registration_of(posterior.case)
-    found = posterior.nuisances[-6:]
+    registration = posterior.nuisances[-6:]
     return {
         "prior_shift_mm": MILLIMETRES * declared.shift,
         "prior_turn_degrees": math.degrees(declared.turn),
-        "shift_mm": [MILLIMETRES * value for _, value, _ in found[:3]],
-        "shift_standard_deviation_mm": [MILLIMETRES * deviation for _, _, deviation in found[:3]],
-        "turn_degrees": [math.degrees(value) for _, value, _ in found[3:]],
-        "turn_standard_deviation_degrees": [math.degrees(deviation) for _, _, deviation in found[3:]],
+        "shift_mm": [MILLIMETRES * value for _, value, _ in registration[:3]],
+        "shift_standard_deviation_mm": [MILLIMETRES * deviation for _, _, deviation in registration[:3]],
+        "turn_degrees": [math.degrees(value) for _, value, _ in registration[3:]],
+        "turn_standard_deviation_degrees": [math.degrees(deviation) for _, _, deviation in registration[3:]],
     }
 
 
 def remarks_of(posterior: Posterior) -> list[str]:
     """With what a user must know of recordings that no parameters explain."""
     return list(posterior.remarks) + [
-        f"{int(one.gross.sum())} of {len(one.rows)} rows of '{one.name}' are gross errors, farther from the prediction "
-        "than its noise allows: what moved them is not in this case"
-        for one in posterior.predictions
-        if one.gross.mean() > _UNEXPLAINED
-    ]
-
-
-def correlated(posterior: Posterior) -> list[str]:
-    """Parameters that are tied to each other, for the terminal and for its page."""
-    names, matrix = posterior.parameters.names, posterior.correlation
-    return [
-        f"correlation of {names[i]} and {names[j]}: {matrix[i, j]:.2f}"
-        for i in range(len(names))
-        for j in range(i)
-        if abs(matrix[i, j]) >= _TIED
+        f"{int(prediction.gross.sum())} of {len(prediction.rows)} rows of '{prediction.name}' are gross errors, "
+        "farther from the prediction than its noise allows: what moved them is not in this case"
+        for prediction in posterior.predictions
+        if prediction.gross.mean() > _UNEXPLAINED
     ]
 
 
 def recorded_points(posterior: Posterior, surfaces: bool = True) -> Iterator[tuple[Prediction, Any]]:
     """Predictions at places, with their recordings: of points, and of surfaces unless these are left out."""
     recordings = {recording.name: recording for recording in posterior.case.recordings}
-    for one in posterior.predictions:
-        if isinstance(recordings[one.name], PointsRecording | SurfaceRecording if surfaces else PointsRecording):
-            yield one, recordings[one.name]
+    for prediction in posterior.predictions:
+        if isinstance(recordings[prediction.name], PointsRecording | SurfaceRecording if surfaces else PointsRecording):
+            yield prediction, recordings[prediction.name]
 
 
-# as printed -----------------------------------------------------------------------------------------------------------
+# as printed and on the page -------------------------------------------------------------------------------------------
 
 
-def estimate_lines(posterior: Posterior, averaged: AveragedTissue | None = None) -> list[str]:
-    """The tables, as printed; with tissue averaged over what may act, if that is known."""
-    lines = [*posterior.identifiability.sentences, ""]
-    lines.append(
-        "tissue             parameter         estimate       sd   95 % interval         prior 95 %         shrinkage"
-    )
-    for marginal in posterior.marginals:
-        parameter = marginal.parameter
-        prior = f"   {_interval(parameter, marginal.prior_interval):<16} {100 * marginal.shrinkage:>7.0f} %"
-        lines.append(_row(parameter, marginal.estimate, marginal.deviation, marginal.interval, prior))
-    if averaged is not None:
-        lines += averaged_lines(averaged)
-    lines += [f"  {line}" for line in (*correlated(posterior), *checks(posterior))]
-    lines += ["", "RMSE at recordings      count   before    after    noise   in 50 %   in 95 %   gross errors"]
-    lines += [_prediction_line(one) for one in posterior.predictions]
-    for one in posterior.overall_errors:
-        name = "all that was fitted" if one.role == "fit" else "all to check"
-        before, after, of_run = (MILLIMETRES * value for value in (one.before, one.after, one.of_run))
-        lines.append(
-            f"  {name:<19} {one.count:>7} {tabled(before):>8} {tabled(after):>8}   mm; "
-            f"by `warpbrain run` of this tissue {tabled(of_run)}"
-        )
-    lines += [f"  remark    {remark}" for remark in remarks_of(posterior)]
-    lines += ["", "time [s]   " + ", ".join(f"{stage} {spent:.1f}" for stage, spent in posterior.seconds.items())]
-    lines.append("equilibria " + ", ".join(f"{stage} {count}" for stage, count in posterior.solves.items()))
-    return lines
+def estimate_lines(summary: Mapping[str, Any]) -> list[str]:
+    """What is printed of what `describe_estimate` says."""
+    averaged = () if summary["nothing_else"] is None else map(averaged_row, summary["nothing_else"]["tissue"])
+    tissue, recorded = map(parameter_row, summary["parameters"]), map(prediction_row, summary["predictions"])
+    tables = (list(tissue), list(averaged), correlated(summary), checks(summary), list(recorded))
+    return lines("estimate.txt", "estimate", summary, *tables)
 
 
-def _row(parameter: Parameter, estimate: float, deviation: float, interval: tuple[float, float], more: str = "") -> str:
-    """Of a parameter by its coordinate, as people read it."""
-    shown = _shown(parameter)(estimate)
-    deviation *= shown if parameter.is_modulus else 1.0
-    return (
-        f"  {parameter.tissue:<16.16} {_name(parameter):<15} {_number(shown):>9} {_number(deviation):>8}   "
-        f"{_interval(parameter, interval):<19}{more:<29}  {'Pa' if parameter.is_modulus else ''}"
-    )
+def parameter_row(parameter: Mapping[str, Any]) -> list[str]:
+    """Tissue, parameter, estimate, standard deviation, 95 % interval, that of the prior, how much of its spread is
+    gone, unit."""
+    numbers = _number(parameter["estimate"]), _number(parameter["standard_deviation"])
+    intervals = interval_of(parameter), interval_of(parameter["prior"])
+    gone = f"{100.0 * parameter['shrinkage']:.0f} %"
+    return [parameter["tissue"], parameter["name"], *numbers, *intervals, gone, unit_of(parameter)]
 
 
-def _interval(parameter: Parameter, interval: tuple[float, float]) -> str:
-    low, high = map(_shown(parameter), interval)
+def averaged_row(parameter: Mapping[str, Any]) -> list[str]:
+    """Tissue, parameter, middle, standard deviation, 95 % interval and unit."""
+    middle, deviation = parameter["middle"], parameter["coordinate"]["standard_deviation"]
+    deviation *= middle if parameter["unit"] == "Pa" else 1.0
+    numbers = _number(middle), _number(deviation)
+    return [parameter["tissue"], parameter["name"], *numbers, interval_of(parameter), unit_of(parameter)]
+
+
+def interval_of(parameter: Mapping[str, Any]) -> str:
+    """The 95 % interval of a parameter."""
+    low, high = parameter["interval_95"]
     return f"{_number(low)} to {_number(high)}"
 
 
-def averaged_lines(averaged: AveragedTissue) -> list[str]:
-    """How probable it is that nothing else acts; tissue averaged where anything else is more probable than that."""
-    likely = [f"{one.name} {percent(one.probability)}" for one in averaged.causes if one.probability >= _LIKELY]
-    lines = [f"  probability that nothing acts but what the case says: {percent(averaged.nothing)}"]
-    # a probability of nothing has no bar of its own: how many sets it shares one with depends on the case
-    if averaged.nothing < averaged.probabilities.max():
-        lines += [f"  what may act: {', '.join(likely)}", "  tissue averaged over what may act, to first order:"]
-        deviations = np.sqrt(np.diag(averaged.covariance)).tolist()
-        each = zip(averaged.parameters, averaged.mean, deviations, averaged.interval(0.95), strict=True)
-        for parameter, mean, deviation, (low, high) in each:
-            lines.append(_row(parameter, mean, deviation, (low, high), f" {'':<29}"))
-    return [line.rstrip() for line in lines]
+def unit_of(parameter: Mapping[str, Any]) -> str:
+    """The unit of a parameter, if it has one."""
+    return "" if parameter["unit"] == "1" else str(parameter["unit"])
 
 
-def _prediction_line(one: Prediction) -> str:
-    factor, unit = SHOWN[one.unit]
-    noise = noise_of(one)
-    within = ["", ""] if one.coverage is None else [f"{100 * part:.0f} %" for part in one.coverage]
-    before, after = factor * one.error_before, factor * one.error_after
-    return (
-        f"  {one.name:<18.18} {one.fitted.count:>8} {tabled(before):>8} {tabled(after):>8} "
-        f"{'' if noise is None else tabled(noise):>8} {within[0]:>9} {within[1]:>9} {int(one.gross.sum()):>9}"
-        f"      {unit}" + (", check" if one.role == "check" else "")
-    )
+def prediction_row(prediction: Mapping[str, Any]) -> list[Any]:
+    """Recording, rows, root mean square with nothing moved, of the estimate and of its state as a run, what noise alone
+    leaves, parts in the 50 % and 95 % intervals, gross errors, unit, whether it is only checked."""
+    unit, noise, cover = prediction["unit"], prediction["noise_root_mean_square"], prediction["coverage"] or {}
+    return [
+        prediction["name"],
+        prediction["count"],
+        *(error_text(prediction[f"root_mean_square_{which}"], unit) for which in ("before", "after", "of_run")),
+        "" if noise is None else error_text(noise, unit),
+        *(f"{100.0 * cover[key]:.0f} %" if key in cover else "" for key in ("50 %", "95 %")),
+        len(prediction["gross_errors"]),
+        unit,
+        "check" if prediction["role"] == "check" else "",
+    ]
 
 
-def checks(posterior: Posterior) -> list[str]:
-    """How far an estimate is to be believed, for the terminal and for its page."""
-    check, chain = posterior.importance, posterior.chain
-    lines = [
-        f"{_METHODS[posterior.method]}: Pareto k {check.smoothed.k:.2f} of {len(check.theta)} weighted draws, "
-        f"{check.smoothed.effective:.0f} of them effective, {check.failed} without equilibrium, {check.unstable} of "
-        "unstable laws",
-        *(f"Laplace's approximation fails: {doubt}" for doubt in posterior.doubts),
+def correlated(summary: Mapping[str, Any]) -> list[str]:
+    """Parameters that are tied to each other."""
+    names, matrix = summary["correlation"]["names"], summary["correlation"]["matrix"]
+    return [
+        f"correlation of {names[i]} and {names[j]}: {matrix[i][j]:.2f}"
+        for i in range(len(names))
+        for j in range(i)
+        if abs(matrix[i][j]) >= _TIED
+    ]
+
+
+def checks(summary: Mapping[str, Any]) -> list[str]:
+    """How far an estimate is to be believed."""
+    check, chain, mesh = summary["check_of_laplace"], summary["chain"], summary["discretisation"]
+    sentences = [
+        f"{_METHODS[summary['method']]}: Pareto k {check['pareto_k']:.2f} of {check['draws']} weighted draws, "
+        f"{check['effective_draws']:.0f} of them effective, {check['without_equilibrium']} without equilibrium, "
+        f"{check['unstable_laws']} of unstable laws",
+        *(f"Laplace's approximation fails: {doubt}" for doubt in check["doubts"]),
     ]
     if chain is not None:
-        lines.append(
-            f"chain of {chain.solves} equilibria, {100 * chain.accepted:.0f} % accepted, worth "
-            f"{chain.effective.min():.0f} independent draws"
+        sentences.append(
+            f"chain of {chain['equilibria']} equilibria, {100 * chain['accepted']:.0f} % accepted, worth "
+            f"{min(chain['effective_draws']):.0f} independent draws"
         )
-    lines.append(f"noise: {posterior.best.point.noise.scale:.2f} times as large as declared")
-    mesh, registration = describe_discretisation(posterior), describe_registration(posterior)
+    sentences.append(f"noise: {summary['likelihood']['noise_scale']:.2f} times as large as declared")
     if mesh is not None:
-        lines.append(
+        sentences.append(
             f"error of the mesh: {mesh['amount']:.2f} ± {mesh['standard_deviation']:.2f} times what elements of half "
             f"the size change, {tabled(mesh['difference_root_mean_square_mm'])} mm root mean square"
         )
-    if registration is not None:
-        shift, turn = (", ".join(f"{x:.2f}" for x in registration[key]) for key in ("shift_mm", "turn_degrees"))
-        lines.append(f"registration: shifted by ({shift}) mm, turned by ({turn}) degrees")
-    return lines
+    if summary["registration"] is not None:
+        moved = (summary["registration"][key] for key in ("shift_mm", "turn_degrees"))
+        shift, turn = (", ".join(f"{x:.2f}" for x in values) for values in moved)
+        sentences.append(f"registration: shifted by ({shift}) mm, turned by ({turn}) degrees")
+    return sentences
 
 
 def _number(value: float) -> str:
@@ -360,23 +348,44 @@ def _number(value: float) -> str:
 def write_predictions(path: Path, posterior: Posterior) -> None:
     """Write every row, in mm or N, axes RAS; of a surface the distance stands in the first of three components."""
     recordings = {recording.name: recording for recording in posterior.case.recordings}
-    vectors = [f"{what}_{axis}" for what in ("observed", "predicted", "standard_deviation") for axis in "xyz"]
+    vectors = [f"{quantity}_{axis}" for quantity in ("observed", "predicted", "standard_deviation") for axis in "xyz"]
     rows = [["recording", "kind", "role", "unit", "row", "gross_error", "x_mm", "y_mm", "z_mm", *vectors]]
-    for one in posterior.predictions:
-        rows += [_predicted(one, recordings[one.name], number) for number in range(len(one.rows))]
+    for prediction in posterior.predictions:
+        rows += [_predicted(prediction, recordings[prediction.name], number) for number in range(len(prediction.rows))]
     write_csv(path, rows)
 
 
-def _predicted(one: Prediction, recording: Recording, number: int) -> list[Any]:
-    factor, unit = SHOWN[one.unit]
-    row = int(one.rows[number])
-    cells = [one.name, one.kind, one.role, unit, row, int(one.gross[number])]
+def _predicted(prediction: Prediction, recording: Recording, number: int) -> list[Any]:
+    factor, unit = SHOWN[prediction.unit]
+    row = int(prediction.rows[number])
+    cells = [prediction.name, prediction.kind, prediction.role, unit, row, int(prediction.gross[number])]
     if isinstance(recording, PointsRecording | SurfaceRecording):
         cells += [f"{MILLIMETRES * value:.6g}" for value in recording.points[row]]
     else:
         cells += [""] * 3
-    before = one.before[number]
-    for values in (before, before - one.after[number], one.deviation[number]):
+    before = prediction.before[number]
+    for values in (before, before - prediction.after[number], prediction.deviation[number]):
         shown = [f"{factor * value:.6g}" for value in np.atleast_1d(values)]
         cells += shown + [""] * (3 - len(shown))
     return cells
+
+
+def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | None = None) -> None:
+    """Write the most probable state of an estimate as VTU with coordinates in mm.
+
+    Point arrays: ``displacement`` [mm] and ``displacement_sd`` of its components [mm]: what is not known of the tissue,
+    to first order about that state. With a map of what is left ``significant`` and ``blind``, too, as in `map.vtu`.
+    """
+    file = file_of_estimate(posterior)
+    if where is not None:
+        file.point_data |= seen(where, posterior.case.remaining[0])
+    write_body(path, file)
+
+
+def file_of_estimate(posterior: Posterior) -> Any:
+    """What `write_estimated_state` writes, as a `meshio.Mesh`."""
+    du, covariance = posterior.best.linearised.du, posterior.covariance
+    variance = np.einsum("pnk,pq,qnk->nk", du, covariance, du)
+    deviation = MILLIMETRES * np.sqrt(np.maximum(variance, 0.0))
+    arrays = {"displacement": MILLIMETRES * posterior.best.point.state.u, "displacement_sd": deviation}
+    return body_file(posterior.case.remaining[0], arrays)

@@ -16,14 +16,21 @@ from warpbrain.estimation.posterior import Posterior
 from warpbrain.inference.probability import percent
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view, fields_of, known_displacement
-from warpbrain.report.comparison import Explained, error_text, explained
-from warpbrain.report.estimate import checks, correlated, recorded_points
+from warpbrain.report.comparison import Explained, explained
+from warpbrain.report.estimate import (
+    averaged_row,
+    checks,
+    correlated,
+    parameter_row,
+    prediction_row,
+    recorded_points,
+)
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
 from warpbrain.report.page import Top, document, sections_of, write_document
 from warpbrain.report.page.figures import inlined
-from warpbrain.report.picture import Moved, Pictures
+from warpbrain.report.picture import Moved, Pictures, draw
 from warpbrain.report.run_page import BADGES
-from warpbrain.report.state_files import SavedState
+from warpbrain.report.state_files import read_state
 from warpbrain.report.summary import left_out
 from warpbrain.simulation.of_case import model_of
 
@@ -39,8 +46,8 @@ _KNOWN = (
 def moved_of(posterior: Posterior) -> Moved:
     """Points that were recorded, and where the estimate, with its nuisances, has them."""
     points = [
-        np.column_stack([recording.points[one.rows], one.before, one.before - one.after])
-        for one, recording in recorded_points(posterior, surfaces=False)
+        np.column_stack([recording.points[prediction.rows], prediction.before, prediction.before - prediction.after])
+        for prediction, recording in recorded_points(posterior, surfaces=False)
     ]
     return Moved(*np.split(np.concatenate([np.zeros((0, 9)), *points]), 3, axis=1))
 
@@ -48,55 +55,57 @@ def moved_of(posterior: Posterior) -> Moved:
 def judged_of(summary: Mapping[str, Any]) -> Explained:
     """Whether an estimate explains its recordings better than no motion at all."""
     entries = [
-        {**one, "before": one["root_mean_square_before"], "after": one["root_mean_square_after"]}
-        for one in summary["predictions"]
+        {**prediction, "before": prediction["root_mean_square_before"], "after": prediction["root_mean_square_after"]}
+        for prediction in summary["predictions"]
     ]
     return explained(entries, "this estimate")
 
 
-def write_estimate_page(
-    path: Path, summary: Mapping[str, Any], posterior: Posterior, state: SavedState, pictures: Pictures | str
-) -> None:
-    """Write the page.
+def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Posterior) -> Pictures | str:
+    """Write `deformation.png` and `report.html` beside `state.vtu`; `summary` is what `estimate.json` holds.
 
-    `summary` is what `estimate.json` holds, `state` the most probable one, with what is not known of it; without
-    pictures it is said why there are none.
+    Returns the pictures, or why there are none.
     """
     case, judged, nothing = summary["case"], judged_of(summary), summary["nothing_else"]
-    whole = posterior.case.mesh
+    whole, state, moved = posterior.case.mesh, read_state(folder / "state.vtu"), moved_of(posterior)
+    titles = {label: tissue.name for label, tissue in posterior.case.tissues.items()}
+    lines = ["the most probable state of the estimate", *judged.sentences]
+    pictures = draw(folder / "deformation.png", whole, state.mesh, state.u, titles, moved, case["title"], lines)
     places = views.places(whole)
-    names = ", ".join(_name(one) for one in summary["parameters"])
+    tissue = [parameter_row(parameter) for parameter in summary["parameters"]]
+    names = ", ".join(f"{row[0]}, {row[1]}" for row in tissue)
     agreement = Markup()
-    if any(one.kind != "surface" for one in posterior.predictions):
+    if any(prediction.kind != "surface" for prediction in posterior.predictions):
         words = "Every component that was recorded beside what the estimate makes of it; on the line they agree."
         agreement = inlined(
             lambda narrow: agreement_figure(posterior, narrow), "Observed beside predicted components.", words
         )
-    causes = [] if nothing is None else [one for one in nothing["causes"] if one["probability"] >= _LIKELY]
+    causes = [] if nothing is None else [cause for cause in nothing["causes"] if cause["probability"] >= _LIKELY]
     sections = sections_of(
         "estimate.html", summary=summary, agreement=agreement,
-        tissue=[_parameter(one) for one in summary["parameters"]],
-        tied=correlated(posterior), checks=checks(posterior),
+        tissue=tissue,
+        tied=correlated(summary), checks=checks(summary),
         densities=inlined(
             lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
             "Each parameter before (dashed, filled) and after (line); dotted: the ends of its 95 % interval.",
         ),
-        causes=[[one["name"], percent(one["probability"])] for one in causes],
+        causes=[[cause["name"], percent(cause["probability"])] for cause in causes],
         averaged=[] if nothing is None else [
-            [_name(one), f"{one['middle']:.4g}", _interval(one), _unit(one)] for one in nothing["tissue"]
+            [f"{tissue}, {name}", middle, interval, unit]
+            for tissue, name, middle, _, interval, unit in map(averaged_row, nothing["tissue"])
         ],
-        recorded=[_recorded(one) for one in summary["predictions"]],
+        recorded=[prediction_row(prediction) for prediction in summary["predictions"]],
         pictures=before_and_after(pictures),
         known=known_displacement(state, whole, places, _KNOWN),
-        view=body_view(state.mesh, state.u, fields_of(state), moved_of(posterior), places),
+        view=body_view(state.mesh, state.u, fields_of(state), moved, places),
         left_out=left_out(model_of(posterior.case)),
         seconds=[[name, f"{value:.1f}"] for name, value in summary["seconds"].items()],
         files=[[name, Markup("<code>{}</code>").format(value)] for name, value in summary["inputs_sha256"].items()],
     )  # fmt: skip
     facts = [
-        (_name(one), f"{one['estimate']:.4g} Pa ({_interval(one)})")
-        for one in summary["parameters"]
-        if one["unit"] == "Pa"
+        (f"{name}, {parameter}", f"{estimate} Pa ({interval})")
+        for name, parameter, estimate, _, interval, *_, unit in tissue
+        if unit == "Pa"
     ]
     if judged.before is not None:
         facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
@@ -104,37 +113,5 @@ def write_estimate_page(
         facts.append(("probability that nothing else acts", percent(nothing["probability"])))
     sentences = [*summary["identifiability"]["sentences"], *judged.sentences]
     top = Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts)
-    write_document(path, document(f"{case['name']}: tissue of {case['title']}", top, sections))
-
-
-def _name(one: Mapping[str, Any]) -> str:
-    return f"{one['tissue']}, {one['name']}"
-
-
-def _interval(one: Mapping[str, Any]) -> str:
-    low, high = one["interval_95"]
-    return f"{low:.4g} to {high:.4g}"
-
-
-def _unit(one: Mapping[str, Any]) -> str:
-    return "" if one["unit"] == "1" else str(one["unit"])
-
-
-def _parameter(one: Mapping[str, Any]) -> list[str]:
-    estimate, deviation = f"{one['estimate']:.4g}", f"{one['standard_deviation']:.3g}"
-    gone = f"{100.0 * one['shrinkage']:.0f} %"
-    return [one["tissue"], one["name"], estimate, deviation, _interval(one), _interval(one["prior"]), gone, _unit(one)]
-
-
-def _recorded(one: Mapping[str, Any]) -> list[Any]:
-    unit, noise, cover = one["unit"], one["noise_root_mean_square"], one["coverage"] or {}
-    return [
-        one["name"],
-        one["count"],
-        *(error_text(one[f"root_mean_square_{which}"], unit) for which in ("before", "after", "of_run")),
-        "" if noise is None else error_text(noise, unit),
-        *(f"{100.0 * cover[key]:.0f} %" if key in cover else "" for key in ("50 %", "95 %")),
-        len(one["gross_errors"]),
-        unit,
-        "check" if one["role"] == "check" else "",
-    ]
+    write_document(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))
+    return pictures

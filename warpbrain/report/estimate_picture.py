@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,11 +19,6 @@ from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERM
 
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
-
-
-def write_prior_and_posterior(path: Path, posterior: Posterior) -> None:
-    """Draw the density of each parameter before and after."""
-    views.save(densities_figure(posterior, False), path, posterior.case.title, 10.0)
 
 
 def densities_figure(posterior: Posterior, narrow: bool) -> Any:
@@ -69,56 +63,55 @@ def _draw_marginal(axes: Any, marginal: Marginal, prior: Floats, draws: Floats |
     axes.set_ylim(0.0, 1.15)
 
 
-def write_observed_against_predicted(path: Path, posterior: Posterior) -> None:
-    """Draw every component of every recording beside what the estimate makes of it; a panel for each unit."""
-    views.save(agreement_figure(posterior, False), path, posterior.case.title, 10.0)
-
-
 def agreement_figure(posterior: Posterior, narrow: bool) -> Any:
     """Components as they were observed and as they are predicted, one unit below the other for a narrow window."""
     # a distance to a surface has no sign that was recorded: before, after is all there is to compare
-    shown = [one for one in posterior.predictions if one.kind != "surface"]
-    units = list(dict.fromkeys(one.unit for one in shown)) or ["m"]
+    shown = [prediction for prediction in posterior.predictions if prediction.kind != "surface"]
+    units = list(dict.fromkeys(prediction.unit for prediction in shown)) or ["m"]
     figure, axes = _side_by_side(len(units), narrow, 5.0, (5.4 * len(units), 6.2))
     for column, unit in enumerate(units):
-        _draw_pairs(axes[column], [one for one in shown if one.unit == unit], unit, 1 if narrow else 2)
+        _draw_pairs(
+            axes[column], [prediction for prediction in shown if prediction.unit == unit], unit, 1 if narrow else 2
+        )
     return figure
 
 
 def _draw_pairs(axes: Any, predictions: Sequence[Prediction], unit: str, columns: int) -> None:
     factor, name = SHOWN[unit]
     ends = [0.0]
-    for number, one in enumerate(predictions):
-        observed, predicted = factor * one.before, factor * (one.before - one.after)
+    for number, prediction in enumerate(predictions):
+        observed, predicted = factor * prediction.before, factor * (prediction.before - prediction.after)
         ends += [float(observed.min()), float(observed.max()), float(predicted.min()), float(predicted.max())]
-        label = f"{one.name} ({one.role})"
+        label = f"{prediction.name} ({prediction.role})"
         style = {"s": 12, "marker": _MARKERS[number % 6], "linewidths": 0.6}
-        good, gross = ~one.gross, f"{label}: gross errors"
+        good, gross = ~prediction.gross, f"{label}: gross errors"
         hollow = {"facecolors": "none", "edgecolors": _COLOURS[number % 6]}
         axes.scatter(predicted[good], observed[good], label=label, **hollow, **style)
-        if one.gross.any():
-            axes.scatter(predicted[one.gross], observed[one.gross], color=VERMILLION, label=gross, **style)
+        if prediction.gross.any():
+            axes.scatter(
+                predicted[prediction.gross], observed[prediction.gross], color=VERMILLION, label=gross, **style
+            )
     margin = 0.05 * (max(ends) - min(ends) or 1.0)
     ends = [min(ends) - margin, max(ends) + margin]
     axes.plot(ends, ends, color="0.4", linewidth=0.8)
     axes.set_xlim(*ends)
     axes.set_ylim(*ends)
     axes.set_aspect("equal")
-    what = "force" if unit == "N" else "displacement"
-    axes.set_xlabel(f"predicted {what}, each component [{name}]")
-    axes.set_ylabel(f"observed {what}, each component [{name}]")
+    quantity = "force" if unit == "N" else "displacement"
+    axes.set_xlabel(f"predicted {quantity}, each component [{name}]")
+    axes.set_ylabel(f"observed {quantity}, each component [{name}]")
     if predictions:
         axes.legend(fontsize=8, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncol=columns)
     else:
         axes.text(0.5, 0.5, "only surfaces were recorded", ha="center", transform=axes.transAxes)
 
 
-def write_residuals(path: Path, posterior: Posterior) -> None:
-    """Draw how far each recorded point is from its prediction, on the outlines of the anatomy from three sides."""
+def residuals_figure(posterior: Posterior) -> Any:
+    """How far each recorded point is from its prediction, on the outlines of the anatomy from three sides."""
     whole, mesh = posterior.case.mesh, posterior.case.remaining[0]
     residuals = [
-        (recording.points[one.rows], MILLIMETRES * np.linalg.norm(one.after, axis=1))
-        for one, recording in recorded_points(posterior)
+        (recording.points[prediction.rows], MILLIMETRES * np.linalg.norm(prediction.after, axis=1))
+        for prediction, recording in recorded_points(posterior)
     ]
     points = np.concatenate([np.empty((0, 3)), *(where for where, _ in residuals)])
     lengths = np.concatenate([np.empty(0), *(sizes for _, sizes in residuals)])
@@ -135,6 +128,6 @@ def write_residuals(path: Path, posterior: Posterior) -> None:
         )  # fmt: skip
         views.frame(panel, whole, view)
         panel.set_title(f"outline at {views.heading(whole, view, place)}", fontsize=10)
-    bar = figure.colorbar(shown, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.03)
-    bar.set_label("distance between observed and predicted [mm], points of all depths")
-    views.save(figure, path, posterior.case.title)
+    label = "distance between observed and predicted [mm], points of all depths"
+    figure.colorbar(shown, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.03, label=label)
+    return figure

@@ -88,9 +88,9 @@ def plain(value: Any) -> Any:
     return value
 
 
-def picked(what: Any, *names: str, **renamed: str) -> dict[str, Any]:
+def picked(instance: Any, *names: str, **renamed: str) -> dict[str, Any]:
     """Attributes of an object for JSON, some by other names than their own."""
-    return {key: getattr(what, name) for key, name in ({name: name for name in names} | renamed).items()}
+    return {key: getattr(instance, name) for key, name in ({name: name for name in names} | renamed).items()}
 
 
 def write_csv(path: Path, rows: Iterable[Iterable[Any]], lineterminator: str = "\r\n") -> None:

@@ -104,7 +104,7 @@ def draw_extrapolation(model: Process, other: Process, group: str | None = None)
         logarithmic(axes, *_ENERGIES)
 
     figure = _groups(model, group, 6.2, draw, [f"strain energy + {OFFSET:g} [Pa]"])
-    names = [f"{one.name}, {one.variant}" for one in (model, other)]
+    names = [f"{process.name}, {process.variant}" for process in (model, other)]
     entries = [
         (views.line(**_THIN), "studies"),
         (views.patch(facecolor=_GROUND), "stretches of these"),

@@ -6,89 +6,46 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from warpbrain.gp.asymmetry import Asymmetry
 from warpbrain.gp.metamodels import Fit
-from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import CURVES, DrawnLaws, Moduli, rejection_rate
 from warpbrain.report.files import write_csv
+from warpbrain.report.page import lines
 
 
-def asymmetry_lines(found: Sequence[Asymmetry], papers: Mapping[str, tuple[float, bool]]) -> list[str]:
+def asymmetry_lines(asymmetries: Sequence[Asymmetry], papers: Mapping[str, tuple[float, bool]]) -> list[str]:
     """Compression and tension, a line for each group, and one of the literature, as of `asymmetries_of_papers`."""
-    width = max(len(one.group) for one in found)
-    lines = [
-        f"{'tension over compression, secant moduli':<{width + 20}}  mean of papers (95 % interval)   "
-        "a new study (95 %)   stiffer in tension"
-    ]
-    for one in found:
-        mean, low, high, new_low, new_high = np.exp([one.mean, one.low, one.high, one.new_low, one.new_high]).tolist()
-        lines.append(
-            f"{one.group:<{width + 2}}strain to {one.strain:<8.2g}  {f'{mean:.2f} ({low:.2f} to {high:.2f})':<32}"
-            f"{f'{new_low:.2f} to {new_high:.2f}':<18}{100.0 * one.tension:>17.0f} %"
-        )
-    compression = sum(value < 0.0 for value, _ in papers.values())
-    tension = sum(value > 0.0 for value, _ in papers.values())
-    lines.append(
-        f"of {len(papers)} hyperelastic papers {compression} are stiffer in compression, {tension} in tension; "
-        f"{sum(not able for _, able in papers.values())} have symmetric forms only, which say nothing of it"
-    )
-    return lines
+    rows = []
+    for asymmetry in asymmetries:
+        mean, low, high, new_low, new_high = np.exp(
+            [asymmetry.mean, asymmetry.low, asymmetry.high, asymmetry.new_low, asymmetry.new_high]
+        ).tolist()
+        intervals = f"{mean:.2f} ({low:.2f} to {high:.2f})", f"{new_low:.2f} to {new_high:.2f}"
+        rows.append([asymmetry.group, asymmetry.strain, *intervals, 100.0 * asymmetry.tension])
+    width = 2 + max(len(asymmetry.group) for asymmetry in asymmetries)
+    return lines("gp.txt", "tension_over_compression", rows, width, list(papers.values()))
 
 
-def fit_lines(model: Process, record: Mapping[str, Any]) -> list[str]:
-    """Objective, convergence, restarts, conditioning and time of a record of `warpbrain.gp.trained.fit_model`."""
-    lines = [f"{model.name} model of the literature as {model.variant}, {record['studies']} studies"]
-    if "climbs" not in record:
-        lines += [
-            f"  objective   {record['objective']:.3f} (negative log of likelihood times prior)",
-            f"  {_converged(record)} after {record['iterations']} iterations: {record['message']}",
-            f"  condition   {record['condition']:.2g} of the covariance; no jitter: what studies leave open is in it",
-        ]
-    else:
-        starts = record["starts"]
-        apart = starts[0]["apart"]
-        lines += [
-            f"  objective   {record['negative log likelihood']:.3f} (negative log marginal likelihood of "
-            f"{record['points']} points, {record['means of replicates']} means)",
-            f"  jitter      {record['jitter']:g} on the diagonal",
-            f"  starts      {len(starts)} on every {starts[0]['every']}th stretch, values "
-            f"{starts[0]['value']:.2f} to {starts[-1]['value']:.2f}; best: "
-            + ("all groups together" if apart is None else f"{apart} apart"),
-        ]
-        for index, climb in enumerate(record["climbs"], 1):
-            lines.append(
-                f"  climb {index}     {climb['value']:.3f}, {_converged(climb)} after {climb['iterations']} "
-                f"iterations, last gain {climb['gain']:.1g}, largest derivative {climb['gradient']:.2g}, "
-                f"condition {climb['condition']:.1g}"
-            )
-    return [*lines, f"  time        {record['seconds']:.1f} s"]
-
-
-def _converged(record: Mapping[str, Any]) -> str:
-    return "converged" if record["converged"] else "NOT converged"
-
-
-def moduli_lines(found: Sequence[Moduli]) -> list[str]:
+def moduli_lines(moduli: Sequence[Moduli]) -> list[str]:
     """A line for each group and law; a modulus in brackets is that of a curve whose law is unstable."""
-    width = max(len(one.group) for one in found)
+    width = max(len(tissue.group) for tissue in moduli)
     curves = "".join(f"{f'k = {k:+g}' if k else 'mean':>11}" for k in CURVES)
     lines = [
         f"{'shear modulus at rest [Pa]':<{width + 16}}{curves}   draws: median (95 % of them)        redrawn   "
         "law of the mean curve"
     ]
-    for one in found:
+    for tissue in moduli:
         cells = "".join(
             f"{f'({fitted.shear_modulus:.4g})' if reason else f'{fitted.shear_modulus:.4g}':>11}"
-            for fitted, reason in zip(one.fits, one.unstable, strict=True)
+            for fitted, reason in zip(tissue.fits, tissue.unstable, strict=True)
         )
-        drawn = f"{one.median:.4g} ({one.low:.3g} to {one.high:.3g})"
+        drawn = f"{tissue.median:.4g} ({tissue.low:.3g} to {tissue.high:.3g})"
         lines.append(
-            f"{one.group:<{width + 2}}{one.law:<14}{cells}   {drawn:<34} {100 * one.rejection_rate:>5.1f} %   "
-            f"{_law_text(one.fits[CURVES.index(0.0)])}"
+            f"{tissue.group:<{width + 2}}{tissue.law:<14}{cells}   {drawn:<34} {100 * tissue.rejection_rate:>5.1f} %   "
+            f"{_law_text(tissue.fits[CURVES.index(0.0)])}"
         )
     return lines
 
@@ -101,7 +58,7 @@ def _law_text(fitted: Fit) -> str:
     )
 
 
-def write_moduli(path: Path, found: Sequence[Moduli]) -> None:
+def write_moduli(path: Path, moduli: Sequence[Moduli]) -> None:
     """Write what `moduli_lines` says, a row for each group, law and curve."""
     head = (
         *("group", "law", "k", "shear modulus [Pa]", "parameters", "rms of fit [log units]", "unstable"),
@@ -109,11 +66,11 @@ def write_moduli(path: Path, found: Sequence[Moduli]) -> None:
     )
     rows = [
         [
-            *(one.group, one.law, k, repr(fitted.shear_modulus), _law_text(fitted), repr(fitted.rms), reason),
-            *(repr(one.median), repr(one.low), repr(one.high), one.draws, repr(one.rejection_rate)),
+            *(tissue.group, tissue.law, k, repr(fitted.shear_modulus), _law_text(fitted), repr(fitted.rms), reason),
+            *(repr(tissue.median), repr(tissue.low), repr(tissue.high), tissue.draws, repr(tissue.rejection_rate)),
         ]
-        for one in found
-        for k, fitted, reason in zip(CURVES, one.fits, one.unstable, strict=True)
+        for tissue in moduli
+        for k, fitted, reason in zip(CURVES, tissue.fits, tissue.unstable, strict=True)
     ]
     write_csv(path, [head, *rows])
 

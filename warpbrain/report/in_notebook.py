@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import singledispatch
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from warpbrain.report.case_text import show_lines
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.ensemble import describe_ensemble, ensemble_lines
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.page import part
 from warpbrain.report.summary import SET_TITLES, describe_result, left_out
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.run import Run
@@ -38,12 +38,7 @@ def html(what: Any) -> str:
     InputError
         If it is none of these.
     """
-    title, rows = _told(what)
-    body = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(value)}</td></tr>'
-        for name, value in rows
-    )
-    return f"<div><strong>{escape(title)}</strong><table>{body}</table></div>"
+    return str(part("notebook", *_told(what)))
 
 
 @singledispatch
@@ -74,7 +69,7 @@ def _(what: Result) -> tuple[str, Rows]:
 def _(what: Run) -> tuple[str, Rows]:
     largest = MILLIMETRES * float(np.linalg.norm(what.u, axis=1).max())
     rows = [("state", what.followed.solution["kind"]), ("moves by at most", f"{largest:.3g} mm")]
-    rows += [(one.name, _before_after(one)) for one in what.observed.comparisons]
+    rows += [(comparison.name, _before_after(comparison)) for comparison in what.observed.comparisons]
     return what.case.title, rows + [("left out", sentence) for sentence in left_out(what.model)]
 
 
@@ -95,8 +90,8 @@ def _(what: Posterior) -> tuple[str, Rows]:
 def _(what: Diagnosis | SpecimenDiagnosis) -> tuple[str, Rows]:
     rows = [("verdict", what.sentence)]
     rows += [
-        (one.kind if isinstance(one, Ranked) else one.name, f"probability {percent(one.probability)}")
-        for one in what.ranking
+        (ranked.kind if isinstance(ranked, Ranked) else ranked.name, f"probability {percent(ranked.probability)}")
+        for ranked in what.ranking
     ]
     return f"Diagnosis of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
 
@@ -107,9 +102,9 @@ def _(what: EnsembleResult) -> tuple[str, Rows]:
     return first, [("", line) for line in rest if line]
 
 
-def _before_after(one: Comparison) -> str:
-    factor, unit = SHOWN[one.unit]
-    before, after = factor * one.before.root_mean_square, factor * one.after.root_mean_square
+def _before_after(comparison: Comparison) -> str:
+    factor, unit = SHOWN[comparison.unit]
+    before, after = factor * comparison.before.root_mean_square, factor * comparison.after.root_mean_square
     return f"RMSE {before:.3g} before, {after:.3g} {unit} after".rstrip()
 
 

@@ -49,14 +49,14 @@ class Moved:
     @classmethod
     def of(cls, recordings: Sequence[Recording], comparisons: Sequence[Comparison]) -> Moved:
         """Of all recordings of displacements at points."""
-        by_name = {one.name: one for one in recordings}
-        found = [np.zeros((0, 9))]
-        for one in comparisons:
-            recording = by_name[one.name]
+        by_name = {recording.name: recording for recording in recordings}
+        moves = [np.zeros((0, 9))]
+        for comparison in comparisons:
+            recording = by_name[comparison.name]
             if isinstance(recording, PointsRecording):
-                moved = one.residuals_before - one.residuals_after
-                found.append(np.column_stack([recording.points[one.rows], one.residuals_before, moved]))
-        return cls(*np.split(np.concatenate(found), 3, axis=1))
+                moved = comparison.residuals_before - comparison.residuals_after
+                moves.append(np.column_stack([recording.points[comparison.rows], comparison.residuals_before, moved]))
+        return cls(*np.split(np.concatenate(moves), 3, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,8 +212,8 @@ def draw(
         panel.set_title(heading(pictures, name), fontsize=10)
     shades = ScalarMappable(cmap="viridis")
     shades.set_clim(0.0, scene.top)
-    bar = figure.colorbar(shades, ax=axes, location="bottom", shrink=0.7, aspect=45, pad=0.01)
-    bar.set_label("displacement [mm]; red: where it was before")
+    label = "displacement [mm]; red: where it was before"
+    figure.colorbar(shades, ax=axes, location="bottom", shrink=0.7, aspect=45, pad=0.01, label=label)
     entries = views.tissue_entries(names, whole, pictures.resected)
     entries += [(views.line(color=colour, linewidth=2.5), name) for name, colour in arrow_colours(scene).items()]
     views.legend(figure, entries, loc="outside lower center", fontsize=9, ncols=6)

@@ -14,8 +14,8 @@ from warpbrain.estimation.posterior import Posterior
 from warpbrain.mesh import TetMesh
 from warpbrain.report.diagnosis.files import file_of_map
 from warpbrain.report.ensemble import file_of_fields
+from warpbrain.report.estimate import file_of_estimate
 from warpbrain.report.files import body_file, file_of_result, sets_of
-from warpbrain.report.state_files import file_of_estimate
 from warpbrain.report.views import TISSUE_COLOURS
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.run import Run

@@ -5,12 +5,11 @@ Of tests of a specimen it is their curves in the place of a body. The words are 
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpbrain.mesh import TetMesh
-from warpbrain.physics.words import tabled
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view
 from warpbrain.report.comparison import (
@@ -19,20 +18,21 @@ from warpbrain.report.comparison import (
     NO_NEARER,
     UNKNOWN,
     WORSE,
-    error_text,
     explained_of,
-    mesh_error_lines,
+    recorded_rows,
 )
-from warpbrain.report.page import Top, document, sections_of, write_document
+from warpbrain.report.page import Top, document, lines, sections_of, write_document
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
-from warpbrain.report.picture import Moved, Pictures
+from warpbrain.report.picture import Moved, Pictures, draw
 from warpbrain.report.specimen import tests_figure
-from warpbrain.report.summary import SET_TITLES
+from warpbrain.report.summary import displacement_rows
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, QUIET, VERMILLION
-from warpbrain.simulation.result import Result
+from warpbrain.simulation.run import Run
 from warpbrain.simulation.specimen_run import Tested
 
+#: Letters of a line of a picture's title.
+_LINE = 150
 #: Ground and letters of what stands on top.
 BADGES = {
     NEARER: (GREEN, "#ffffff"),
@@ -43,16 +43,18 @@ BADGES = {
 }
 
 
-def write_run_page(
-    path: Path, summary: Mapping[str, Any], result: Result, whole: TetMesh, moved: Moved, pictures: Pictures | str
-) -> None:
-    """Write the page of a run.
+def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictures | str:
+    """Write `deformation.png` and `report.html` of a run; `summary` is what `summary.json` holds.
 
-    `summary` is what `summary.json` holds, `whole` the anatomy before anything was resected; without pictures it is
-    said why there are none.
+    Returns the pictures, or why there are none.
     """
     case, described, solution = summary["case"], summary["result"], summary["solution"]
-    judged = explained_of(summary["recordings"]["compared"])
+    judged, result, whole = explained_of(summary["recordings"]["compared"]), run.result, run.case.mesh
+    moved = Moved.of(run.case.recordings, run.observed.comparisons)
+    names = {label: tissue.name for label, tissue in run.case.tissues.items()}
+    left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
+    subtitles = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
+    pictures = draw(folder / "deformation.png", whole, result.mesh, result.u, names, moved, run.case.title, subtitles)
     fields = [
         Field(
             name.replace("_", " "), f"{name.replace('_', ' ')} [Pa]", values, float(values.min()), float(values.max())
@@ -72,17 +74,27 @@ def write_run_page(
         facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
     sentences = judged.sentences or ["Nothing was recorded of this case that the simulation could be compared with."]
     _write(
-        path, summary, Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts),
+        folder / "report.html", summary, Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts),
         pictures=before_and_after(pictures),
         view=body_view(result.mesh, result.u, fields, moved, places),
-        displacements=[
-            [SET_TITLES.get(name, name), s["nodes"]]
-            + [tabled(s[key]) for key in ("mean", "root_mean_square", "percentile_95", "largest")]
-            for name, s in described["displacement_mm"].items()
-        ],
-        mesh_error=mesh_error_lines(summary["mesh_error"]) if "mesh_error" in summary else [],
+        displacements=displacement_rows(described),
+        mesh_error=lines("run.txt", "mesh_error", summary["mesh_error"]) if "mesh_error" in summary else [],
         solution=solved,
     )  # fmt: skip
+    return pictures
+
+
+def _subtitle(case: Mapping[str, Any], outcome: Mapping[str, Any]) -> str:
+    laws = ", ".join(
+        f"{tissue['name']} {tissue['law']} {tissue['shear_modulus_Pa']:g} Pa" for tissue in case["tissues"].values()
+    )
+    state = outcome["kind"]
+    if state == "motion":
+        state = f"after {1000 * outcome['time_s']:.0f} ms"
+    elif state == "slow change":
+        state = f"after {outcome['time_s']:g} s"
+    stand_in = "stand-in, not the patient's images; " if case["origin"] == "stand-in" else ""
+    return f"{stand_in}{laws}; {state}"
 
 
 def write_specimen_page(path: Path, summary: Mapping[str, Any], tests: Sequence[Tested]) -> None:
@@ -105,24 +117,11 @@ def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> N
     nothing = {"tests": "", "pictures": "", "view": "", "displacements": [], "mesh_error": [], "solution": []}
     sections = sections_of(
         "run.html", summary=summary, **{**nothing, **values},
-        recorded=[_recorded(one) for one in summary["recordings"]["compared"]],
+        recorded=[row[:9] for row in recorded_rows(summary["recordings"]["compared"])],
         tissues=[
-            [label, one["name"], f"{one['law']} ({one['formulation']})", f"{one['shear_modulus_Pa']:.4g}"]
-            for label, one in case["tissues"].items()
+            [label, tissue["name"], f"{tissue['law']} ({tissue['formulation']})", f"{tissue['shear_modulus_Pa']:g}"]
+            for label, tissue in case["tissues"].items()
         ],
         seconds=[[name, f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()],
     )  # fmt: skip
     write_document(path, document(f"{case['name']}: {case['title']}", top, sections))
-
-
-def _recorded(one: Mapping[str, Any]) -> list[Any]:
-    noise, after = one["noise_root_mean_square"], one["after"]
-    errors = (
-        one["before"]["root_mean_square"],
-        *(after[key] for key in ("root_mean_square", "percentile_95", "largest")),
-    )
-    return [
-        *(one["name"], one["count"], *(error_text(value, one["unit"]) for value in errors)),
-        *("" if noise is None else error_text(noise, one["unit"]), one["unit"]),
-        "check" if one["role"] == "check" else "",
-    ]

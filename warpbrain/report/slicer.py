@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from string import Template
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from warpbrain.images.moving_points import PointFile
 from warpbrain.images.reading import Image
 from warpbrain.recordings.electrodes import is_electrodes
 from warpbrain.report.files import MILLIMETRES, write_body
+from warpbrain.report.page import rendered
 from warpbrain.report.state_files import LEFT, SEEN, TRUST, UNSEEN, SavedState
 
 #: Names of the transforms: what they do to an image.
@@ -24,89 +24,6 @@ SCRIPT = "load_in_slicer.py"
 SURFACES = ("surface-before.vtu", "surface-after.vtu")
 #: Red, green and blue of what `trust.nii.gz` says.
 _COLOURS = {SEEN: (0.0, 0.62, 0.45), UNSEEN: (0.6, 0.6, 0.6), LEFT: (0.84, 0.37, 0.0)}
-
-_TEXT = Template('''\
-"""Loads a result of warpbrain into 3D Slicer. In its Python console:
-
-    exec(open("$path", encoding="utf-8").read())
-"""
-
-import csv
-import os
-
-import slicer
-import vtk
-
-# the folder of the files, if they were moved since they were written
-FOLDER = globals().get("WARPBRAIN_FOLDER", $folder)
-VOLUMES = $volumes
-LABELS = $labels
-DEVIATION = $deviation
-TRUST = $trust
-SURFACES = $surfaces
-MARKUPS = $markups
-ELECTRODES = $electrodes
-TRANSFORM = $transform
-# the largest displacement [mm]
-LARGEST = $largest
-BEFORE, AFTER = (0.0, 0.6, 0.9), (1.0, 0.5, 0.0)
-VIRIDIS = "vtkMRMLColorTableNodeFileViridis.txt"
-
-
-def place(name):
-    return name if os.path.isabs(name) else os.path.join(FOLDER, name)
-
-
-def coloured(nodes, colour):
-    # a file may hold several markups
-    for node in nodes if isinstance(nodes, (list, tuple)) else [nodes]:
-        node.CreateDefaultDisplayNodes()
-        node.GetDisplayNode().SetSelectedColor(*colour)
-
-
-# what is loaded last is shown: the images
-for name in DEVIATION:
-    slicer.util.loadVolume(place(name)).GetDisplayNode().SetAndObserveColorNodeID(VIRIDIS)
-volumes = [slicer.util.loadVolume(place(name)) for name in VOLUMES]
-for name in LABELS:
-    slicer.util.loadLabelVolume(place(name))
-for name, meanings in TRUST:
-    table = slicer.mrmlScene.AddNewNodeByClass("vtkMRMLColorTableNode", "trust")
-    table.SetTypeToUser()
-    table.SetNumberOfColors(1 + len(meanings))
-    table.SetColor(0, "outside of the body", 0.0, 0.0, 0.0, 0.0)
-    for value, meaning, red, green, blue in meanings:
-        table.SetColor(value, meaning, red, green, blue, 1.0)
-    slicer.util.loadLabelVolume(place(name)).GetDisplayNode().SetAndObserveColorNodeID(table.GetID())
-for name, opacity in SURFACES:
-    model = slicer.util.loadModel(place(name))
-    display = model.GetDisplayNode()
-    display.SetActiveScalar("displacement_size", vtk.vtkAssignAttribute.POINT_DATA)
-    display.SetAndObserveColorNodeID(VIRIDIS)
-    display.SetScalarVisibility(True)
-    display.SetScalarRangeFlag(slicer.vtkMRMLDisplayNode.UseManualScalarRange)
-    display.SetScalarRange(0.0, LARGEST)
-    display.SetOpacity(opacity)
-    display.SetVisibility2D(True)
-for before, after in MARKUPS:
-    coloured(slicer.util.loadMarkups(place(before)), BEFORE)
-    coloured(slicer.util.loadMarkups(place(after)), AFTER)
-# Slicer reads no electrodes.tsv: their places are in moved.csv
-for name in ELECTRODES:
-    with open(place("moved.csv"), newline="", encoding="utf-8") as stream:
-        rows = [row for row in csv.DictReader(stream) if row["file"] == name]
-    for prefix, when, colour in (("", "before", BEFORE), ("moved_", "after", AFTER)):
-        points = slicer.mrmlScene.AddNewNodeByClass("vtkMRMLMarkupsFiducialNode", name + " " + when)
-        for row in rows:
-            position = [float(row[prefix + axis + "_mm"]) for axis in "xyz"]
-            points.AddControlPoint(vtk.vtkVector3d(*position), row["label"])
-        coloured(points, colour)
-# moves volumes, models and points alike from before to after, once they are put under it
-slicer.util.loadTransform(place(TRANSFORM))
-if len(volumes) > 1:
-    slicer.util.setSliceViewerLayers(background=volumes[0], foreground=volumes[1], foregroundOpacity=0.5)
-slicer.util.resetThreeDViews()
-''')
 
 
 def write_slicer_scene(
@@ -148,9 +65,8 @@ def write_slicer_scene(
         "transform": FORTH,
         "largest": max(float(size.max()), 1e-6),
     }
-    script = _TEXT.substitute(
-        path=(folder / SCRIPT).resolve().as_posix(), **{name: json.dumps(value) for name, value in values.items()}
-    )
+    path = (folder / SCRIPT).resolve().as_posix()
+    script = rendered("load_in_slicer.txt", path=path, **{name: json.dumps(value) for name, value in values.items()})
     with whole_file(folder / SCRIPT) as scratch:
-        scratch.write_text(script, encoding="utf-8")
+        scratch.write_text(script + "\n", encoding="utf-8")
     return [*SURFACES, SCRIPT]

@@ -6,7 +6,7 @@ The picture has one panel a test: over what was imposed, or over time, if the st
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES, picked, write_csv
-from warpbrain.report.summary import describe_case, elements_lines, sentence_lines, tissue_lines
+from warpbrain.report.summary import describe_case
 from warpbrain.report.views import BLACK, BLUE, VERMILLION
 from warpbrain.simulation.locking import largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model
@@ -84,39 +84,18 @@ def describe_specimen(
     }
 
 
-def specimen_lines(summary: Mapping[str, Any]) -> list[str]:
-    """The specimen and its assumptions, as printed."""
-    specimen = summary["specimen"]
-    lines = [
-        summary["title"],
-        f"  specimen  {_size(specimen)}, {summary['volume_cm3']:.3g} cm3; ends {specimen['grips']}",
-        f"  mesh      {summary['nodes']} nodes, {summary['tetrahedra']} tetrahedra"
-        if specimen["grips"] == "glued"
-        else "  mesh      one element: the state is homogeneous",
-        *(elements_lines(summary) if specimen["grips"] == "glued" else []),
-    ]
-    return lines + tissue_lines(summary) + sentence_lines(summary)
-
-
-def _size(specimen: Mapping[str, Any]) -> str:
-    x, y, z = specimen["size_mm"]
-    if specimen["shape"] == "cylinder":
-        return f"cylinder, radius {x / 2.0:.4g} mm, height {z:.4g} mm"
-    return f"block, {x:.4g} x {y:.4g} x {z:.4g} mm"
-
-
 def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
     """The computed curve of each test, with units."""
     described = []
     for recording, result in ((test.recording, test.result) for test in tests):
-        what, answer = recording.quantities
-        (factor, unit), (scale, answer_unit) = SHOWN[what], SHOWN[answer]
+        quantity, answer = recording.quantities
+        (factor, unit), (scale, answer_unit) = SHOWN[quantity], SHOWN[answer]
         described.append(
             {
                 **picked(recording, "name", "mode", "role"),
                 "rows": len(recording.imposed),
                 **({} if result.time is None else {"time_s": result.time}),
-                "imposed": {"quantity": what, "unit": unit, "values": factor * result.imposed},
+                "imposed": {"quantity": quantity, "unit": unit, "values": factor * result.imposed},
                 "response": {"quantity": answer, "unit": answer_unit, "values": scale * result.response},
                 "newton_iterations": result.newton,
                 "smallest_volume_ratio_J": result.min_J,
@@ -127,26 +106,20 @@ def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
     return described
 
 
-def tested_lines(tests: Sequence[Tested]) -> list[str]:
-    """The table of tests, as printed."""
-    lines = [
-        "test                  mode       rows  role   RMSE before      after  unit       R2  states  Newton   min J"
-    ]
+def test_rows(tests: Sequence[Tested]) -> list[dict[str, Any]]:
+    """Cells of the table of tests: name, mode, rows, role, root mean square before and after with its unit, R2, states,
+    Newton iterations and least volume ratio; and in how many iterations the tangent was indefinite."""
+    rows = []
     for test in tests:
         recording, result, compared = test.recording, test.result, test.comparison
         scale, unit = SHOWN[recording.answer[0]]
-        before, after = (scale * error.root_mean_square for error in (compared.before, compared.after))
-        lines.append(
-            f"  {recording.name:<19} {recording.mode:<8} {compared.count:>6}  {recording.role:<5} "
-            f"{before:>12.4g} {after:>10.4g}  {unit:<5} "
-            f"{result.r_squared:>7.3f} {len(result.imposed):>7} {result.newton.sum():>7} {result.min_J.min():>7.3f}"
+        errors = (scale * error.root_mean_square for error in (compared.before, compared.after))
+        states = (len(result.imposed), int(result.newton.sum()), float(result.min_J.min()))
+        head = (recording.name, recording.mode, compared.count, recording.role)
+        rows.append(
+            {"cells": [*head, *errors, unit, result.r_squared, *states], "unstable": result.unstable_iterations}
         )
-        if result.unstable_iterations:
-            lines.append(
-                f"    note: the tangent was indefinite in {result.unstable_iterations} iterations: the specimen "
-                "buckles or its law softens, and the real one may reach another state"
-            )
-    return [*lines, "  before: a specimen that resists nothing; after: this simulation; R2: 1 is perfect"]
+    return rows
 
 
 def write_tests(path: Path, tests: Sequence[Tested]) -> None:
@@ -200,7 +173,7 @@ def tests_figure(tests: Sequence[Tested], most: int) -> Any:
 
 def _draw(axes: Any, test: Tested) -> None:
     recording, result = test.recording, test.result
-    (what, answer), (factor, unit) = recording.quantities, SHOWN[recording.quantities[0]]
+    (quantity, answer), (factor, unit) = recording.quantities, SHOWN[recording.quantities[0]]
     scale, answer_unit = _readable(recording.response, SHOWN[answer][1])
     colour, shape = _STYLES[recording.role]
     through_time = result.time is not None and recording.time is not None
@@ -215,7 +188,7 @@ def _draw(axes: Any, test: Tested) -> None:
         axes.plot(factor * result.imposed, scale * result.response, ".", color=BLACK, markersize=6.0)
     axes.axhline(0.0, color="#bbbbbb", linewidth=0.7, zorder=0)
     axes.locator_params(axis="x", nbins=6)
-    axes.set_xlabel("time [s]" if through_time else f"{what} [{unit}]" if unit else what)
+    axes.set_xlabel("time [s]" if through_time else f"{quantity} [{unit}]" if unit else quantity)
     axes.set_ylabel(f"{'nominal ' if answer == 'stress' else ''}{answer} [{answer_unit}]")
     error = f"{scale * test.comparison.after.root_mean_square:.3g} {answer_unit}"
     if recording.force_controlled:

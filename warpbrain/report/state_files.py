@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from warpbrain.arrays import Floats, Ints
-from warpbrain.diagnosis.locating import ScoreMap
-from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.posterior import Posterior
+from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.patience import patience
 from warpbrain.mesh.vtu import read_vtu
-from warpbrain.report.files import MIDDLES, MILLIMETRES, body_file, write_body
-from warpbrain.worlds.body.displacement_spread import displacement_deviation
+from warpbrain.report.files import MIDDLES, MILLIMETRES
 
 #: Files that hold a deformed body, in the order in which they are looked for: of `run`, of `estimate` and `diagnose`,
 #: and of `ensemble`.
@@ -88,56 +82,3 @@ def read_state(result: Path) -> SavedState:
     if {"blind", "significant"} <= at.keys():
         trust = np.where(at["significant"] > 0.0, LEFT, np.where(at["blind"] > 0.0, UNSEEN, SEEN))
     return SavedState(path, mesh, u / MILLIMETRES, middles, deviation, trust)
-
-
-def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | None = None) -> None:
-    """Write the most probable state of an estimate as VTU with coordinates in mm.
-
-    Point arrays: ``displacement`` [mm] and ``displacement_sd`` of its components [mm]: what is not known of the tissue,
-    to first order about that state. With a map of what is left ``significant`` and ``blind``, too, as in `map.vtu`.
-    """
-    file = file_of_estimate(posterior)
-    if where is not None:
-        file.point_data |= seen(where, posterior.case.remaining[0])
-    write_body(path, file)
-
-
-def file_of_estimate(posterior: Posterior) -> Any:
-    """What `write_estimated_state` writes, as a `meshio.Mesh`."""
-    du, covariance = posterior.best.linearised.du, posterior.covariance
-    variance = np.einsum("pnk,pq,qnk->nk", du, covariance, du)
-    deviation = MILLIMETRES * np.sqrt(np.maximum(variance, 0.0))
-    arrays = {"displacement": MILLIMETRES * posterior.best.point.state.u, "displacement_sd": deviation}
-    return body_file(posterior.case.remaining[0], arrays)
-
-
-def write_diagnosed_state(path: Path, diagnosis: Diagnosis) -> None:
-    """Write the last state of a diagnosis, with all that is named, as VTU with coordinates in mm.
-
-    Point arrays: ``displacement`` [mm], ``displacement_sd`` of its components [mm] as of `displacement_deviation`,
-    where that state can be linearised, ``significant`` and ``blind`` as in `map.vtu`.
-    """
-    refit = diagnosis.best.refit
-    state = diagnosis.base.at if refit is None else refit.state
-    mesh = state.system.model.mesh
-    arrays = {"displacement": MILLIMETRES * state.u, **seen(diagnosis.map, mesh)}
-    # a state at the edge of what is stable has an equilibrium, and none beside it
-    with contextlib.suppress(SolveError):
-        arrays["displacement_sd"] = MILLIMETRES * displacement_deviation(diagnosis.best, diagnosis.base)
-    write_body(path, body_file(mesh, arrays))
-
-
-def seen(where: ScoreMap, mesh: TetMesh) -> dict[str, Any]:
-    """What the map says at each node: whether what is left is significant, and whether recordings see no force."""
-    nearest = nearest_site(where, mesh)
-    return {
-        "significant": (where.scores[nearest] > where.threshold).astype(np.uint8),
-        "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
-    }
-
-
-def nearest_site(where: ScoreMap, mesh: TetMesh) -> Ints:
-    """Index (n,) of the place of the map that is nearest to each node."""
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(where.sites).query(mesh.points)[1])

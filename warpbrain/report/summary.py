@@ -12,13 +12,14 @@ from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.checking import NOTHING_ACTS
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import tabled
-from warpbrain.report.files import MILLIMETRES, picked
+from warpbrain.report.files import MILLIMETRES, fingerprints, picked
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
 
 if TYPE_CHECKING:
     from warpbrain.cases.drawn import FromPrior
+    from warpbrain.simulation.system import System
 
 #: Said wherever a stand-in is met.
 STAND_IN = "a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
@@ -86,6 +87,18 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
     }
 
 
+def describe_opening(
+    case: Case, described: Mapping[str, Any], prior: Mapping[str, Any] | None, system: System, precision: str
+) -> dict[str, Any]:
+    """How every summary of a run begins: what was computed, of which files, and where."""
+    return {
+        "case": described,
+        "inputs_sha256": fingerprints(case),
+        **({} if prior is None else {"prior": prior}),
+        "device": {"name": system.device.name, "alias": system.device.alias, "precision": precision},
+    }
+
+
 def _law(tissue: Tissue) -> dict[str, Any]:
     return {"parameters": vars(tissue.known_law), "shear_modulus_Pa": tissue.known_law.shear_modulus}
 
@@ -115,107 +128,27 @@ def sizes_mm(statistics: Any) -> dict[str, float]:
     return {key: MILLIMETRES * getattr(statistics, key) for key in keys}
 
 
-def case_lines(summary: Mapping[str, Any]) -> list[str]:
-    """The anatomy and its assumptions, as printed."""
-    lines = [summary["title"]]
-    if summary["origin"] == "stand-in":
-        lines.append(f"  {STAND_IN}")
-    before, after = summary["volume_before_resection_cm3"], summary["volume_cm3"]
-    lines.append(
-        f"  mesh      {summary['nodes']} nodes, {summary['tetrahedra']} tetrahedra"
-        + (f" of elements {summary['elements']}" if summary["elements"] != "tet4" else "")
-        + (f" with {summary['midside_nodes']} midside nodes" if summary["midside_nodes"] else "")
-        + f", {after:.1f} cm3, {summary['mass_kg']:.4f} kg"
-        + (f" (before resection {before:.1f} cm3)" if before - after > 1e-6 else "")
-    )
-    return lines + elements_lines(summary) + tissue_lines(summary) + sentence_lines(summary)
-
-
-def tissue_lines(summary: Mapping[str, Any]) -> list[str]:
-    """The law of each tissue, as printed."""
+def displacement_rows(described: Mapping[str, Any]) -> list[list[Any]]:
+    """Node set, number of nodes, mean, root mean square, 95th percentile and largest displacement [mm], as text."""
     return [
-        f"  tissue {label}  {tissue['name']}: {tissue['law']} ({tissue['formulation']}), "
-        f"mu = {tissue['shear_modulus_Pa']:g} Pa, nu = {summary['poisson']:g}"
-        for label, tissue in summary["tissues"].items()
+        [
+            *(SET_TITLES.get(name, name), s["nodes"]),
+            *(tabled(s[key]) for key in ("mean", "root_mean_square", "percentile_95", "largest")),
+        ]
+        for name, s in described["displacement_mm"].items()
     ]
 
 
-def sentence_lines(summary: Mapping[str, Any]) -> list[str]:
-    """What is assumed, remarked and left out, as printed."""
-    kinds = (("assumed", "assumptions"), ("remark", "remarks"), ("left out", "left_out"))
-    return [f"  {kind:<9} {sentence}" for kind, key in kinds for sentence in summary[key]]
-
-
-def elements_lines(summary: Mapping[str, Any]) -> list[str]:
-    """Why there are other elements than plain ones that nobody asked for, as printed."""
-    if summary["elements"] == "tet4" or summary["elements_chosen"] == "asked for":
-        return []
-    return [f"  elements  {summary['elements']}: {summary['elements_chosen']}"]
-
-
-def displacement_lines(summary: Mapping[str, Any]) -> list[str]:
-    """The table of displacements, as printed."""
-    lines = ["displacement [mm]        nodes     mean      RMS      95 %      max"]
-    for name, s in summary["displacement_mm"].items():
-        lines.append(
-            f"  {SET_TITLES.get(name, name):<20} {s['nodes']:>7} {tabled(s['mean']):>8} "
-            f"{tabled(s['root_mean_square']):>8} {tabled(s['percentile_95']):>9} {tabled(s['largest']):>8}"
-        )
-    J = summary["volume_ratio_J"]
-    lines.append(
-        f"  volume ratio J {J['smallest']:.3f} to {J['largest']:.3f}; largest von Mises stress "
-        f"{summary['von_mises_Pa']['largest']:.0f} Pa"
-    )
-    lines += [
-        f"  {name.replace('_', ' ')} {p['smallest']:.3g} to {p['largest']:.3g} Pa"
-        for name, p in summary["pressures_at_nodes_Pa"].items()
-    ]
-    return lines
-
-
-def timing_lines(phases: Mapping[str, float], counts: Mapping[str, int]) -> list[str]:
-    """The table of wall times by phase, as printed."""
-    lines = ["time [ms]                 calls      each     total"]
-    for name, seconds in phases.items():
-        calls = counts.get(name, 1)
-        lines.append(f"  {name:<22} {calls:>6} {1000.0 * seconds / calls:>9.2f} {1000.0 * seconds:>9.1f}")
-    return lines
-
-
-def describe_prior(found: FromPrior) -> dict[str, Any]:
+def describe_prior(prior: FromPrior) -> dict[str, Any]:
     """Model, draw and laws, with units; the draw is None where the laws are those of middle curves."""
-    drawn, draw = found.drawn, None
+    drawn, draw = prior.drawn, None
     tissues: dict[str, dict[str, Any]] = {}
-    for label in found.labels:
-        tissue = found.case.tissues[label]
+    for label in prior.labels:
+        tissue = prior.case.tissues[label]
         known = {"name": tissue.name, "group": tissue.prior, "law": tissue.known_law.name}
         tissues[str(label)] = known | _law(tissue)
     if drawn is not None:
         draw = {"sample": drawn.number, "seed": drawn.seed, "redrawn": len(drawn.rejected), "reasons": drawn.rejected}
         for described, fitted in zip(tissues.values(), drawn.fits, strict=True):
             described["rms_of_fit"] = fitted.rms
-    return {"model": found.model.name, "variant": found.model.variant, "draw": draw, "tissues": tissues}
-
-
-def prior_lines(described: Mapping[str, Any] | None) -> list[str]:
-    """What is printed; nothing for None, where no law is the generative model's."""
-    if described is None:
-        return []
-    draw = described["draw"]
-    by = f"the generative model {described['model']} ({described['variant']})"
-    lines, curve = [], f"the middle curve of {by}"
-    if draw is not None:
-        redrawn, curve = f"unstable and redrawn: {draw['redrawn']}", "drawn"
-        lines = [f"  prior     draw {draw['sample']} of seed {draw['seed']} by {by}; {redrawn}"]
-        lines += [f"  redrawn   {reason}" for reason in draw["reasons"]]
-    for label, tissue in described["tissues"].items():
-        parameters = []
-        for name, value in tissue["parameters"].items():
-            numbers = ", ".join(f"{v:.6g}" for v in (value if isinstance(value, tuple) else (value,)))
-            # exponents have no unit
-            parameters.append(f"{name} = {numbers}" + ("" if name == "alpha" else " Pa"))
-        lines.append(
-            f"  tissue {label}  {tissue['group']}, {curve}: {tissue['law']}, {', '.join(parameters)}, "
-            f"shear modulus {tissue['shear_modulus_Pa']:.6g} Pa"
-        )
-    return lines
+    return {"model": prior.model.name, "variant": prior.model.variant, "draw": draw, "tissues": tissues}

@@ -64,13 +64,13 @@ def read_sweep(path: Path, header: list[str], tissues: int) -> tuple[dict[Steps,
     # what is cut off in its first line, or is all zeros, has no points of any sweep
     if not sound and first.strip("?") and not ",".join(header).startswith(first):
         raise InputError(f"{path}: a sweep of something else: take the file away to begin again")
-    found = {}
+    points = {}
     for row in sound:
         numbers = [float(value) for value in row[:-3]]
         steps = tuple(numbers[:tissues])
         error = float(row[-3]) if row[-3] else None
-        found[steps] = SweepPoint(steps, tuple(numbers[tissues:]), error, row[-2])
-    return found, max(len(rows) - 1, 0) - len(sound)
+        points[steps] = SweepPoint(steps, tuple(numbers[tissues:]), error, row[-2])
+    return points, max(len(rows) - 1, 0) - len(sound)
 
 
 def _checksum(header: list[str], row: list[str]) -> str:
@@ -106,19 +106,19 @@ def estimated_in(path: Path) -> dict[str, Estimated]:
     """
     if not path.exists():
         return {}
-    found: dict[str, Estimated] = {}
+    estimates: dict[str, Estimated] = {}
     try:
-        for one in json.loads(path.read_text(encoding="utf-8"))["parameters"]:
-            if one["name"] != "shear modulus":
+        for parameter in json.loads(path.read_text(encoding="utf-8"))["parameters"]:
+            if parameter["name"] != "shear modulus":
                 continue
-            middle, low, high = float(one["estimate"]), *map(float, one["interval_95"])
+            middle, low, high = float(parameter["estimate"]), *map(float, parameter["interval_95"])
             if not 0.0 < low <= middle <= high < math.inf:
-                raise ValueError(f"{one['tissue']}: found {middle:g} in {low:g} to {high:g} Pa")
-            found[one["tissue"]] = middle, low, high
+                raise ValueError(f"{parameter['tissue']}: found {middle:g} in {low:g} to {high:g} Pa")
+            estimates[parameter["tissue"]] = middle, low, high
     except (OSError, LookupError, TypeError, ValueError, RecursionError) as error:
         detail = " ".join(str(error).split())[:200]
         raise InputError(f"{path}: not an estimate to draw beside the sweep ({detail})") from None
-    return found
+    return estimates
 
 
 def write_sweep_picture(path: Path, sweep: Sweep, title: str, estimated: Mapping[str, Estimated]) -> None:
@@ -153,10 +153,10 @@ def _draw_curve(axes: Any, sweep: Sweep, estimated: Mapping[str, Estimated]) -> 
     axes.plot(moduli[order], errors[order], "o-", color=BLUE, markersize=5, label="sweep")
     best = int(np.nanargmin(errors))
     axes.plot(moduli[best], errors[best], "s", color=VERMILLION, markersize=9, label="best of the sweep")
-    found = estimated.get(sweep.parameters.tissues[0])
-    if found is not None:
-        axes.axvline(found[0], color=BLACK, label="estimate")
-        axes.axvspan(found[1], found[2], color=BLACK, alpha=0.15, linewidth=0, label="95 % interval")
+    estimate = estimated.get(sweep.parameters.tissues[0])
+    if estimate is not None:
+        axes.axvline(estimate[0], color=BLACK, label="estimate")
+        axes.axvspan(estimate[1], estimate[2], color=BLACK, alpha=0.15, linewidth=0, label="95 % interval")
     axes.set_xscale("log")
     axes.set_xlabel(f"shear modulus of {sweep.parameters.tissues[0]} [Pa]")
     axes.set_ylabel(f"RMSE at the fitted recordings [{SHOWN[sweep.unit][1]}]")

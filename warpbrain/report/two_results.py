@@ -44,14 +44,14 @@ class SavedResult:
     def inputs(self) -> dict[str, str]:
         """What it was made from and how, as text by name."""
         summary = self.summary
-        found = {"command": self.command}
-        found |= {f"sha256 of {name}": digest[:16] for name, digest in (summary.get("inputs_sha256") or {}).items()}
+        inputs = {"command": self.command}
+        inputs |= {f"sha256 of {name}": digest[:16] for name, digest in (summary.get("inputs_sha256") or {}).items()}
         for part in ("case", *_INPUTS):
             value = summary.get(part)
             if isinstance(value, dict):
                 value = {key: item for key, item in value.items() if key not in _NO_INPUT and "iterations" not in key}
-            found |= dict(_flat(part, value))
-        return found | dict(_flat("version of", summary.get("versions", {})))
+            inputs |= dict(_flat(part, value))
+        return inputs | dict(_flat("version of", summary.get("versions", {})))
 
     def errors(self) -> dict[str, Quantity]:
         """Root mean square differences from what was recorded, by what they are of."""
@@ -61,14 +61,14 @@ class SavedResult:
             by_name[f"{name}, nothing moved"] = Quantity(before, unit)
             by_name[name] = Quantity(after, unit, interval)
 
-        for one in (self.summary.get("recordings") or {}).get("compared", []):
-            add(one["name"], one["unit"], one["before"]["root_mean_square"], one["after"]["root_mean_square"])
-        for one in self.summary.get("predictions", []):
-            add(one["name"], one["unit"], one["root_mean_square_before"], one["root_mean_square_of_run"])
-            by_name[f"{one['name']}, moved back"] = Quantity(one["root_mean_square_after"], one["unit"])
-        for name, one in ((self.summary.get("result") or {}).get("rmse_at_recordings") or {}).items():
-            after = one["after"]
-            add(name, one["unit"], one["before"], after["p50"], (after["p05"], after["p95"]))
+        for entry in (self.summary.get("recordings") or {}).get("compared", []):
+            add(entry["name"], entry["unit"], entry["before"]["root_mean_square"], entry["after"]["root_mean_square"])
+        for entry in self.summary.get("predictions", []):
+            add(entry["name"], entry["unit"], entry["root_mean_square_before"], entry["root_mean_square_of_run"])
+            by_name[f"{entry['name']}, moved back"] = Quantity(entry["root_mean_square_after"], entry["unit"])
+        for name, entry in ((self.summary.get("result") or {}).get("rmse_at_recordings") or {}).items():
+            after = entry["after"]
+            add(name, entry["unit"], entry["before"], after["p50"], (after["p05"], after["p95"]))
         for kind, where in (("rmse_m", "all fitted"), ("heldout_rmse_m", "held out"), ("check_rmse_m", "check")):
             for stage, value in ((self.summary.get("fit") or {}).get(kind) or {}).items():
                 if value is not None:
@@ -78,18 +78,24 @@ class SavedResult:
     def tissue(self) -> dict[str, Quantity]:
         """Parameters of the tissues, by tissue and name."""
         by_name: dict[str, Quantity] = {}
-        for one in ((self.summary.get("case") or {}).get("tissues") or {}).values():
-            by_name[f"{one['name']}, shear modulus"] = Quantity(one["shear_modulus_Pa"], "Pa")
+        for parameter in ((self.summary.get("case") or {}).get("tissues") or {}).values():
+            by_name[f"{parameter['name']}, shear modulus"] = Quantity(parameter["shear_modulus_Pa"], "Pa")
         estimated = [
-            *((one, "estimate", "") for one in self.summary.get("parameters") or [] if self.command == "estimate"),
             *(
-                (one, "middle", ", over what may act")
-                for one in (self.summary.get("nothing_else") or {}).get("tissue") or []
+                (parameter, "estimate", "")
+                for parameter in self.summary.get("parameters") or []
+                if self.command == "estimate"
+            ),
+            *(
+                (parameter, "middle", ", over what may act")
+                for parameter in (self.summary.get("nothing_else") or {}).get("tissue") or []
             ),
         ]
-        for one, key, more in estimated:
-            low, high = one["interval_95"]
-            by_name[f"{one['tissue']}, {one['name']}{more}"] = Quantity(one[key], one["unit"], (low, high))
+        for parameter, key, more in estimated:
+            low, high = parameter["interval_95"]
+            by_name[f"{parameter['tissue']}, {parameter['name']}{more}"] = Quantity(
+                parameter[key], parameter["unit"], (low, high)
+            )
         return by_name
 
 
@@ -160,15 +166,17 @@ def difference(first: SavedState, second: SavedState) -> Difference:
     InputError
         If they are nowhere in one place.
     """
-    mesh, other = first.mesh, second.mesh
+    mesh, second_mesh = first.mesh, second.mesh
     size = float(np.ptp(mesh.points, axis=0).max())
-    same = mesh.tetrahedra.shape == other.tetrahedra.shape and np.array_equal(mesh.tetrahedra, other.tetrahedra)
-    same = same and mesh.points.shape == other.points.shape
-    same = same and bool(np.abs(mesh.points - other.points).max() <= _SAME * size)
+    same = mesh.tetrahedra.shape == second_mesh.tetrahedra.shape and np.array_equal(
+        mesh.tetrahedra, second_mesh.tetrahedra
+    )
+    same = same and mesh.points.shape == second_mesh.points.shape
+    same = same and bool(np.abs(mesh.points - second_mesh.points).max() <= _SAME * size)
     if same:
         there, inside = second.u, np.ones(len(mesh.points), dtype=bool)
     else:
-        location = locate(other.points, other.tetrahedra, mesh.points)
+        location = locate(second_mesh.points, second_mesh.tetrahedra, mesh.points)
         inside = location.distance <= _SAME * size
         there = location.interpolate(second.u)
     if not inside.any():
@@ -195,12 +203,12 @@ def difference(first: SavedState, second: SavedState) -> Difference:
 
 def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
     """Everything that is compared, as plain values; RMSE are of the simulation alone, but those "moved back"."""
-    one, two = first.inputs(), second.inputs()
-    names = dict.fromkeys([*one, *two])
+    inputs, two = first.inputs(), second.inputs()
+    names = dict.fromkeys([*inputs, *two])
     bodies = first.state is not None and second.state is not None
     return {
         "folders": [str(first.folder), str(second.folder)],
-        "inputs_that_differ": {n: [one.get(n), two.get(n)] for n in names if one.get(n) != two.get(n)},
+        "inputs_that_differ": {n: [inputs.get(n), two.get(n)] for n in names if inputs.get(n) != two.get(n)},
         "rmse": _pairs(first.errors(), second.errors()),
         "displacement": asdict(difference(first.state, second.state)) if bodies else None,  # type: ignore[arg-type]
         "tissue": _pairs(first.tissue(), second.tissue()),
@@ -209,59 +217,13 @@ def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
     }
 
 
-def _pairs(one: dict[str, Quantity], two: dict[str, Quantity]) -> dict[str, Any]:
+def _pairs(first: dict[str, Quantity], two: dict[str, Quantity]) -> dict[str, Any]:
     pairs = {}
-    for name in dict.fromkeys([*one, *two]):
-        both = [one.get(name), two.get(name)]
+    for name in dict.fromkeys([*first, *two]):
+        both = [first.get(name), two.get(name)]
         pairs[name] = {
             "unit": next(each.unit for each in both if each is not None),
             "values": [None if each is None else each.value for each in both],
             "intervals_95": [None if each is None else each.interval for each in both],
         }
     return pairs
-
-
-def two_lines(summary: dict[str, Any]) -> list[str]:
-    """What is printed."""
-    lines = [f"A  {summary['folders'][0]}", f"B  {summary['folders'][1]}", ""]
-    differ = summary["inputs_that_differ"]
-    if differ:
-        lines.append("inputs that differ")
-        for name, both in differ.items():
-            values = ("not said" if value is None else value for value in both)
-            lines += [f"  {name}", *(f"    {letter}  {value}" for letter, value in zip("AB", values, strict=True))]
-    else:
-        lines.append("inputs that differ: none")
-    if summary["rmse"]:
-        lines += ["", f"{'RMSE at recordings':<44}{'A':>22}{'B':>22}", *_table(summary["rmse"])]
-    apart = summary["displacement"]
-    if apart is not None:
-        at = ", ".join(f"{x:.0f}" for x in apart["at_mm"])
-        body = "on the same mesh" if apart["same_mesh"] else f"at {apart['nodes']} nodes of A that are in B"
-        lines += [
-            "",
-            f"displacement, {body}",
-            f"  B minus A   RMS {apart['root_mean_square_mm']:.4g} mm, at most {apart['largest_mm']:.4g} mm "
-            f"at ({at}) mm",
-            f"  alone       RMS A {apart['first_mm']:.4g} mm, B {apart['second_mm']:.4g} mm",
-        ]
-        if apart["outside"]:
-            lines.append(f"  {apart['outside']} nodes of A are outside of B and not compared")
-    if summary["tissue"]:
-        lines += ["", f"{'tissue (95 % interval)':<44}{'A':>22}{'B':>22}", *_table(summary["tissue"])]
-    if any(summary["verdict"]):
-        lines += ["", "verdict"]
-        for letter, verdict, sentence in zip("AB", summary["verdict"], summary["sentence"], strict=True):
-            lines.append(f"  {letter}  {'none: no diagnosis' if verdict is None else f'{verdict}: {sentence}'}")
-    return lines
-
-
-def _table(pairs: dict[str, Any]) -> list[str]:
-    rows = []
-    for name, pair in pairs.items():
-        cells = []
-        for value, interval in zip(pair["values"], pair["intervals_95"], strict=True):
-            cell = "-" if value is None else f"{value:.4g}"
-            cells.append(cell if interval is None else f"{cell} ({interval[0]:.4g} to {interval[1]:.4g})")
-        rows.append(f"  {name:<42}{cells[0]:>22}{cells[1]:>22} {pair['unit']}".rstrip())
-    return rows

@@ -105,8 +105,8 @@ def places(mesh: TetMesh, resected: Bools | None = None) -> tuple[float, float, 
         cavity = mesh.points[mesh.tetrahedra[resected].ravel()].mean(axis=0)
         return float(cavity[2]), float(cavity[1]), float(cavity[0])
     # beside the midline, where a lateral ventricle is
-    beside = float(np.quantile(mesh.points[ventricle, 0], 0.75)) if ventricle.any() else float(centre[0])
-    return float(centre[2]), float(centre[1]), beside
+    lateral = float(np.quantile(mesh.points[ventricle, 0], 0.75)) if ventricle.any() else float(centre[0])
+    return float(centre[2]), float(centre[1]), lateral
 
 
 def in_view(coordinates: Floats) -> Floats:
@@ -136,13 +136,13 @@ def heading(mesh: TetMesh, view: View, place: float) -> str:
 def tissue_colours(names: Mapping[int, str], mesh: TetMesh) -> dict[int, str]:
     """Colour of each label of a mesh, whatever the order of the labels."""
     chosen = {label: COLOUR_OF[names[label]] for label in mesh.labels if names.get(label) in COLOUR_OF}
-    others = [colour for colour in TISSUE_COLOURS if colour not in COLOUR_OF.values()]
+    spare = [colour for colour in TISSUE_COLOURS if colour not in COLOUR_OF.values()]
     # one that nobody named is called so (`cases new`)
     named = {label: name for label, name in names.items() if name != f"tissue {label}" and label not in chosen}
     for name, label in sorted((named[label], label) for label in mesh.labels if label in named):
         # that of the name in every case, unless another tissue of this one has it already
-        first = zlib.crc32(name.encode()) % len(others)
-        wishes = [*others[first:], *others[:first]]
+        first = zlib.crc32(name.encode()) % len(spare)
+        wishes = [*spare[first:], *spare[:first]]
         chosen[label] = next((colour for colour in wishes if colour not in chosen.values()), wishes[0])
     left = [colour for colour in TISSUE_COLOURS if colour not in chosen.values()]
     nameless = [label for label in mesh.labels if label not in chosen]
@@ -198,6 +198,12 @@ def draw_part(axes: Any, section: Cut, part: Bools, **style: Any) -> None:
     if part.any():
         chosen = [Shape(in_view(p), closed=False) for p, here in zip(section.polygons, part, strict=True) if here]
         axes.add_artist(PathPatch(Shape.make_compound_path(*chosen), **style))
+
+
+def draw_hatching(axes: Any, section: Cut, mesh: TetMesh, nodes: Any, hatch: str, colour: str) -> None:
+    """Hatch the elements of a cut of which most nodes are among those (n,) that are true."""
+    inside = nodes[mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
+    draw_part(axes, section, inside, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0.0, zorder=2.0)
 
 
 def draw_outline(axes: Any, mesh: TetMesh, view: View, place: float, colour: str = TISSUE_EDGE) -> None:

@@ -38,7 +38,7 @@ _APART = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class WarpRequest:
     """What is to be warped, read and checked before anything is computed."""
 
     image: Image | None
@@ -56,7 +56,7 @@ class Asked:
         return self.labels if self.image is None else self.image
 
 
-def read_asked(image: Path | None, labels: Path | None, points: Sequence[Path]) -> Asked:
+def read_request(image: Path | None, labels: Path | None, points: Sequence[Path]) -> WarpRequest:
     """Read what is to be warped.
 
     Raises
@@ -65,21 +65,23 @@ def read_asked(image: Path | None, labels: Path | None, points: Sequence[Path]) 
         Naming the file, what was found and what was expected.
     """
     require("nibabel", "nibabel", "writing of images")
-    asked = Asked(
+    request = WarpRequest(
         None if image is None else read_image(image),
         None if labels is None else read_image(labels),
         tuple(read_point_file(path) for path in points),
     )
-    if asked.labels is not None:
-        labels_of(asked.labels)
-    if asked.image is not None and asked.image.values.dtype.kind not in "iufb":
-        raise InputError(f"{asked.image.path}: expected real numbers, found values of type {asked.image.values.dtype}")
-    if asked.grid_of is not None and asked.grid_of.grid.is_skew:
+    if request.labels is not None:
+        labels_of(request.labels)
+    if request.image is not None and request.image.values.dtype.kind not in "iufb":
         raise InputError(
-            f"{asked.grid_of.path}: affine: its axes are not at right angles, which no ITK transform can have: "
+            f"{request.image.path}: expected real numbers, found values of type {request.image.values.dtype}"
+        )
+    if request.grid_of is not None and request.grid_of.grid.is_skew:
+        raise InputError(
+            f"{request.grid_of.path}: affine: its axes are not at right angles, which no ITK transform can have: "
             "resample the image first"
         )
-    names = _names(asked)
+    names = _names(request)
     # one file on systems that take letters for the same in either case
     plain = [name.lower() for name in names]
     for name in names:
@@ -87,11 +89,14 @@ def read_asked(image: Path | None, labels: Path | None, points: Sequence[Path]) 
             raise InputError(
                 f"{name}: {plain.count(name.lower())} of the files given would be written as it: rename one"
             )
-    return asked
+    return request
 
 
 def write_warped(
-    folder: Path, state: SavedState, asked: Asked, progress: Callable[[float, str], None] = lambda share, stage: None
+    folder: Path,
+    state: SavedState,
+    request: WarpRequest,
+    progress: Callable[[float, str], None] = lambda share, stage: None,
 ) -> tuple[list[str], list[str]]:
     """Write all that a state and what is asked for give; returns what a user should read, and names of the files.
 
@@ -100,8 +105,8 @@ def write_warped(
     InputError
         If the image is not of the body.
     """
-    source = asked.grid_of
-    check_place(asked, state.mesh, state.path)
+    source = request.grid_of
+    check_place(request, state.mesh, state.path)
     grid = Grid.around(state.mesh, _SPACING, _MARGIN) if source is None else source.grid
     progress(0.0, "displacement on the grid of the image")
     fine = _for_transforms(grid)
@@ -115,29 +120,31 @@ def write_warped(
     write_transform(folder / BACK, field)
     files = ["displacement.nii.gz", FORTH, BACK]
     onto = back.field.on(grid)
-    for image, nearest in ((asked.image, False), (asked.labels, True)):
+    for image, nearest in ((request.image, False), (request.labels, True)):
         if image is not None:
             name = _after(image.path)
             write_volume(folder / name, resampled(image.values, image.grid, onto, nearest=nearest), grid)
             files.append(name)
     files += _write_maps(folder, state, inside if fine is grid else voxels_inside(state.mesh, grid))
-    moved = [move_points(file, state.mesh, state.u, state.middles, field) for file in asked.points]
+    moved = [move_points(file, state.mesh, state.u, state.middles, field) for file in request.points]
     if moved:
         files += write_moved(folder, moved)
-    image_after, labels_after = (None if each is None else _after(each.path) for each in (asked.image, asked.labels))
-    files += write_slicer_scene(folder, state, asked.image, image_after, labels_after, asked.points, files)
-    lines = [*_lines(asked, field, inside, back, moved), *_partly_outside(asked, state.mesh), *_trust_lines(state)]
+    image_after, labels_after = (
+        None if each is None else _after(each.path) for each in (request.image, request.labels)
+    )
+    files += write_slicer_scene(folder, state, request.image, image_after, labels_after, request.points, files)
+    lines = [*_lines(request, field, inside, back, moved), *_partly_outside(request, state.mesh), *_trust_lines(state)]
     return lines, files
 
 
-def in_the_way(folder: Path, asked: Asked) -> list[str]:
+def in_the_way(folder: Path, request: WarpRequest) -> list[str]:
     """Names of files in a folder that what is asked for would be written over."""
-    names = ["displacement.nii.gz", FORTH, BACK, *_names(asked)]
+    names = ["displacement.nii.gz", FORTH, BACK, *_names(request)]
     return [name for name in names if (folder / name).exists()]
 
 
-def _names(asked: Asked) -> list[str]:
-    return [*(_after(image.path) for image in asked.images), *(file.moved_name for file in asked.points)]
+def _names(request: WarpRequest) -> list[str]:
+    return [*(_after(image.path) for image in request.images), *(file.moved_name for file in request.points)]
 
 
 def _after(path: Path) -> str:
@@ -148,10 +155,10 @@ def _after(path: Path) -> str:
     return f"{stem}-after.nii.gz"
 
 
-def check_place(asked: Asked, mesh: TetMesh, path: Path) -> None:
+def check_place(request: WarpRequest, mesh: TetMesh, path: Path) -> None:
     """`InputError` if most of a body is outside of an image: in another place, unit or orientation."""
     points = MILLIMETRES * mesh.points
-    for image in asked.images:
+    for image in request.images:
         share = float(np.mean(image.grid.contains(points)))
         if share < _INSIDE:
             # all eight: of an oblique image two opposite ones span less than the image
@@ -161,26 +168,26 @@ def check_place(asked: Asked, mesh: TetMesh, path: Path) -> None:
                 f"{_span(corners)}, the body {_span(points)} "
                 "mm RAS: is it the image that the mesh was made from?"
             )
-    if asked.labels is not None:
-        there = asked.labels.values != 0
+    if request.labels is not None:
+        there = request.labels.values != 0
         labelled = [np.flatnonzero(there.any(axis=across)) for across in ((1, 2), (0, 2), (0, 1))]
         if not len(labelled[0]):
-            raise InputError(f"{asked.labels.path}: all its voxels are 0: there are no labels to warp")
+            raise InputError(f"{request.labels.path}: all its voxels are 0: there are no labels to warp")
         ends = np.array([(index.min() - 0.5, index.max() + 0.5) for index in labelled])
-        low, high = asked.labels.grid.indices(points).min(axis=0), asked.labels.grid.indices(points).max(axis=0)
+        low, high = request.labels.grid.indices(points).min(axis=0), request.labels.grid.indices(points).max(axis=0)
         if (ends[:, 1] < low).any() or (ends[:, 0] > high).any():
-            box = asked.labels.grid.positions(np.array(np.meshgrid(*ends, indexing="ij")).reshape(3, -1).T)
+            box = request.labels.grid.positions(np.array(np.meshgrid(*ends, indexing="ij")).reshape(3, -1).T)
             raise InputError(
-                f"{asked.labels.path}: affine: its labels span {_span(box)}, the body of {path} {_span(points)} "
+                f"{request.labels.path}: affine: its labels span {_span(box)}, the body of {path} {_span(points)} "
                 "mm RAS: no label is of it"
             )
 
 
-def _partly_outside(asked: Asked, mesh: TetMesh) -> list[str]:
+def _partly_outside(request: WarpRequest, mesh: TetMesh) -> list[str]:
     """What to say of images that hold a part of the body only."""
     points, weights = MILLIMETRES * mesh.points, mesh.node_volumes
     lines = []
-    for image in asked.images:
+    for image in request.images:
         share = float(weights[~image.grid.contains(points)].sum() / weights.sum())
         if share > _CUT_OFF:
             lines.append(f"note      {image.path.name}: {100 * share:.2g} % of the body are outside of it")
@@ -235,7 +242,7 @@ def _trust_lines(state: SavedState) -> list[str]:
 
 
 def _lines(
-    asked: Asked, field: DisplacementField, inside: VoxelsInside, back: Inverse, moved: list[MovedPoints]
+    request: WarpRequest, field: DisplacementField, inside: VoxelsInside, back: Inverse, moved: list[MovedPoints]
 ) -> list[str]:
     sizes = np.linalg.norm(field.vectors[inside.mask], axis=1)
     shape = " x ".join(str(n) for n in field.grid.shape)
@@ -265,4 +272,4 @@ def _lines(
                 "linear between voxels: at a wall (moved.csv)"
             )
         lines += [line, *(f"note      {remark}" for remark in points.file.remarks)]
-    return lines + [f"note      {note}" for image in asked.images for note in image.notes]
+    return lines + [f"note      {note}" for image in request.images for note in image.notes]

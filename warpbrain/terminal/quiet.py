@@ -39,8 +39,8 @@ def reason_of(error: OSError) -> str:
     """Why the system refused something, and what to do where it is a folder that kernels are kept in."""
     warp = sys.modules.get("warp")
     cache = warp.config.kernel_cache_dir if warp else None
-    said = str(error.strerror).startswith(_NOT_KEPT)
-    if cache and error.filename and not said and Path(os.fsdecode(error.filename)).is_relative_to(cache):
+    explained = str(error.strerror).startswith(_NOT_KEPT)
+    if cache and error.filename and not explained and Path(os.fsdecode(error.filename)).is_relative_to(cache):
         return _not_kept(error)
     return error.strerror or str(error)
 

@@ -98,7 +98,7 @@ def _remove_empty(folders: list[Path]) -> None:
 MARKS = ("summary.json", "estimate.json", "diagnosis.json", "ensemble.json", "sweep.csv")
 
 
-def choose_folder(asked: Path | None, usual: str, overwrite: bool, beside: Iterable[str] = ()) -> Path:
+def choose_folder(requested: Path | None, usual: str, overwrite: bool, allowed_marks: Iterable[str] = ()) -> Path:
     """Where results are to be written, known before anything is computed; this process alone has it until it ends.
 
     A folder that was made for nothing goes again when the command ends (`release`).
@@ -108,30 +108,30 @@ def choose_folder(asked: Path | None, usual: str, overwrite: bool, beside: Itera
     it: what the command reads or goes on with. `InputError` if the folder that was asked for has results and may not be
     overwritten, belongs to another process, cannot be one or be written to.
     """
-    if asked is None and not overwrite:
-        return _next_free(usual, tuple(beside))
-    folder = asked or Path(usual)
+    if requested is None and not overwrite:
+        return _next_free(usual, tuple(allowed_marks))
+    folder = requested or Path(usual)
     claim(folder)
-    if not overwrite and (marks := _has_results(folder, beside)):
+    if not overwrite and (marks := _has_results(folder, allowed_marks)):
         raise InputError(f"{folder}: has results already ({', '.join(marks)}): --overwrite replaces them")
     return folder
 
 
-def _next_free(usual: str, beside: Iterable[str]) -> Path:
+def _next_free(usual: str, allowed_marks: Iterable[str]) -> Path:
     folder, number = Path(usual), 1
     while True:
-        if not _has_results(folder, beside):
+        if not _has_results(folder, allowed_marks):
             with suppress(TakenError):
                 claim(folder)
                 # known for sure only now that nobody else can write some
-                if not _has_results(folder, beside):
+                if not _has_results(folder, allowed_marks):
                     return folder
         number += 1
         folder = Path(f"{usual}-{number}")
 
 
-def _has_results(folder: Path, beside: Iterable[str]) -> list[str]:
-    allowed = set(beside)
+def _has_results(folder: Path, allowed_marks: Iterable[str]) -> list[str]:
+    allowed = set(allowed_marks)
     return [name for name in MARKS if name not in allowed and (folder / name).exists()]
 
 

@@ -6,10 +6,10 @@ import pytest
 from sinking_block import OPTIONS
 
 from warpbrain.report.diagnosis.description import describe
-from warpbrain.report.diagnosis.files import write_covariance, write_map, write_points
+from warpbrain.report.diagnosis.files import write_covariance, write_diagnosed_state, write_map, write_points
 from warpbrain.report.diagnosis.page import write_page
 from warpbrain.report.files import write_summary
-from warpbrain.report.state_files import read_state, write_diagnosed_state
+from warpbrain.report.state_files import read_state
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,8 @@
 import numpy as np
 
 from warpbrain.mesh.vtu import read_vtu
-from warpbrain.report.state_files import LEFT, SEEN, UNSEEN, read_state, write_diagnosed_state
+from warpbrain.report.diagnosis.files import write_diagnosed_state
+from warpbrain.report.state_files import LEFT, SEEN, UNSEEN, read_state
 from warpbrain.worlds.body.displacement_spread import displacement_deviation
 
 

@@ -28,8 +28,8 @@ STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained":
 
 def describe(diagnosis: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions, device: str) -> dict[str, Any]:
     """Everything that is known of a diagnosis, lengths in metres, stresses in Pa, other units beside the values."""
-    other = ("mesh_error", "without_nuisances") if isinstance(diagnosis, SpecimenDiagnosis) else ("ends",)
-    asked = {name: value for name, value in asdict(options).items() if name not in other}
+    inapplicable = ("mesh_error", "without_nuisances") if isinstance(diagnosis, SpecimenDiagnosis) else ("ends",)
+    chosen = {name: value for name, value in asdict(options).items() if name not in inapplicable}
     particular = (
         _of_specimen(diagnosis, options.alpha) if isinstance(diagnosis, SpecimenDiagnosis) else _of_body(diagnosis)
     )
@@ -46,12 +46,12 @@ def describe(diagnosis: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions
             "group": diagnosis.group,
             "doubts": diagnosis.doubts,
             **particular,
-            "next_measurement": [asdict(one) for one in diagnosis.next_measurement],
+            "next_measurement": [asdict(measurement) for measurement in diagnosis.next_measurement],
             "assumptions": diagnosis.assumptions,
             "remarks": diagnosis.remarks,
             "case": picked(diagnosis.case, "name", "title", "origin"),
             "inputs_sha256": fingerprints(diagnosis.case),
-            "options": asked | {"candidates": "all" if options.candidates is None else options.candidates},
+            "options": chosen | {"candidates": "all" if options.candidates is None else options.candidates},
             "seconds": diagnosis.seconds,
             "device": device,
             "versions": machine(),
@@ -59,9 +59,9 @@ def describe(diagnosis: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions
     )
 
 
-def _picked(one: Any, *names: str, **renamed: str) -> Any:
+def _picked(instance: Any, *names: str, **renamed: str) -> Any:
     """Attributes as of `picked`; None of none."""
-    return None if one is None else picked(one, *names, **renamed)
+    return None if instance is None else picked(instance, *names, **renamed)
 
 
 def _decision(decision: Decision) -> Any:
@@ -69,11 +69,16 @@ def _decision(decision: Decision) -> Any:
 
 
 def _values(values: Sequence[Value]) -> dict[str, Any]:
-    return {one.name: _picked(one, "value", "sd", "unit") for one in values}
+    return {value.name: _picked(value, "value", "sd", "unit") for value in values}
 
 
-def _smallest(kind: str, one: Smallest) -> dict[str, Any]:
-    return {"size": one.size, "unit": one.unit, "parameter": one.name, "says": smallest_in_words(kind, one)}
+def _smallest(kind: str, smallest: Smallest) -> dict[str, Any]:
+    return {
+        "size": smallest.size,
+        "unit": smallest.unit,
+        "parameter": smallest.name,
+        "says": smallest_in_words(kind, smallest),
+    }
 
 
 def _improvement(improvement: tuple[float, float, float] | None) -> dict[str, Any] | None:
@@ -85,10 +90,13 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
     place = _place(best) or (_picked(where, centre_m="centre", radius_m="radius") if where.significant else None)
     ranking = [
         _cause(
-            one.kind, _words(diagnosis, one), _picked(one, "physics", "heldout_rmse_change", "rejected_because"), one
+            ranked.kind,
+            _words(diagnosis, ranked),
+            _picked(ranked, "physics", "heldout_rmse_change", "rejected_because"),
+            ranked,
         )
-        | {"where": _place(one)}
-        for one in diagnosis.ranking
+        | {"where": _place(ranked)}
+        for ranked in diagnosis.ranking
     ]
     rejected = [
         _cause(kind, sentence_of_kind(kind), {"physics": kind in mechanisms(), "rejected_because": why})
@@ -96,12 +104,20 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
         for kind, why in diagnosis.rejected.items()
     ]
     named = [
-        {"mechanism": one.kind, "says": _words(diagnosis, one), "parameters": _values(one.values), "where": _place(one)}
-        | _picked(one, "probability", "region")
-        for one in diagnosis.named
+        {
+            "mechanism": ranked.kind,
+            "says": _words(diagnosis, ranked),
+            "parameters": _values(ranked.values),
+            "where": _place(ranked),
+        }
+        | _picked(ranked, "probability", "region")
+        for ranked in diagnosis.named
     ]
     return {
-        "hypotheses": [asdict(one) | {"kinds": [kind.value for kind in one.kinds]} for one in diagnosis.combinations],
+        "hypotheses": [
+            asdict(combination) | {"kinds": [kind.value for kind in combination.kinds]}
+            for combination in diagnosis.combinations
+        ],
         "by_posterior": _decision(diagnosis.by_posterior),
         "where": place and place | {"region": best.region if best is not None else ""}
         | {"local_p": where.local_p, "global_p": where.global_p},
@@ -120,7 +136,8 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "ranking": ranking + rejected,
         "smallest_detectable": {
-            kind: _smallest(kind, one) | {"named_from": one.named} for kind, one in diagnosis.smallest.items()
+            kind: _smallest(kind, smallest) | {"named_from": smallest.named}
+            for kind, smallest in diagnosis.smallest.items()
         },
         "confusion": {"says": confusion_sentences(diagnosis.confusion), "rows": diagnosis.confusion.rows},
         "fit": _fit(diagnosis),
@@ -130,22 +147,22 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _words(diagnosis: Diagnosis, one: Ranked) -> str:
-    return effect_sentence(one, diagnosis.case.gravity_axis)
+def _words(diagnosis: Diagnosis, ranked: Ranked) -> str:
+    return effect_sentence(ranked, diagnosis.case.gravity_axis)
 
 
 def _cause(
-    name: str, words: str, known: Mapping[str, Any], one: Ranked | of_specimen.Ranked | None = None
+    name: str, words: str, known: Mapping[str, Any], ranked: Ranked | of_specimen.Ranked | None = None
 ) -> dict[str, Any]:
     """A row of a ranking; of a cause that was not tried there are no numbers."""
-    numbers = _picked(one, "log_evidence", "probability", "detectability", "region")
+    numbers = _picked(ranked, "log_evidence", "probability", "detectability", "region")
     nothing = {"log_evidence": None, "probability": 0.0, "detectability": None, "region": ""}
-    estimate = {} if one is None else _values(one.values)
+    estimate = {} if ranked is None else _values(ranked.values)
     return {"mechanism": name, "says": words, "estimate": estimate, **(numbers or nothing), **known}
 
 
-def _place(one: Ranked | None) -> dict[str, Any] | None:
-    return None if one is None or one.centre is None else _picked(one, centre_m="centre", radius_m="radius")
+def _place(ranked: Ranked | None) -> dict[str, Any] | None:
+    return None if ranked is None or ranked.centre is None else _picked(ranked, centre_m="centre", radius_m="radius")
 
 
 def _fit(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -163,8 +180,8 @@ def _fit(diagnosis: Diagnosis) -> dict[str, Any]:
         "placebo_p": fit.placebo_p,
         "placebo_heldout_rmse_m": fit.placebo,
         "confirmations": [
-            {"mechanism" if key == "name" else key: value for key, value in asdict(one).items()}
-            for one in diagnosis.confirmations
+            {"mechanism" if key == "name" else key: value for key, value in asdict(confirmation).items()}
+            for confirmation in diagnosis.confirmations
         ],
     }
 
@@ -176,22 +193,26 @@ def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
         for name, why in diagnosis.rejected.items()
     ]
     confirmations = [
-        {"mechanism": one.name, "heldout_gain": _improvement(one.gain), "why_not": one.why_not(alpha)}
-        | _picked(one, "log_evidence", "heldout_log_density", "placebo_p")
-        for one in diagnosis.confirmations
+        {
+            "mechanism": confirmation.name,
+            "heldout_gain": _improvement(confirmation.gain),
+            "why_not": confirmation.why_not(alpha),
+        }
+        | _picked(confirmation, "log_evidence", "heldout_log_density", "placebo_p")
+        for confirmation in diagnosis.confirmations
     ]
     return {
-        "mechanisms": [_ranked_of_specimen(one) for one in diagnosis.named],
+        "mechanisms": [_ranked_of_specimen(ranked) for ranked in diagnosis.named],
         "where": _picked(where, "test", "mode", "segment", "strain"),
         "when": {"seconds": where.time} if where is not None and where.time is not None else None,
-        "ranking": [_ranked_of_specimen(one) for one in diagnosis.ranking] + rejected,
-        "combinations": [asdict(one) for one in diagnosis.combinations],
+        "ranking": [_ranked_of_specimen(ranked) for ranked in diagnosis.ranking] + rejected,
+        "combinations": [asdict(combination) for combination in diagnosis.combinations],
         "before_checks": _decision(diagnosis.by_posterior),
-        "smallest_detectable": {name: _smallest(name, one) for name, one in diagnosis.smallest.items()},
+        "smallest_detectable": {name: _smallest(name, smallest) for name, smallest in diagnosis.smallest.items()},
         "fit": {
-            "rmse_pa": {name: one and one.fitted for name, one in scores.items()},
-            "heldout_rmse_pa": {name: one and one.heldout for name, one in scores.items()},
-            "check_rmse_pa": {name: one and one.check for name, one in scores.items()},
+            "rmse_pa": {name: score and score.fitted for name, score in scores.items()},
+            "heldout_rmse_pa": {name: score and score.heldout for name, score in scores.items()},
+            "check_rmse_pa": {name: score and score.check for name, score in scores.items()},
             "rows": "all that were recorded",
             "held_out": "each test in turn" if diagnosis.by_test else "each quarter of the only test in turn",
             "improvement": _improvement(diagnosis.improvement),
@@ -205,7 +226,7 @@ def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
     }
 
 
-def _ranked_of_specimen(one: of_specimen.Ranked) -> dict[str, Any]:
-    why = "" if math.isfinite(one.log_evidence) else "no fit with it stands"
-    known = {"physics": one.kind is Kind.PHYSICS, "rejected_because": why, "heldout_rmse_change_pa": one.change}
-    return _cause(one.name, specimen_sentences.effect_sentence(one), known, one)
+def _ranked_of_specimen(ranked: of_specimen.Ranked) -> dict[str, Any]:
+    why = "" if math.isfinite(ranked.log_evidence) else "no fit with it stands"
+    known = {"physics": ranked.kind is Kind.PHYSICS, "rejected_because": why, "heldout_rmse_change_pa": ranked.change}
+    return _cause(ranked.name, specimen_sentences.effect_sentence(ranked), known, ranked)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,14 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.atomic import UNFINISHED, whole_file
 from warpbrain.cases.case import Case
 from warpbrain.cases.writing import write_case
+from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Diagnosis
+from warpbrain.errors import SolveError
+from warpbrain.mesh import TetMesh
 from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.files import MILLIMETRES, body_file, write_body, write_csv
-from warpbrain.report.state_files import nearest_site, seen
+from warpbrain.worlds.body.displacement_spread import displacement_deviation
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 
@@ -46,6 +50,38 @@ def file_of_map(diagnosis: Diagnosis) -> Any:
             "displacement": diagnosis.base.at.u * MILLIMETRES,
         },
     )
+
+
+def write_diagnosed_state(path: Path, diagnosis: Diagnosis) -> None:
+    """Write the last state of a diagnosis, with all that is named, as VTU with coordinates in mm.
+
+    Point arrays: ``displacement`` [mm], ``displacement_sd`` of its components [mm] as of `displacement_deviation`,
+    where that state can be linearised, ``significant`` and ``blind`` as in `map.vtu`.
+    """
+    refit = diagnosis.best.refit
+    state = diagnosis.base.at if refit is None else refit.state
+    mesh = state.system.model.mesh
+    arrays = {"displacement": MILLIMETRES * state.u, **seen(diagnosis.map, mesh)}
+    # a state at the edge of what is stable has an equilibrium, and none beside it
+    with contextlib.suppress(SolveError):
+        arrays["displacement_sd"] = MILLIMETRES * displacement_deviation(diagnosis.best, diagnosis.base)
+    write_body(path, body_file(mesh, arrays))
+
+
+def seen(where: ScoreMap, mesh: TetMesh) -> dict[str, Any]:
+    """What the map says at each node: whether what is left is significant, and whether recordings see no force."""
+    nearest = nearest_site(where, mesh)
+    return {
+        "significant": (where.scores[nearest] > where.threshold).astype(np.uint8),
+        "blind": (where.detectable[nearest] > where.blind_above).astype(np.uint8),
+    }
+
+
+def nearest_site(where: ScoreMap, mesh: TetMesh) -> Ints:
+    """Index (n,) of the place of the map that is nearest to each node."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(where.sites).query(mesh.points)[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,8 +231,8 @@ def write_covariance(path: Path, diagnosis: Diagnosis) -> None:
 
 def write_explained(folder: Path, case: Case) -> None:
     """Write the case with what was named; one that is there of an earlier diagnosis is replaced."""
-    beside = folder.with_name(f"{UNFINISHED}{folder.name}")
-    shutil.rmtree(beside, ignore_errors=True)
-    write_case(beside, case)
+    unfinished = folder.with_name(f"{UNFINISHED}{folder.name}")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    write_case(unfinished, case)
     shutil.rmtree(folder, ignore_errors=True)
-    beside.rename(folder)
+    unfinished.rename(folder)

@@ -46,14 +46,15 @@ def write_page(
 def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None) -> str:
     """The page; `summary` is its `diagnosis.json`, `state` its `state.vtu`: how well the displacement is known."""
     recorded = Recorded.of(diagnosis) if isinstance(diagnosis, Diagnosis) else None
+    shown = text.shown_of(summary)
     sections = sections_of(
         "diagnosis.html",
         summary=summary,
         pictures=defaultdict(str, _pictures(diagnosis, summary, recorded, state)),
-        text=text,
-        next=[[one["what"], f"{one['expected_nats']:.1f}"] for one in summary["next_measurement"]],
+        shown=shown,
+        candidates=[row[:7] for row in shown["candidates"]],
         aside=[] if recorded is None else recorded.aside,
-        chances={one["mechanism"]: one["probability"] for one in summary["ranking"]},
+        chances={candidate["mechanism"]: candidate["probability"] for candidate in summary["ranking"]},
     )
     title, verdict = summary["case"]["title"], summary["verdict"]
     top = Top(title, verdict, _BADGES[verdict], [summary["sentence"]], _facts(summary))
@@ -88,8 +89,8 @@ def _pictures(
 def _facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     facts = [("p, nothing missing", f"{summary['p_value']:.2g}")]
     if named := summary["mechanisms"]:
-        facts.insert(0, ("mechanism", " and ".join(one["mechanism"] for one in named)))
-        facts.append(("probability", " and ".join(percent(one["probability"]) for one in named)))
+        facts.insert(0, ("mechanism", " and ".join(mechanism["mechanism"] for mechanism in named)))
+        facts.append(("probability", " and ".join(percent(mechanism["probability"]) for mechanism in named)))
     suffix, factor, unit = text.unit_of(summary)
     held = summary["fit"][f"heldout_rmse_{suffix}"]
     errors = [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None]

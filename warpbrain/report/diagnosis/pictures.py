@@ -16,7 +16,7 @@ from warpbrain.report import views
 from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.diagnosis.files import Recorded, file_of_map
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.page.figures import NARROW, TEXT, WIDTH, inlined, panels, shades
+from warpbrain.report.page.figures import NARROW, TEXT, WIDTH, colour_bar, inlined, panels, shades
 from warpbrain.report.page.scene import Arrows, Field, View
 from warpbrain.report.slices import Cut, cut
 from warpbrain.report.views import (
@@ -84,11 +84,9 @@ class Anatomy:
         mesh, place = self.mesh, float(self.centre[view.axis])
         section = cut(mesh.points, mesh.tetrahedra, self.fields["score"], view.axis, place)
         everywhere = np.ones(len(section.polygons), dtype=bool)
-        blind = self.fields["blind"][mesh.tetrahedra[section.elements]].mean(axis=1) > 0.5
         for part, colour in ((everywhere, _TISSUE), (section.values > self.threshold, _TINT)):
             views.draw_part(axes, section, part, facecolor=colour, edgecolor=colour, linewidth=0.3)
-        hatched = {"facecolor": "none", "edgecolor": _HATCHING, "hatch": "//////", "linewidth": 0.0, "zorder": 2.0}
-        views.draw_part(axes, section, blind, **hatched)
+        views.draw_hatching(axes, section, mesh, self.fields["blind"], "//////", _HATCHING)
         views.draw_level(axes, section, self.threshold, GREEN)
         views.draw_outline(axes, mesh, view, place)
         return section
@@ -115,10 +113,8 @@ def map_figure(anatomy: Anatomy) -> str:
                 panel.add_patch(Circle((float(at[0]), float(at[1])), radius, **style))
             panel.set_title(anatomy.plane(view), fontsize=TEXT)
             views.frame(panel, anatomy.mesh, view, anatomy.margin)
-        shape = {"shrink": 0.9, "pad": 0.01} if narrow else {"shrink": 0.5, "pad": 0.02}
-        bar = figure.colorbar(tint, ax=axes, orientation="horizontal", aspect=40, **shape)
-        bar.set_label("score of a force there\n(chi-squared of 3 degrees of freedom)", fontsize=TEXT - 1)
-        bar.ax.tick_params(labelsize=TEXT - 2)
+        label = "score of a force there\n(chi-squared of 3 degrees of freedom)"
+        bar = colour_bar(figure, tint, axes, narrow, label)
         bar.ax.axvline(threshold, color=BLACK, linewidth=1.6)
         return figure
 
@@ -137,7 +133,7 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
     counted, shown, points = ~vectors.aside, list(vectors.left), anatomy.mesh.points
     first = vectors.left[shown[0]][counted]
     # the cut in whose plane most of the mismatch lies
-    view = max(VIEWS, key=lambda one: float(np.sum(first[:, one.plane] ** 2)))
+    view = max(VIEWS, key=lambda cut_plane: float(np.sum(first[:, cut_plane.plane] ** 2)))
     large = float(np.quantile(np.linalg.norm(first, axis=1), 0.95)) or 1e-3
     enlarged = _LONG * float(np.ptp(points, axis=0).max()) / large
     across, high = np.ptp(points[:, view.plane], axis=0)
@@ -271,8 +267,10 @@ def confusion_figure(rows: dict[str, dict[str, float]]) -> str:
         "Percent of the visible effect of each mechanism, at its middling place, that the best place of another cause "
         "imitates: near 100 these data cannot tell the two apart, however large the effect is."
     )
-    pairs = [(part, kind, other) for kind, row in rows.items() for other, part in row.items()]
-    most = ", ".join(f"{kind} by {other} {percent(part)}" for part, kind, other in sorted(pairs, reverse=True)[:4])
+    pairs = [(part, kind, imitator) for kind, row in rows.items() for imitator, part in row.items()]
+    most = ", ".join(
+        f"{kind} by {imitator} {percent(part)}" for part, kind, imitator in sorted(pairs, reverse=True)[:4]
+    )
     return inlined(draw, f"How much of each mechanism others imitate; most: {most}.", caption)
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from warpbrain.inference.decide import NOTHING
@@ -11,16 +10,32 @@ from warpbrain.inference.probability import percent
 from warpbrain.physics.words import measured, number, place
 from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.page import lines
 
-_WIDTH = 110
-#: Times at which a size that changes is said; sets of causes and measurements that are.
-_TIMES, _SETS, _NEXT = 5, 6, 5
+#: Times at which a size that changes is said; and sets of causes that are.
+_TIMES, _SETS = 5, 6
 Summary = Mapping[str, Any]
 
 
 def diagnosis_lines(summary: Summary) -> list[str]:
     """The verdict on top, then sets of causes, each cause, the fit and what to do next."""
-    return [*_verdict(summary), "", *_causes(summary), "", *_fit(summary), *_further(summary)]
+    return lines("diagnosis.txt", "diagnosis", summary, shown_of(summary), NOTHING)
+
+
+def shown_of(summary: Summary) -> dict[str, Any]:
+    """What templates of printed lines and of the page show: rows of tables, sentences, and the unit of errors."""
+    return {
+        "unit": unit_of(summary)[2],
+        "sets": _set_rows(summary),
+        "candidates": _candidate_rows(summary),
+        "rejected": _rejected_rows(summary),
+        "fit": _fit_rows(summary),
+        "placebos": _placebo_sentences(summary),
+        "smallest": _smallest_rows(summary),
+        "measurements": [[m["what"], f"{m['expected_nats']:.1f}"] for m in summary["next_measurement"]],
+        "where": summary["where"] and _where_in_words(summary["where"]),
+        "when": summary["when"] and when_in_words(summary["when"]),
+    }
 
 
 def unit_of(summary: Summary) -> tuple[str, float, str]:
@@ -28,7 +43,7 @@ def unit_of(summary: Summary) -> tuple[str, float, str]:
     return ("m", MILLIMETRES, "mm") if "rmse_m" in summary["fit"] else ("pa", 1.0, "Pa")
 
 
-def set_rows(summary: Summary) -> list[list[str]]:
+def _set_rows(summary: Summary) -> list[list[str]]:
     """The most probable sets of causes: which, with what probability, and the log evidence against nothing."""
     sets = summary.get("combinations", summary.get("hypotheses"))
     # of a specimen it is against nothing already
@@ -39,34 +54,41 @@ def set_rows(summary: Summary) -> list[list[str]]:
     ]
 
 
-def candidate_rows(summary: Summary) -> list[list[str]]:
+def _candidate_rows(summary: Summary) -> list[list[str]]:
     """Every candidate that was tried, the most probable first: name, probability, log evidence, `d`, change of the
-    held-out error, what it says, and why it is behind."""
+    held-out error, what it says, why it is behind, and its first parameters with their standard deviations."""
     suffix, factor, unit = unit_of(summary)
     rows = []
-    for one in summary["ranking"]:
-        if one["log_evidence"] is not None:
-            held = one["heldout_rmse_change" if suffix == "m" else "heldout_rmse_change_pa"]
-            d = one["detectability"] if one["physics"] else None
-            numbers = f"{one['log_evidence']:+.1f}", "" if d is None else f"{d:.1f}"
+    for candidate in summary["ranking"]:
+        if candidate["log_evidence"] is not None:
+            held = candidate["heldout_rmse_change" if suffix == "m" else "heldout_rmse_change_pa"]
+            d = candidate["detectability"] if candidate["physics"] else None
+            numbers = f"{candidate['log_evidence']:+.1f}", "" if d is None else f"{d:.1f}"
             change = "" if held is None else f"{factor * held:+.3g} {unit}"
-            words = one["says"], one["rejected_because"]
-            rows.append([one["mechanism"], percent(one["probability"]), *numbers, change, *words])
+            words = candidate["says"], candidate["rejected_because"]
+            values = [(name, v, v["unit"]) for name, v in list(candidate["estimate"].items())[:3]]
+            estimate = ", ".join(f"{name} {v['value']:.3g} ± {v['sd']:.2g} {unit}".rstrip() for name, v, unit in values)
+            head = candidate["mechanism"], percent(candidate["probability"])
+            rows.append([*head, *numbers, change, *words, estimate])
     return rows
 
 
-def rejected_rows(summary: Summary) -> list[list[str]]:
+def _rejected_rows(summary: Summary) -> list[list[str]]:
     """What was not tried, and why."""
-    return [[one["mechanism"], one["rejected_because"]] for one in summary["ranking"] if one["log_evidence"] is None]
+    return [
+        [candidate["mechanism"], candidate["rejected_because"]]
+        for candidate in summary["ranking"]
+        if candidate["log_evidence"] is None
+    ]
 
 
-def fit_rows(summary: Summary) -> list[list[str]]:
+def _fit_rows(summary: Summary) -> list[list[str]]:
     """Errors of each state, at what was fitted, held out, and only checked; beside them what others would reach."""
     (suffix, factor, _), fit = unit_of(summary), summary["fit"]
 
     def cell(value: Any) -> str:
         if isinstance(value, dict):
-            return ", ".join(f"{name} {cell(one)}" for name, one in value.items())
+            return ", ".join(f"{name} {cell(error)}" for name, error in value.items())
         return "" if value is None else f"{factor * value:.4g}"
 
     columns = [fit[f"{key}_{suffix}"] or {} for key in ("rmse", "heldout_rmse", "check_rmse")]
@@ -82,25 +104,28 @@ def fit_rows(summary: Summary) -> list[list[str]]:
     return rows
 
 
-def smallest_rows(summary: Summary) -> list[list[str]]:
+def _smallest_rows(summary: Summary) -> list[list[str]]:
     """What these data would have shown of each mechanism, and from which size half would be named."""
     rows = []
-    for kind, one in summary["smallest_detectable"].items():
-        named = one.get("named_from")
+    for kind, effect in summary["smallest_detectable"].items():
+        named = effect.get("named_from")
         # of what is there or not there is no size
-        of_size = named is not None and one["unit"] != "of being there"
-        rows.append([kind, one["says"], f"{named:.2g} {one['unit']}" if of_size else ""])
+        of_size = named is not None and effect["unit"] != "of being there"
+        rows.append([kind, effect["says"], f"{named:.2g} {effect['unit']}" if of_size else ""])
     return rows
 
 
-def placebo_sentences(summary: Summary) -> list[str]:
+def _placebo_sentences(summary: Summary) -> list[str]:
     """How often patterns that mean nothing do as well as what was added."""
     fit, words = summary["fit"], "pattern that means nothing does as well with p ="
     together = [] if fit.get("placebo_p") is None else [f"A {words} {fit['placebo_p']:.2g}."]
-    return together or [f"{one['mechanism']}: a {words} {one['placebo_p']:.2g}." for one in fit["confirmations"]]
+    return together or [
+        f"{confirmation['mechanism']}: a {words} {confirmation['placebo_p']:.2g}."
+        for confirmation in fit["confirmations"]
+    ]
 
 
-def where_in_words(where: Summary) -> str:
+def _where_in_words(where: Summary) -> str:
     """Where a mismatch is largest: a place in a body, or a part of a test."""
     if "test" in where:
         low, high = where["strain"]
@@ -128,58 +153,3 @@ def when_in_words(when: Summary) -> str:
     sure = "" if when["probability"] is None else f" (probability {percent(when['probability'])})"
     course = f", {when['course']}" if when["course"] else ""
     return f"it set in {between}{sure}{course}"
-
-
-def _wrapped(sentence: str, following: str = "  ") -> list[str]:
-    return textwrap.wrap(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
-
-
-def _verdict(summary: Summary) -> Iterator[str]:
-    yield f"VERDICT: {summary['verdict']}"
-    yield from _wrapped(summary["sentence"])
-    if summary["where"] is not None:
-        yield f"  where: {where_in_words(summary['where'])}"
-    if summary["when"] is not None:
-        yield f"  when: {when_in_words(summary['when'])}"
-
-
-def _causes(summary: Summary) -> Iterator[str]:
-    yield f"  p = {summary['p_value']:.2g} that nothing is missing; the most probable sets of causes:"
-    for causes, probability, evidence in set_rows(summary):
-        yield f"    {causes:<60} {probability:>10}   log evidence {evidence:>8}"
-    if summary["p_left"] is not None:
-        yield f"  p = {summary['p_left']:.2g} that nothing is left beside the causes that the verdict is about"
-    yield from ["", "  candidate          probability   log evidence        d    held-out RMSE    estimate"]
-    values = {one["mechanism"]: list(one["estimate"].items())[:3] for one in summary["ranking"]}
-    for name, probability, evidence, d, change, *_ in candidate_rows(summary):
-        each = (f"{key} {v['value']:.3g} ± {v['sd']:.2g} {v['unit']}".rstrip() for key, v in values[name])
-        numbers = f"{probability:>11} {evidence:>14} {d:>8}   {change:>13}"
-        yield f"  {name:<18} {numbers}    {', '.join(each)}".rstrip()
-    if rejected := rejected_rows(summary):
-        yield from ["", "  not tried:", *(f"    {name}: {why}" for name, why in rejected)]
-
-
-def _fit(summary: Summary) -> Iterator[str]:
-    rows = [[f"RMSE [{unit_of(summary)[2]}]", "fitted", "held out", "check"], *fit_rows(summary)]
-    width = max(len(row[0]) for row in rows)
-    for name, *errors in rows:
-        inside, outside, check = errors if any(row[3] for row in rows[1:]) else (*errors[:2], "")
-        yield f"  {name:<{width}} {inside:>8}   {outside:>14}   {check}".rstrip()
-    if improvement := summary["fit"]["improvement"]:
-        part, low, high = (100.0 * value for value in (improvement["part"], *improvement["interval_95"]))
-        yield f"  held-out error falls by {part:.0f} % (95 %: {low:.0f} to {high:.0f} %)"
-    yield from (f"  {sentence}" for sentence in placebo_sentences(summary))
-    for one in summary["fit"]["confirmations"]:
-        held_out = f"of held-out rows {-one['heldout_log_density']:+.1f}"
-        yield f"  without {one['mechanism']}: log evidence {-one['log_evidence']:+.1f}, {held_out}"
-
-
-def _further(summary: Summary) -> Iterator[str]:
-    if summary["verdict"] != NOTHING and summary["smallest_detectable"]:
-        shown = "; ".join(f"{kind} {one['says']}" for kind, one in summary["smallest_detectable"].items())
-        yield from ["", *_wrapped(f"What these data would have shown: {shown}.", "    ")]
-    if summary["next_measurement"]:
-        yield from ["", "  what to measure next (expected log Bayes factor between the two most probable mechanisms):"]
-        yield from (f"    {one['expected_nats']:8.1f}  {one['what']}" for one in summary["next_measurement"][:_NEXT])
-    if summary.get("confusion"):
-        yield from ["", *(line for sentence in summary["confusion"]["says"] for line in _wrapped(sentence, "    "))]

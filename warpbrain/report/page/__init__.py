@@ -1,13 +1,15 @@
-"""How a report becomes one page that needs no network.
+"""How a result becomes printed lines and one page that needs no network: templates of the same dictionary, its JSON.
 
-A template (`run.html` of runs and tests of specimens, `estimate.html`, `diagnosis.html`) makes sections of a result;
-`document` puts them below a verdict and a table of contents into the frame, with `page.css`. Macros of `parts.html`
+The macros of a text template (`run.txt`, `estimate.txt`, ...) make what is printed. A template of a page (`run.html` of
+runs and tests of specimens, `estimate.html`, `diagnosis.html`) makes sections of a result; `document` puts them below a
+verdict and a table of contents into the frame, with `page.css`. Macros of `parts.html`
 make what pages share; `figures` makes still figures, `scene` with `scene.js` the view in three dimensions.
 """
 
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -15,14 +17,17 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup, escape
 
 from warpbrain.atomic import whole_file
 from warpbrain.inference.probability import percent
+from warpbrain.physics.words import tabled
 
 #: Characters of a cell that is never broken.
 _SHORT = 8
+#: Characters of a printed line of prose.
+_WIDTH = 110
 
 
 @dataclass(frozen=True)
@@ -52,12 +57,28 @@ class Top:
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("warpbrain.report.page", "."), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
+        loader=PackageLoader("warpbrain.report.page", "."), autoescape=select_autoescape(["html"]),
+        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters |= {"percent": percent}
+    environment.filters |= {"percent": percent, "tabled": tabled, "wrapped": _wrapped}
     environment.globals |= {"table": table, "asset": asset}
     return environment
+
+
+def lines(template: str, macro: str, *values: Any) -> list[str]:
+    """What a macro of a text template prints of values."""
+    text = getattr(_environment().get_template(template).module, macro)(*values)
+    return [line.rstrip() for line in text.splitlines()]
+
+
+def rendered(template: str, **values: Any) -> str:
+    """A whole text template of values."""
+    return _environment().get_template(template).render(**values)
+
+
+def _wrapped(sentence: str, following: str) -> str:
+    """A sentence on lines of the width of a terminal, all but the first indented as is said."""
+    return textwrap.fill(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
 
 
 def part(name: str, *values: Any) -> Markup:
@@ -79,7 +100,7 @@ def sections_of(template: str, **values: Any) -> list[Section]:
 
 def document(title: str, top: Top, sections: Sequence[Section]) -> str:
     """A page as one HTML file; `title` is of the window, sections without a body are left out."""
-    return str(part("frame", title, top, [one for one in sections if one.body])) + "\n"
+    return str(part("frame", title, top, [section for section in sections if section.body])) + "\n"
 
 
 def write_document(path: Path, page: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from markupsafe import Markup
@@ -27,10 +27,18 @@ def panels(narrow: bool, height: float, count: int = 1, width: float = WIDTH, **
         if narrow
         else views.panels(1, count, (width, height), **options)
     )
-    for one in axes:
-        one.tick_params(labelsize=TEXT - 1)
-        one.spines[["top", "right"]].set_visible(False)
+    for panel in axes:
+        panel.tick_params(labelsize=TEXT - 1)
+        panel.spines[["top", "right"]].set_visible(False)
     return figure, axes
+
+
+def colour_bar(figure: Any, drawn: Any, axes: Sequence[Any], narrow: bool, label: str) -> Any:
+    """The bar of what was drawn in colours, below all panels."""
+    bar = figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.9 if narrow else 0.5, aspect=40, pad=0.02)
+    bar.set_label(label, fontsize=TEXT - 1)
+    bar.ax.tick_params(labelsize=TEXT - 2)
+    return bar
 
 
 def inlined(draw: Callable[[bool], Any], alternative: str, caption: str) -> Markup:

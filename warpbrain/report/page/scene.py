@@ -94,12 +94,12 @@ def describe_scene(view: View) -> dict[str, Any]:
         "recorded": _packed(MILLIMETRES * view.recorded),
         "arrows": [
             {
-                "name": one.name,
-                "colour": [int(one.colour[k : k + 2], 16) for k in (1, 3, 5)],
-                "vectors": _packed(MILLIMETRES * one.vectors),
-                "shown": one.shown,
+                "name": arrows.name,
+                "colour": [int(arrows.colour[k : k + 2], 16) for k in (1, 3, 5)],
+                "vectors": _packed(MILLIMETRES * arrows.vectors),
+                "shown": arrows.shown,
             }
-            for one in view.arrows
+            for arrows in view.arrows
         ],
         "enlarged": _enlarged(view.arrows, mesh),
         "ball": ball,

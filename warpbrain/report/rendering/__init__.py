@@ -85,8 +85,8 @@ class Scene:
         seen = self.points[self.tetrahedra[self.removed]].reshape(-1, 3)
         seen = self.where if not len(seen) else seen
         middle = 0.5 * (self.points.min(axis=0) + self.points.max(axis=0))
-        aside = seen.mean(axis=0) - middle if len(seen) else np.zeros(3)
-        return np.array([1.0 if aside[0] > 0.0 else -1.0, -1.0 if aside[1] < 0.0 else 1.0, 1.0])
+        offset = seen.mean(axis=0) - middle if len(seen) else np.zeros(3)
+        return np.array([1.0 if offset[0] > 0.0 else -1.0, -1.0 if offset[1] < 0.0 else 1.0, 1.0])
 
 
 def render(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -> dict[str, Any]:

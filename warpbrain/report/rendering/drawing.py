@@ -72,13 +72,13 @@ def _draw_after(plotter: Any, scene: Scene, exaggeration: float) -> None:
     plotter.add_mesh(ghost, color=GHOST, opacity=0.35, culling="front", lighting=False)
 
 
-def _body_of(scene: Scene, kept: Bools) -> Any:
+def _body_of(scene: Scene, elements: Bools) -> Any:
     """Some of the tetrahedra (m,), with what they carry."""
-    cells = scene.tetrahedra[kept]
+    cells = scene.tetrahedra[elements]
     grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: cells}, np.asarray(scene.points, dtype=np.float64))
     grid.point_data[_U] = scene.u
     grid.point_data[_SIZE] = np.linalg.norm(scene.u, axis=1)
-    grid.cell_data[_TISSUE] = scene.colours[kept]
+    grid.cell_data[_TISSUE] = scene.colours[elements]
     return grid
 
 
@@ -95,9 +95,9 @@ def _cut_open(grid: Any, scene: Scene) -> list[Any]:
     parts = [surface.clip_box(bounds, invert=True).extract_surface(algorithm="dataset_surface")]
     for axis in range(3):
         face = grid.slice(normal=np.eye(3)[axis], origin=middle)
-        for other in (k for k in range(3) if k != axis):
+        for side in (k for k in range(3) if k != axis):
             if face.n_points:
-                face = face.clip(normal=towards[other] * np.eye(3)[other], origin=middle, invert=False)
+                face = face.clip(normal=towards[side] * np.eye(3)[side], origin=middle, invert=False)
         if face.n_points:
             face.field_data["flat"] = [1]
             parts.append(face)
