@@ -24,9 +24,9 @@ from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
 from warpbrain.estimation.within_element import change_over_element
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.surface import feature_normals
 from warpbrain.recordings.closest import closest_points
-from warpbrain.recordings.comparison import faces_of_set
 from warpbrain.recordings.copies import distinct_rows
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording

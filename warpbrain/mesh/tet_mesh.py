@@ -345,7 +345,7 @@ def _defects(points: Floats, tetrahedra: Ints) -> list[str]:
 def _flat_or_inverted(points: Floats, tetrahedra: Ints, numbers: NDArray[np.int64], bad: Bools) -> list[str]:
     corner = points[tetrahedra]
     measurable = ~bad[tetrahedra].any(axis=1)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         volumes = signed_volumes(points, tetrahedra)
         longest = np.sqrt(((corner[:, :, None] - corner[:, None]) ** 2).sum(-1).max(axis=(1, 2)))
         # flat to rounding: such a volume has no sign that means anything

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh.free_surfaces import faces_of
+from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.recordings.agreement import lengths, root_mean_square
 from warpbrain.recordings.closest import closest_points
@@ -266,23 +266,6 @@ def joined(parts: Sequence[Comparison]) -> Comparison:
         residuals_after=after,
         noise=float(np.sqrt(sum(squares) / len(rows))) if len(squares) == len(parts) else None,
     )
-
-
-def faces_of_set(mesh: TetMesh, name: str, who: str) -> Ints:
-    """Boundary triangles (k, 3) all of whose nodes are in a node set; `who` asks for them, for the message.
-
-    Raises
-    ------
-    InputError
-        If there is no such set or no such triangle.
-    """
-    if name not in mesh.node_sets:
-        known = ", ".join(sorted(mesh.node_sets)) or "none"
-        raise InputError(f"{who}: the mesh has no node set '{name}', found {known}")
-    faces = faces_of(mesh, mesh.node_sets[name])
-    if len(faces) == 0:
-        raise InputError(f"{who}: no boundary triangle of the mesh has all its nodes in the set '{name}'")
-    return faces
 
 
 def _to_recorded(nodes: Floats, points: Floats, faces: Ints | None) -> Floats:

@@ -212,6 +212,14 @@ def _is_header(path: Path, number: int, header: list[str], known: Sequence[str],
     return True
 
 
+def read_csv(path: Path, problems: Problems, known: Sequence[str]) -> Table | None:
+    """The same of a file that must be called ``.csv``."""
+    if path.suffix.lower() != ".csv":
+        problems.add(path, "", f"found ending {shown(path.suffix)}, expected .csv")
+        return None
+    return read_table(path, problems, known)
+
+
 def _split(line: str, separator: str) -> list[str]:
     if '"' not in line:
         return [field.strip() for field in line.split(separator)]

@@ -1,4 +1,4 @@
-"""Which rows of a recording a state is compared with, and how many numbers it holds."""
+"""Which rows of a recording a state is compared with."""
 
 from __future__ import annotations
 
@@ -6,25 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.recordings.recording import (
-    ForceRecording,
-    PointsRecording,
-    Recording,
-    SurfaceRecording,
-    TestRecording,
-)
+from warpbrain.recordings.base import Recording
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-AnyRecording = PointsRecording | SurfaceRecording | ForceRecording | TestRecording
-
 
 def times_of(recording: Recording) -> Floats:
     """Time (n,) [s] of each row; infinite of the end, where a recording has no times, or none after the loads came."""
-    times = getattr(recording, "time", None)
+    times = recording.time
     if times is None or not (times > 0.0).any():
-        return np.full(_count(recording), np.inf)
+        return np.full(recording.count, np.inf)
     return np.asarray(times, dtype=np.float64)
 
 
@@ -45,16 +37,7 @@ def compared_rows(recording: Recording) -> Rows:
     return np.asarray(rows[np.argsort(times[rows], kind="stable")], dtype=np.int64)
 
 
-def components_of(recording: Recording) -> int:
-    """How many numbers a row holds: of points 3, of a surface its distance, of a force what was recorded of it."""
-    if isinstance(recording, PointsRecording):
-        return 3
-    if isinstance(recording, ForceRecording):
-        return int(np.isfinite(recording.force).all(axis=0).sum())
-    return 1
-
-
-def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
+def rows_at(recording: Recording, time: float | None = None) -> Rows:
     """Rows that say what was so at a time.
 
     Without a time it is the end: every row of points or of a surface that has no times; of points with ids the last row
@@ -64,7 +47,7 @@ def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
 
     Parameters
     ----------
-    recording : PointsRecording, SurfaceRecording, ForceRecording or TestRecording
+    recording : Recording
     time : float, optional
         [s]
 
@@ -82,9 +65,8 @@ def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
     if times is None:
         if time is not None:
             raise InputError(f"recording '{recording.name}' has no times: it can be compared with an end state only")
-        single = isinstance(recording, TestRecording)
-        return np.arange(_count(recording) - 1 if single else 0, _count(recording))
-    ids = recording.ids if isinstance(recording, PointsRecording) else None
+        return np.arange(recording.count - 1 if recording.of_specimen else 0, recording.count)
+    ids = getattr(recording, "ids", None)
     groups = np.zeros(len(times), dtype=np.int64) if ids is None else np.unique(ids, return_inverse=True)[1]
     apart = -times if time is None else np.abs(times - time)
     order = np.lexsort((times, apart, groups))
@@ -95,11 +77,6 @@ def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
         span = f"{times.min():g} s to {times.max():g} s"
         raise InputError(f"recording '{recording.name}' has nothing at {time:g} s: its times are {span}")
     return rows
-
-
-def _count(recording: Recording) -> int:
-    names = ("imposed", "force", "points")
-    return len(next(getattr(recording, name) for name in names if hasattr(recording, name)))
 
 
 def _half_interval(times: Floats) -> float:
