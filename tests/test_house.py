@@ -37,7 +37,6 @@ NAMED = {
     "cases/boundary.py": "[[boundary]] kinds of case.toml",
     "cases/format/tables.py": "[[boundary]] kinds of case.toml",
     "cases/case.py": "a case's anatomy is what its resection leaves",
-    "simulation/of_case.py": "[[boundary]] kinds of case.toml that mechanisms compute",
     "cases/building/node_sets.py": "name of a node set of a shipped mesh",
     "cases/building/tissue_names.py": "name of labels of tissue that is taken out",
     "cases/building/pipeline.py": "names of sets of a shipped mesh",

@@ -264,7 +264,7 @@ def _observations(case: Case, recording: Recording, moments: Moments) -> Iterato
     rows, times = compared_rows(recording), times_of(recording)
     if not set(times[rows].tolist()) <= set(moments.times):
         # of a body that goes on by itself there is an end alone
-        rows = rows_at(recording)  # type: ignore[arg-type]
+        rows = rows_at(recording)
         times = np.full(len(times), np.inf)
     if len(rows) == 0:
         zero = isinstance(recording, PointsRecording) and recording.weights is not None

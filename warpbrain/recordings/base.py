@@ -65,7 +65,9 @@ class Recording:
     time: Floats | None = None
 
     @classmethod
-    def read(cls, path: Path, frame: Frame, problems: Problems, **given: Any) -> Self | None:
+    def read(
+        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
+    ) -> Self | None:
         """Read a file.
 
         Parameters
@@ -77,7 +79,7 @@ class Recording:
             Gets everything that is wrong with the file.
         name, file, role
             As in `Recording`.
-        sigma : float or None
+        sigma : float, optional
             As `case.toml` has it: noise of one component in the unit of the file.
         **given
             The `keys` of the kind in SI units and RAS axes, None where `case.toml` says nothing; of a key that names a
@@ -87,13 +89,13 @@ class Recording:
         -------
         Recording or None
             None if there were problems.
-
-        Raises
-        ------
-        ParameterError
-            If a key cannot have its value.
         """
         raise NotImplementedError
+
+    @classmethod
+    def fault_of_keys(cls, given: Mapping[str, Any]) -> tuple[str, str] | None:
+        """A key that cannot have its value whatever the file holds, and why; None if there is none."""
+        return None
 
     @property
     def count(self) -> int:

@@ -12,7 +12,7 @@ from warpbrain.arrays import Floats
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.problems import Problems
-from warpbrain.recordings.base import REFERENCE, Columns, Recording, columns_of_vectors
+from warpbrain.recordings.base import REFERENCE, Columns, Recording
 from warpbrain.recordings.tables import read_csv
 from warpbrain.recordings.text import collected
 
@@ -46,7 +46,9 @@ class ForceRecording(Recording):
     torque: Floats | None = None
 
     @classmethod
-    def read(cls, path: Path, frame: Frame, problems: Problems, **given: Any) -> Self | None:
+    def read(
+        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
+    ) -> Self | None:
         """Read ``.csv``: columns ``t`` [s] and one or more of ``fx``, ``fy``, ``fz`` [N] and ``torque`` [N m].
 
         See `Recording.read`; `sigma` is of the force, or of the torque if that is all there is.
@@ -65,7 +67,7 @@ class ForceRecording(Recording):
             torque = table.numbers("torque") if "torque" in table else None
         if time is None or found:
             return None
-        return cls(time=time, force=frame.directions(force), torque=torque, **given)
+        return cls(time=time, force=frame.directions(force), torque=torque, sigma=sigma, **given)
 
     @property
     def count(self) -> int:
@@ -84,6 +86,6 @@ class ForceRecording(Recording):
         return f"{self.count} forces on '{self.boundary}'"
 
     def columns(self, frame: Frame) -> Columns:
-        force = columns_of_vectors(FORCE, frame.directions(self.force))
-        columns: Columns = {"t": self.time} | {name: f for name, f in force.items() if np.isfinite(f).all()}
+        force = zip(FORCE, frame.directions(self.force).T, strict=True)
+        columns: Columns = {"t": self.time, **{name: values for name, values in force if np.isfinite(values).all()}}
         return columns if self.torque is None else columns | {"torque": self.torque}

@@ -58,14 +58,7 @@ class PointsRecording(TrackedPoints, Recording):
 
     @classmethod
     def read(
-        cls,
-        path: Path,
-        frame: Frame,
-        problems: Problems,
-        *,
-        sigma: float | None,
-        moved: Path | None = None,
-        **given: Any,
+        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
     ) -> Self | None:
         """Read ``.csv``, ``.tag``, a pair of 3D Slicer markups (``.mrk.json``, ``.fcsv``), or an ending that another
         package reads (`warpbrain.recordings.tracked_points.Reader`); see `Recording.read`.
@@ -76,7 +69,7 @@ class PointsRecording(TrackedPoints, Recording):
         """
         noise = None if sigma is None else frame.metres * sigma
         with collected(path, problems) as found:
-            tracked = tracked_points(path, frame, moved, found)
+            tracked = tracked_points(path, frame, given.pop("moved", None), found)
             if tracked is None or found:
                 return None
             return cls(sigma=noise, **given, **vars(tracked))

@@ -61,7 +61,9 @@ class SurfaceRecording(Recording):
     faces: Ints | None = None
 
     @classmethod
-    def read(cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None, **given: Any) -> Self | None:
+    def read(
+        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
+    ) -> Self | None:
         """Read ``.csv``, a 3D Slicer markup or a surface mesh; see `Recording.read`.
 
         A CSV file has columns ``x,y,z`` and perhaps ``t`` [s] and ``nx,ny,nz``; of a mesh (``.vtp``, ``.stl``,

@@ -13,7 +13,6 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.frame import PASCALS, Frame
 from warpbrain.keys import Key
-from warpbrain.physics.mechanism import ParameterError
 from warpbrain.problems import Problems
 from warpbrain.recordings.base import Columns, Recording, column_of_time
 from warpbrain.recordings.tables import Table, read_csv
@@ -28,6 +27,8 @@ QUANTITIES = {
     "biaxial": (("stretch", "stress"),),
 }
 UNITS = {"displacement": "m", "force": "N", "stress": "Pa", "angle": "rad", "torque": "N m", "stretch": "1"}
+#: Axis of the machine.
+Z = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -85,26 +86,13 @@ class TestRecording(Recording):
     imposed: Floats
     response: Floats
     specimen: str = ""
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    axis: tuple[float, float, float] = Z
     sheared: tuple[float, float, float] | None = None
     control: str = "displacement"
 
     @classmethod
     def read(
-        cls,
-        path: Path,
-        frame: Frame,
-        problems: Problems,
-        *,
-        mode: str,
-        sigma: float | None = None,
-        specimen: str | None = None,
-        stress: str = "nominal",
-        unit: str = "Pa",
-        control: str = "displacement",
-        axis: tuple[float, float, float] | None = None,
-        sheared: tuple[float, float, float] | None = None,
-        **given: Any,
+        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
     ) -> Self | None:
         """Read ``.csv``: columns of one pair of `QUANTITIES` of the mode, and perhaps ``t`` [s]; see `Recording.read`.
 
@@ -112,11 +100,10 @@ class TestRecording(Recording):
         [rad] and ``torque`` [N m]; `unit` is that of a stress, of `PASCALS`, and `stress` what it is, see
         `nominal_stress`. `sigma` is of what answered, in the unit of its column.
         """
-        axis = axis or (0.0, 0.0, 1.0)
-        try:
-            turn_of(axis, sheared)
-        except InputError as error:
-            raise ParameterError("axis" if sheared is None else "sheared", str(error)) from None
+        mode, control = given["mode"], given.setdefault("control", "displacement")
+        stress, unit = given.pop("stress", "nominal"), given.pop("unit", "Pa")
+        # what is so if a key is absent
+        given |= {"specimen": given.get("specimen") or "", "axis": given.get("axis") or Z}
         with collected(path, problems) as found:
             table = read_csv(path, found, ("t", *(column for pair in QUANTITIES[mode] for column in pair)))
             pair = _pair(table, mode, found) if table is not None else None
@@ -135,17 +122,20 @@ class TestRecording(Recording):
         of_answer = {"stress": PASCALS[unit], "displacement": frame.metres}.get(pair[control != "force"], 1.0)
         return cls(
             sigma=None if sigma is None else of_answer * sigma,
-            mode=mode,
             quantities=pair,
             imposed=imposed,
             response=response,
             time=time,
-            specimen=specimen or "",
-            axis=axis,
-            sheared=sheared,
-            control=control,
             **given,
         )
+
+    @classmethod
+    def fault_of_keys(cls, given: Mapping[str, Any]) -> tuple[str, str] | None:
+        try:
+            turn_of(given["axis"] or Z, given["sheared"])
+        except InputError as error:
+            return "axis" if given["sheared"] is None else "sheared", str(error)
+        return None
 
     @property
     def force_controlled(self) -> bool:
@@ -181,7 +171,7 @@ class TestRecording(Recording):
 
     def in_case(self) -> Mapping[str, Any]:
         # a stress is written as a nominal one in Pa, and what is so if a key is absent is left out
-        absent = {"specimen": "", "control": "displacement", "axis": (0.0, 0.0, 1.0)}
+        absent = {"specimen": "", "control": "displacement", "axis": Z}
         return {key: value for key, value in vars(self).items() if key not in absent or value != absent[key]}
 
     def without_meaning(self) -> Mapping[str, str]:

@@ -8,7 +8,6 @@ from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import RECORDING
 from warpbrain.cases.parts.named import Named
 from warpbrain.mesh import MeshInFile
-from warpbrain.physics.mechanism import ParameterError
 from warpbrain.recordings.recording import RECORDINGS, Recording
 from warpbrain.recordings.times import compared_rows
 
@@ -68,11 +67,10 @@ def _given(
 def _read(table: Reading, kind: type[Recording], given: dict[str, Any] | None) -> Recording | None:
     if given is None:
         return None
-    try:
-        recording = kind.read(frame=table.context.frame, problems=table.problems, **given)
-    except ParameterError as error:
-        table.problem(error.key, str(error))
+    if fault := kind.fault_of_keys(given):
+        table.problem(*fault)
         return None
+    recording = kind.read(frame=table.context.frame, problems=table.problems, **given)
     for key, why in recording.without_meaning().items() if recording is not None else ():
         if table.named(key):
             table.problem(key, why, "it says what a column stress is")
