@@ -6,7 +6,7 @@ import math
 
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
-from warpbrain.recordings.copies import distinct_rows
+from warpbrain.recordings.points import distinct_rows
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording
 from warpbrain.recordings.times import compared_rows
 

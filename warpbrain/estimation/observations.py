@@ -27,8 +27,8 @@ from warpbrain.mesh import TetMesh
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.surface import feature_normals
 from warpbrain.recordings.closest import closest_points
-from warpbrain.recordings.copies import distinct_rows
 from warpbrain.recordings.location import locate
+from warpbrain.recordings.points import distinct_rows
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.times import compared_rows, rows_at, times_of
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.recordings.spheres import Spheres
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 #: Barycentric coordinates up to this are none.

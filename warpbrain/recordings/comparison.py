@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.tet_mesh import TetMesh
@@ -17,7 +18,6 @@ from warpbrain.recordings.location import Location, locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, SurfaceRecording
 from warpbrain.recordings.times import rows_at
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 

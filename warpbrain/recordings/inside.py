@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.quality import extent
 from warpbrain.mesh.tet_mesh import TetMesh
@@ -16,8 +16,6 @@ from warpbrain.recordings.base import TrackedPoints
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.text import collected, shown
-
-Floats = NDArray[np.float64]
 
 #: What is tried on points most of which are outside: factor on x, y and z, and what it would mean.
 _MISTAKES = (

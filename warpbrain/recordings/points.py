@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
@@ -106,3 +107,32 @@ class PointsRecording(TrackedPoints, Recording):
         if self.weights is not None:
             columns["weight"] = self.weights
         return columns
+
+
+def distinct_rows(recording: PointsRecording, rows: Ints) -> tuple[Ints, Floats]:
+    """Rows without copies of others, and their weights.
+
+    A copy is of the same place and the same time, went as far, and has the same noise, to the last bit. Taken for rows
+    of their own, two of half a weight would not be one: a gross error would have to strike each by itself, and what
+    neighbours share grows with the noise of each.
+
+    Parameters
+    ----------
+    recording : PointsRecording
+    rows : (k,) int array
+        Those to look at.
+
+    Returns
+    -------
+    rows : (m,) int64 array
+        The first of each, in the order in which they were given.
+    weights : (m,) array
+        Sums of the weights of each and its copies; rows without a weight have that of one.
+    """
+    weights = np.ones(len(rows)) if recording.weights is None else recording.weights[rows]
+    columns_of = [recording.points, recording.displacement, recording.time, recording.sigmas]
+    columns = np.column_stack([values[rows] for values in columns_of if values is not None])
+    _, first, of = np.unique(columns, axis=0, return_index=True, return_inverse=True)
+    total = np.bincount(of.ravel(), weights, minlength=len(first))
+    order = np.argsort(first)
+    return rows[first[order]], np.asarray(total[order], dtype=np.float64)

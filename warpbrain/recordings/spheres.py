@@ -6,10 +6,8 @@ from collections.abc import Iterator
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from warpbrain.arrays import Floats, Ints
 
 #: Pairs that are handed out at a time, to bound the memory.
 PAIRS = 1_000_000
@@ -36,12 +34,12 @@ class Spheres:
             ids = np.flatnonzero(sizes == size)
             self._classes.append((cKDTree(centres[ids]), ids, float(radii[ids].max())))
 
-    def nearest(self, points: Floats, count: int) -> Indices:
+    def nearest(self, points: Floats, count: int) -> Ints:
         """The `count` spheres, or all if there are fewer, whose centres are nearest to each point: (n, count)."""
         count = min(count, len(self._radii))
         return np.asarray(self._all.query(points, k=count)[1], dtype=np.int64).reshape(len(points), count)
 
-    def touching(self, points: Floats, reach: Floats) -> Iterator[tuple[Indices, Indices]]:
+    def touching(self, points: Floats, reach: Floats) -> Iterator[tuple[Ints, Ints]]:
         """All pairs (point, sphere) no farther apart than `reach` (n,) of the point, a batch at a time."""
         reach = reach * (1.0 + 1e-9)
         for tree, ids, largest in self._classes:

@@ -15,13 +15,10 @@ from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.problems import Problems
 from warpbrain.recordings.text import lines_of, read_text, remark_open_end, shown, without_comment
-
-Floats = NDArray[np.float64]
-
 
 #: No length, time, force or stress that anybody records is larger, in whatever unit; squares of it are still numbers.
 LARGEST = 1e12

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.recordings.base import Recording
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
 
 
 def times_of(recording: Recording) -> Floats:
@@ -20,7 +17,7 @@ def times_of(recording: Recording) -> Floats:
     return np.asarray(times, dtype=np.float64)
 
 
-def compared_rows(recording: Recording) -> Rows:
+def compared_rows(recording: Recording) -> Ints:
     """Numbers (k,) of the rows that states are compared with, in the order of their times.
 
     Not of the time 0 or earlier, when nothing acts yet, nor of the time of the reference, which differs from itself by
@@ -37,8 +34,8 @@ def compared_rows(recording: Recording) -> Rows:
     return np.asarray(rows[np.argsort(times[rows], kind="stable")], dtype=np.int64)
 
 
-def rows_at(recording: Recording, time: float | None = None) -> Rows:
-    """Rows that say what was so at a time.
+def rows_at(recording: Recording, time: float | None = None) -> Ints:
+    """Ints that say what was so at a time.
 
     Without a time it is the end: every row of points or of a surface that has no times; of points with ids the last row
     of each; else the rows of the last time. At a time it is the rows of the recorded time nearest to it, the earlier of
