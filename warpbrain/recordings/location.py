@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh.surface import EDGES, FACES, paired_faces
-from warpbrain.recordings.closest import closest_points
-from warpbrain.recordings.spheres import Spheres
+from warpbrain.recordings.closest import Spheres, closest_points
 
 Ints = NDArray[np.int32]
 
