@@ -178,7 +178,7 @@ def compare_surface(
         residuals.append(points - closest_points(points, moved, faces).position)
         reverse.append(Error.of(_to_recorded(moved[members], points, recording.faces)))
     # noise along a surface is not seen: one component of three is left
-    compared = _comparison(recording, rows, *residuals, recording.sigma)
+    compared = _comparison(recording, rows, residuals[0], residuals[1], recording.sigma)
     return replace(compared, reverse_before=reverse[0], reverse_after=reverse[1])
 
 
