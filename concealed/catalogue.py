@@ -10,7 +10,6 @@ from dataclasses import asdict
 
 from warpbrain.atomic import whole_file
 from warpbrain.cases.shipped import CATALOGUE, SHIPPED, Entry, find_case
-from warpbrain.recordings.recording import count_of
 
 
 def read_entry(name: str, tissue: str) -> Entry:
@@ -24,7 +23,7 @@ def read_entry(name: str, tissue: str) -> Entry:
         len(case.mesh.points),
         len(case.mesh.tetrahedra),
         round(1e6 * case.mesh.volume, 1),
-        {recording.name: count_of(recording) for recording in case.recordings},
+        {recording.name: recording.count for recording in case.recordings},
     )
 
 

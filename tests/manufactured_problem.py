@@ -19,6 +19,7 @@ from shapes import cube
 
 from warpbrain.mesh import QuadraticMesh, TetMesh, surface_forces
 from warpbrain.mesh.integrals import shape_values, volume_forces
+from warpbrain.mesh.refinement import finer_mesh
 from warpbrain.mesh.surface import EDGES
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
@@ -50,7 +51,7 @@ def irregular(level: int, cells: int = 3) -> TetMesh:
     x = np.where((x < 1e-9) | (x > 1.0 - 1e-9), x, x + moved)
     mesh = replace(mesh, points=x, node_sets={"top": x[:, 2] > 1.0 - 1e-9})
     for _ in range(level):
-        mesh, _ = mesh.finer
+        mesh, _ = finer_mesh(mesh)
     return mesh
 
 

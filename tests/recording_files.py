@@ -5,8 +5,7 @@ from typing import Any
 
 from warpbrain.frame import Frame
 from warpbrain.problems import Problems
-from warpbrain.recordings import reading
-from warpbrain.recordings.recording import Recording
+from warpbrain.recordings.recording import RECORDINGS, Recording
 
 #: What each reader is told beside file and frame.
 KEYS: dict[str, dict[str, Any]] = {
@@ -20,7 +19,7 @@ KEYS: dict[str, dict[str, Any]] = {
 def read(kind: str, path: Path, frame: Frame | None = None, **keys: Any) -> tuple[Recording | None, Problems]:
     problems = Problems()
     common = {"name": "r", "file": path.name, "role": "fit", "sigma": None} | KEYS[kind] | keys
-    return getattr(reading, f"read_{kind}")(path, frame or Frame(), problems, **common), problems
+    return RECORDINGS[kind].read(path, frame or Frame(), problems, **common), problems
 
 
 def read_content(kind: str, path: Path, content: str, frame: Frame | None = None, **keys: Any) -> tuple[Any, Problems]:

@@ -81,7 +81,7 @@ def beads_of(
 
 def lid(result: Result, sigma: float | None = 1e-4) -> SurfaceRecording:
     """Points on the moved top, none of them a node."""
-    from warpbrain.recordings.comparison import faces_of_set
+    from warpbrain.mesh.free_surfaces import faces_of_set
 
     faces = faces_of_set(result.mesh, "top", "test")
     weights = np.random.default_rng(1).dirichlet([2.0, 2.0, 2.0], len(faces))

@@ -1,11 +1,14 @@
 """The house: every floor imports only from floors below it, and what is particular to a mechanism is in its file."""
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from warpbrain.physics.mechanisms import mechanisms
 
@@ -28,13 +31,12 @@ FLOORS = [
     *("worlds", "diagnosis", "report", "terminal", "bench", "cli"),
 ]
 #: Modules that any floor may use, and that use none; the package's public names are everyone's.
-LEAVES = ["arrays", "errors", "atomic", "frame", "plugins", "problems", "seconds", "shown", "threads", "values"]
+LEAVES = ["arrays", "errors", "atomic", "frame", "keys", "plugins", "problems", "seconds", "shown", "threads", "values"]
 #: Where a kind of mechanism, or a class of one, may stand outside `physics/mechanisms`, and why.
 NAMED = {
     "cases/boundary.py": "[[boundary]] kinds of case.toml",
     "cases/format/tables.py": "[[boundary]] kinds of case.toml",
     "cases/case.py": "a case's anatomy is what its resection leaves",
-    "simulation/of_case.py": "[[boundary]] kinds of case.toml that mechanisms compute",
     "cases/building/node_sets.py": "name of a node set of a shipped mesh",
     "cases/building/tissue_names.py": "name of labels of tissue that is taken out",
     "cases/building/pipeline.py": "names of sets of a shipped mesh",
@@ -77,6 +79,54 @@ def test_there_is_no_other_room():
     rooms = {path.name for path in PACKAGE.iterdir() if path.is_dir() and path.name != "__pycache__"}
     assert rooms == set(FLOORS)
     assert {path.stem for path in PACKAGE.glob("*.py")} == {*LEAVES, "__init__", "__main__"}
+
+
+def run_time_nodes(tree: ast.AST) -> Iterator[ast.AST]:
+    """Nodes of a module, those inside functions too; not what is imported for the checker of types alone."""
+    yield tree
+    for child in ast.iter_child_nodes(tree):
+        if not (isinstance(child, ast.If) and ast.unparse(child.test).endswith("TYPE_CHECKING")):
+            yield from run_time_nodes(child)
+
+
+def uses(source: str, modules: Iterable[str]) -> set[str]:
+    """Which of some modules a source imports, anywhere; of a package its `__init__` only where a name is of that."""
+    imported = set()
+    for node in run_time_nodes(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names = {f"{node.module}.{alias.name}": node.module for alias in node.names}
+            imported |= {name if name in modules else module for name, module in names.items()}
+    return imported & set(modules)
+
+
+def circles(sources: Mapping[str, str]) -> list[list[str]]:
+    """Groups of modules each of which imports itself by way of the others, by their sources."""
+    names = sorted(sources)
+    pairs = [(names.index(name), names.index(other)) for name in names for other in uses(sources[name], sources)]
+    graph = coo_array((np.ones(len(pairs)), np.array(pairs).reshape(-1, 2).T), shape=(len(names), len(names)))
+    group = connected_components(graph, connection="strong")[1]
+    groups = [[names[k] for k in np.flatnonzero(group == number)] for number in range(group.max() + 1)]
+    return [members for members in groups if len(members) > 1]
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    """Within a floor, too, and inside functions."""
+    sources = {
+        ".".join(("warpbrain", *file.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__"): (
+            file.read_text(encoding="utf-8")
+        )
+        for file in PACKAGE.rglob("*.py")
+    }
+    assert circles(sources) == []
+
+
+def test_a_circle_is_seen_wherever_its_imports_stand():
+    late = "def f():\n    from p.a import g\n"
+    assert circles({"p": "", "p.a": "from p import b", "p.b": late, "p.c": "import p.a"}) == [["p.a", "p.b"]]
+    typed = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from p.a import g\n"
+    assert circles({"p": "", "p.a": "from p.b import h", "p.b": typed}) == []
 
 
 def mentions(tree: ast.AST) -> Iterator[str]:

@@ -8,6 +8,7 @@ from material_point import LAWS
 from shapes import cube, distorted
 
 from warpbrain.kernels.two_level import TwoLevelGradient
+from warpbrain.mesh.refinement import finer_mesh
 from warpbrain.simulation.finer import free_prolongation, prolongation
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
@@ -46,7 +47,7 @@ def two_levels(system: System, coarse, ends) -> TwoLevelGradient:
 
 @pytest.fixture(scope="module")
 def meshes():
-    return COARSE, *COARSE.finer
+    return COARSE, *finer_mesh(COARSE)
 
 
 def test_solution_in_a_tenth_of_the_iterations(meshes):

@@ -16,6 +16,7 @@ from warpbrain.mesh import (
     split_boundary,
     wall_nodes,
 )
+from warpbrain.mesh.refinement import finer_mesh
 
 
 def opened(seed: int) -> tuple[TetMesh, TetMesh, np.ndarray]:
@@ -55,7 +56,7 @@ def test_a_wall_stays_one_through_copies_cuts_and_refinement():
     assert not len(mesh.cut)
     for other in (replace(left, node_sets={}), left.with_node_sets({}), pickle.loads(pickle.dumps(left))):
         assert as_set(other.cut) == as_set(wall)
-    finer = left.finer[0]
+    finer = finer_mesh(left)[0]
     assert len(finer.cut) == 4 * len(wall)
     assert as_set(faces_of(finer, finer.node_sets["part"])) == as_set(finer.cut)
     total, fine = (face_vectors(m.points, m.cut).sum(axis=0) for m in (left, finer))

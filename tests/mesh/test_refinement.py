@@ -5,7 +5,7 @@ import pytest
 from shapes import box, distorted, tetrahedron
 
 from warpbrain.mesh import TetMesh, boundary_faces, dihedral_angles
-from warpbrain.mesh.refinement import refined
+from warpbrain.mesh.refinement import finer_mesh, refined
 
 
 @pytest.mark.parametrize("mesh", [tetrahedron(), box((2, 1, 2)), distorted(box((2, 2, 2)), 0.05, tissues=2)])
@@ -57,11 +57,11 @@ def test_an_edge_through_the_body_is_not_on_its_surface() -> None:
 
 def test_other_sets_of_nodes_are_inherited_on_the_same_elements() -> None:
     mesh = box((2, 2, 2))
-    finer, _ = mesh.finer
+    finer, _ = finer_mesh(mesh)
     x, z = mesh.points[:, 0], mesh.points[:, 2]
     for sets in ({"bottom": z < 1e-9}, {"ends": (x < 1e-9) | (x > 1 - 1e-9), "half": z < 0.6}):
-        shared, _ = mesh.with_node_sets(sets).finer
-        anew, _ = TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, sets).finer
+        shared, _ = finer_mesh(mesh.with_node_sets(sets))
+        anew, _ = finer_mesh(TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, sets))
         assert shared.tetrahedra is finer.tetrahedra
         assert set(shared.node_sets) == set(sets)
         for name in sets:

@@ -9,13 +9,13 @@ from shapes import cube, distorted
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.comparison import (
     Error,
     compare_force,
     compare_points,
     compare_surface,
-    faces_of_set,
     legacy_error,
 )
 from warpbrain.recordings.location import locate

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpbrain.recordings.copies import distinct_rows
+from warpbrain.recordings.points import distinct_rows
 from warpbrain.recordings.recording import PointsRecording
 
 POINTS = np.array([[0.0, 0.0, 0.1], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1], [0.0, 0.0, 0.1]])

@@ -21,7 +21,7 @@ def read(folder, text=TEXT, side=None, name="sub-01_ses-1_electrodes.tsv"):
 
 def test_positions_move_and_the_rest_stays(tmp_path):
     electrodes, problems = read(tmp_path)
-    assert electrodes.names == ("LA1", "LA2")
+    assert electrodes.labels == ("LA1", "LA2")
     np.testing.assert_allclose(electrodes.points, [[0.01, -0.02, 0.0055], [0.012, -0.02, 0.005]])
     assert "taken for mm" in problems.remarks[0]
     moved = electrodes.moved_text(electrodes.points + np.array([0.001, 0.0, -0.0025]))

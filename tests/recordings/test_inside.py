@@ -9,7 +9,6 @@ from shapes import box
 
 from warpbrain.mesh import TetMesh
 from warpbrain.problems import Problems
-from warpbrain.recordings.inside import check_points_inside
 from warpbrain.recordings.recording import PointsRecording
 
 MESH = box((5, 5, 5), (0.1, 0.1, 0.1))
@@ -20,7 +19,7 @@ def checked(points, mesh: TetMesh = MESH, **keys) -> Problems:
     problems = Problems()
     points = np.asarray(points, dtype=float)
     recording = PointsRecording(name="p", file="p.csv", points=points, displacement=np.zeros_like(points), **keys)
-    check_points_inside(recording, mesh, FILE, problems)
+    recording.check(mesh, FILE, problems)
     return problems
 
 

@@ -16,7 +16,7 @@ def test_points(tmp_path):
     content = (
         "id,x,y,z,ux,uy,uz,t,sigma,weight\na,10,20,30,1,2,3,0,0.5,1\nb,0,0,0,4,5,6,0,1,0\na,10,20,30,2,3,4,1,.5,2\n"
     )
-    points, problems = read_content("points", tmp_path / "p.csv", content, Frame("mm", "LPS"), sigma=0.001)
+    points, problems = read_content("points", tmp_path / "p.csv", content, Frame("mm", "LPS"), sigma=1.0)
     assert not problems
     np.testing.assert_allclose(points.points[0], [-0.01, -0.02, 0.03])
     np.testing.assert_allclose(points.displacement[1], [-0.004, -0.005, 0.006])

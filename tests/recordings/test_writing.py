@@ -15,7 +15,6 @@ from warpbrain.recordings.recording import (
     SurfaceRecording,
     TestRecording,
 )
-from warpbrain.recordings.writing import write_recording
 
 
 def recordings(seed: int) -> list[Recording]:
@@ -85,7 +84,7 @@ def recordings(seed: int) -> list[Recording]:
 def test_round_trip(tmp_path, frame, seed):
     for recording in recordings(seed):
         file = tmp_path / recording.file
-        write_recording(file, recording, frame)
+        recording.write(file, frame)
         back, problems = read(recording.kind, file, frame)
         assert not problems, messages(problems)
         for field in fields(recording):
@@ -103,8 +102,8 @@ def test_what_cannot_be_written(tmp_path):
     points, _, surface, mesh, *_ = recordings(0)
     for recording, name in ((points, "a.vtu"), (surface, "a.vtu"), (mesh, "a.csv"), (points, "no/a.csv")):
         with pytest.raises(InputError):
-            write_recording(tmp_path / name, recording, Frame())
+            recording.write(tmp_path / name, Frame())
     named = PointsRecording(name="r", file="r", points=np.zeros((1, 3)), displacement=np.zeros((1, 3)), ids=("a\nb",))
     with pytest.raises(InputError, match="line break"):
-        write_recording(tmp_path / "a.csv", named, Frame())
+        named.write(tmp_path / "a.csv", Frame())
     assert list(tmp_path.iterdir()) == []

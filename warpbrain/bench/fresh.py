@@ -5,7 +5,7 @@ diagnosis asks for the same mesh thousands of times; a second system of a mesh i
 first. What is kept, and for how long:
 
 - as long as a `TetMesh` lives: its cached properties (labels, volumes, centres, boundary, node volumes), meshes made of
-  it (`_made`: refined, without a resection), which `with_node_sets` passes on; what a device was told of it, the
+  it (`shared`: refined, without a resection), which `with_node_sets` passes on; what a device was told of it, the
   elements by device and precision, patterns by the bytes of their stencils (`warpbrain.simulation.placed`);
 - by mesh, the latest ones: connected parts (`simulation.held`), balls (`physics.regions`), patches of a traction
   (`physics.mechanisms.traction`), and what estimation and diagnosis ask of a mesh;

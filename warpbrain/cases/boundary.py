@@ -9,7 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.physics.mechanism import ClosedSurface
+from warpbrain.physics.mechanism import ClosedSurface, Mechanism
+from warpbrain.physics.mechanisms.contact import Contact as SurfaceContact
+from warpbrain.physics.mechanisms.pressure import Pressure
 
 Ramp = Sequence[tuple[float, float]]
 
@@ -19,8 +21,16 @@ class Boundary:
     """What all kinds have: a name, and a node set of the case's mesh."""
 
     kind: ClassVar[str]
+    #: Whether it acts on faces of the surface, and whether it keeps a part of the body from drifting away.
+    on_faces: ClassVar[bool] = False
+    holds: ClassVar[bool] = True
     name: str
     nodes: str
+
+    @property
+    def mechanism(self) -> Mechanism | None:
+        """The mechanism that computes it, as if ``[[mechanism]]`` said it; None if conditions on nodes do."""
+        return None
 
     def sentence(self) -> str:
         """What is assumed, for people to read."""
@@ -42,6 +52,11 @@ class Sliding(Boundary):
     """Nodes that move along their surface only."""
 
     kind: ClassVar[str] = "sliding"
+    on_faces: ClassVar[bool] = True
+
+    @property
+    def mechanism(self) -> Mechanism:
+        return SurfaceContact(nodes=self.nodes)
 
     def sentence(self) -> str:
         return f"The {self.name} slides along its surface and does not leave it."
@@ -86,6 +101,7 @@ class Forced(Boundary):
     """Nodes that share a total force [N] evenly, times a factor over time [s]."""
 
     kind: ClassVar[str] = "force"
+    holds: ClassVar[bool] = False
     total: tuple[float, float, float]
     ramp: Ramp = field(default=())
 
@@ -99,8 +115,14 @@ class Pressed(Boundary):
     """Faces of the nodes under a pressure [Pa] that follows them, times a factor over time [s]; positive pushes."""
 
     kind: ClassVar[str] = "pressure"
+    on_faces: ClassVar[bool] = True
+    holds: ClassVar[bool] = False
     value: float
     ramp: Ramp = field(default=())
+
+    @property
+    def mechanism(self) -> Mechanism:
+        return Pressure(nodes=self.nodes, value=self.value, ramp=self.ramp)
 
     def sentence(self) -> str:
         return f"A pressure of {self.value:g} Pa on the {self.name}."
@@ -113,6 +135,10 @@ class Contact(Boundary):
     kind: ClassVar[str] = "contact"
     surface: ClosedSurface
     friction: float = 0.0
+
+    @property
+    def mechanism(self) -> Mechanism:
+        return SurfaceContact(nodes=self.nodes, state="lifting", friction=self.friction, surface=self.surface)
 
     def sentence(self) -> str:
         return f"The {self.name} cannot cross the surface of {self.surface}; friction {self.friction:g}."

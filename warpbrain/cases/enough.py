@@ -6,9 +6,9 @@ import math
 
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
-from warpbrain.recordings.copies import distinct_rows
+from warpbrain.recordings.points import distinct_rows
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording
-from warpbrain.recordings.times import compared_rows, components_of
+from warpbrain.recordings.times import compared_rows
 
 #: Noise can be estimated from no fewer numbers than this.
 _FOR_NOISE = 10
@@ -26,7 +26,7 @@ def numbers_in(case: Case, recording: Recording) -> int:
     rows = compared_rows(recording)
     if isinstance(recording, PointsRecording):
         rows, _ = distinct_rows(recording, rows)
-    return components_of(recording) * len(rows)
+    return recording.components * len(rows)
 
 
 def numbers_to_fit(case: Case) -> int:

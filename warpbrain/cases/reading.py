@@ -21,9 +21,6 @@ from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
 from warpbrain.physics.composition import CompositionError, require_composable, require_left
 from warpbrain.problems import Problems
-from warpbrain.recordings.inside import check_points_inside, check_surface_near
-from warpbrain.recordings.possible import check_possible
-from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.recordings.registration import Registration
 
 
@@ -114,13 +111,8 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     left = case.remaining[0]
     check_faces(context, left, boundaries)
     for recording in recordings:
-        if isinstance(recording, PointsRecording | SurfaceRecording):
-            check_possible(recording, left, file.parent / recording.file, problems)
-        if isinstance(recording, PointsRecording):
-            check_points_inside(recording, left, file.parent / recording.file, problems)
-        elif isinstance(recording, SurfaceRecording):
-            try:
-                check_surface_near(recording, left, file.parent / recording.file, problems)
-            except InputError as error:  # the set has no face
-                problems.add(file, "[[recording]]", str(error))
+        try:
+            recording.check(left, file.parent / recording.file, problems)
+        except InputError as error:  # the set has no face
+            problems.add(file, "[[recording]]", str(error))
     return case

@@ -15,16 +15,15 @@ import numpy as np
 from warpbrain.atomic import output_folder, safe_name, whole_file
 from warpbrain.cases.boundary import Boundary, Contact, Displaced
 from warpbrain.cases.case import Case, Tissue
-from warpbrain.cases.format.keys import Table
 from warpbrain.cases.format.tables import BOUNDARY, CASE, MECHANISM, PRIOR, RECORDING, TISSUE
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
+from warpbrain.keys import Table
 from warpbrain.mesh import write_mesh
 from warpbrain.mesh.vtu import write_vtu
 from warpbrain.physics.mechanism import ClosedSurface, Facts, Mechanism, Removing
-from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording, TestRecording
-from warpbrain.recordings.writing import write_recording
+from warpbrain.recordings.recording import Recording
 
 _HEAD = "# A case of warpbrain. What its tables and keys mean: docs/case-format.md.\n\n"
 
@@ -149,21 +148,11 @@ def _mechanism(folder: Path, mechanism: Mechanism, facts: Facts, frame: Frame) -
 
 
 def _recording(folder: Path, recording: Recording, frame: Frame) -> dict[str, Any]:
-    name = _new_file(
-        folder, "recordings", recording.name, ".vtu" if getattr(recording, "faces", None) is not None else ".csv"
-    )
-    # that of a test is written as a nominal one in Pa
-    given = {key: value for key, value in vars(recording).items() if key not in ("stress", "unit", "moved")}
-    given |= {"kind": recording.kind, "file": name}
-    length = isinstance(recording, PointsRecording | SurfaceRecording)
-    if isinstance(recording, TestRecording):
-        length = recording.answer[0] == "displacement"
-        given |= {"specimen": recording.specimen or None}
-        given |= {} if recording.force_controlled else {"control": None}
-        given |= {"axis": None} if recording.axis == (0.0, 0.0, 1.0) else {}
+    name = _new_file(folder, "recordings", recording.name, recording.ending)
+    recording.write(folder / name, frame)
+    given = {**recording.in_case(), "kind": recording.kind, "file": name}
     if recording.sigma is not None:
-        given["sigma"] = recording.sigma / (frame.metres if length else 1.0)
-    write_recording(folder / name, replace(recording, file=name), frame)
+        given["sigma"] = recording.sigma / (frame.metres if recording.noise_unit == "m" else 1.0)
     return {"name": recording.name} | _values(RECORDING, recording.kind, given, frame)
 
 

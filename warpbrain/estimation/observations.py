@@ -26,11 +26,11 @@ from warpbrain.estimation.registration import moved_back, moved_back_columns
 from warpbrain.estimation.within_element import change_over_element
 from warpbrain.inference.noise import noise_covariance
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.surface import feature_normals
 from warpbrain.recordings.closest import closest_points
-from warpbrain.recordings.comparison import faces_of_set
-from warpbrain.recordings.copies import distinct_rows
 from warpbrain.recordings.location import locate
+from warpbrain.recordings.points import distinct_rows
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.times import compared_rows, rows_at, times_of
 
@@ -273,7 +273,7 @@ def _observations(case: Case, recording: Recording, moments: Moments) -> Iterato
     rows, times = compared_rows(recording), times_of(recording)
     if not set(times[rows].tolist()) <= set(moments.times):
         # of a body that goes on by itself there is an end alone
-        rows = rows_at(recording)  # type: ignore[arg-type]
+        rows = rows_at(recording)
         times = np.full(len(times), np.inf)
     if len(rows) == 0:
         zero = isinstance(recording, PointsRecording) and recording.weights is not None

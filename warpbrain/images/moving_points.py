@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,6 @@ from warpbrain.problems import Problems
 from warpbrain.recordings.electrodes import is_electrodes, read_electrodes
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.markups import ENDINGS, is_markup, read_markup
-from warpbrain.recordings.moving_markups import moved_markup
 
 _HEADER = (
     *("file", "label", "x_mm", "y_mm", "z_mm", "moved_x_mm", "moved_y_mm", "moved_z_mm"),
@@ -93,23 +91,17 @@ def read_point_file(path: Path) -> PointFile:
     InputError
         Naming the file, what was found and what was expected.
     """
-    problems = Problems()
-    moved_text: Callable[[Floats], str]
-    if is_electrodes(path):
-        electrodes = read_electrodes(path, problems)
-        problems.stop()
-        assert electrodes is not None
-        labels, points, moved_text = electrodes.names, electrodes.points, electrodes.moved_text
-    elif is_markup(path):
-        markup = read_markup(path, problems)
-        problems.stop()
-        assert markup is not None
-        labels, points = markup.labels, markup.points
-        moved_text = partial(moved_markup, path, path.read_text(encoding="utf-8-sig"))
-    else:
+    if not (is_electrodes(path) or is_markup(path)):
         raise InputError(f"{path}: found ending '{path.suffix}', expected .mrk.json, .fcsv or a BIDS electrodes.tsv")
+    problems = Problems()
+    file = read_electrodes(path, problems) if is_electrodes(path) else read_markup(path, problems)
+    problems.stop()
+    assert file is not None
+    moved_text = file.moved_text
     remarks = tuple(problems.remarks)
-    return PointFile(path, labels, MILLIMETRES * points, lambda after: moved_text(after / MILLIMETRES), remarks)
+    return PointFile(
+        path, file.labels, MILLIMETRES * file.points, lambda after: moved_text(after / MILLIMETRES), remarks
+    )
 
 
 def move_points(

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.errors import InputError
 from warpbrain.mesh.surface import (
     Bools,
     Floats,
@@ -156,6 +157,23 @@ def faces_of(mesh: TetMesh, members: Bools) -> Ints:
     if not len(mesh.cut) or beside.any():
         return held
     return np.asarray(held[in_rows(held, mesh.cut)])
+
+
+def faces_of_set(mesh: TetMesh, name: str, who: str) -> Ints:
+    """Boundary triangles (k, 3) all of whose nodes are in a node set; `who` asks for them, for the message.
+
+    Raises
+    ------
+    InputError
+        If there is no such set or no such triangle.
+    """
+    if name not in mesh.node_sets:
+        known = ", ".join(sorted(mesh.node_sets)) or "none"
+        raise InputError(f"{who}: the mesh has no node set '{name}', found {known}")
+    faces = faces_of(mesh, mesh.node_sets[name])
+    if len(faces) == 0:
+        raise InputError(f"{who}: no boundary triangle of the mesh has all its nodes in the set '{name}'")
+    return faces
 
 
 def wall_nodes(mesh: TetMesh, elements: str) -> Bools:

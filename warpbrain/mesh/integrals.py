@@ -73,17 +73,24 @@ def surface_forces(
     """Forces (n, 3) [N] of a force on the boundary [Pa], or on some of its triangles, by a rule of degree 4 on each."""
     bary, _ = triangle_rule()
     if isinstance(mesh, TetMesh):
-        faces, shapes, (at, sizes) = mesh.boundary, bary, mesh.boundary_rule
+        faces, shapes, (at, sizes) = mesh.boundary, bary, rule_on_boundary(mesh)
     else:
-        faces, shapes, (at, sizes) = mesh.faces, shape_values(bary), mesh.corners.boundary_rule
+        faces, shapes, (at, sizes) = mesh.faces, shape_values(bary), rule_on_boundary(mesh.corners)
     return _summed(mesh, faces[triangles], at[:, triangles], sizes[:, triangles], shapes, traction)
 
 
 def rule_on_boundary(mesh: TetMesh) -> tuple[Floats, Floats]:
-    """Points (q, b, 3) [m] of the rule on the triangles of a boundary, and for what area (q, b) [m2] each stands."""
-    bary, weights = triangle_rule()
-    areas = np.linalg.norm(face_vectors(mesh.points, mesh.boundary), axis=1)
-    return _points_on(mesh.points[mesh.boundary], bary), weights[:, None] * areas
+    """Points (q, b, 3) [m] of the rule on the triangles of a boundary, and for what area (q, b) [m2] each stands.
+
+    Made once for a mesh and all that share its elements.
+    """
+    rule: tuple[Floats, Floats] | None = mesh.shared.get("rule on boundary")
+    if rule is None:
+        bary, weights = triangle_rule()
+        areas = np.linalg.norm(face_vectors(mesh.points, mesh.boundary), axis=1)
+        rule = _points_on(mesh.points[mesh.boundary], bary), weights[:, None] * areas
+        mesh.shared["rule on boundary"] = rule
+    return rule
 
 
 def _points_on(corners: Floats, bary: Floats) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,21 @@ def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
     finer = TetMesh(points, children, tissue, {}, element_sets, element_vectors)
     finer = replace(finer, cut=_finer_cut(mesh.cut, ends, finer)) if len(mesh.cut) else finer
     return finer.with_node_sets(inherited_sets(mesh.node_sets, ends, finer)), ends
+
+
+#: Finer meshes by those they are of.
+_FINER: WeakKeyDictionary[TetMesh, tuple[TetMesh, Ints]] = WeakKeyDictionary()
+
+
+def finer_mesh(mesh: TetMesh) -> tuple[TetMesh, Ints]:
+    """What `refined` returns, made once: elements are shared by meshes that differ in their node sets only."""
+    if mesh not in _FINER:
+        if "finer" not in mesh.shared:
+            mesh.shared["finer"] = _FINER[mesh] = refined(mesh)
+        else:
+            finer, ends = mesh.shared["finer"]
+            _FINER[mesh] = finer.with_node_sets(inherited_sets(mesh.node_sets, ends, finer)), ends
+    return _FINER[mesh]
 
 
 def _finer_cut(cut: Ints, ends: Ints, finer: TetMesh) -> Ints:

@@ -182,38 +182,9 @@ class TetMesh:
         return boundary_faces(self.tetrahedra)
 
     @cached_property
-    def boundary_rule(self) -> tuple[Floats, Floats]:
-        """Where fields on the boundary are asked for, and for what area each point stands; made once.
-
-        See `warpbrain.mesh.integrals.rule_on_boundary`.
-        """
-        from warpbrain.mesh.integrals import rule_on_boundary
-
-        return rule_on_boundary(self)
-
-    @cached_property
-    def _made(self) -> dict[str, Any]:
-        """Meshes made of this one, which others share that differ in their node sets only."""
-        return {}
-
-    @property
     def shared(self) -> dict[str, Any]:
         """What was made of its elements, of all meshes alike that differ from it in their node sets only."""
-        return self._made
-
-    @cached_property
-    def finer(self) -> tuple[TetMesh, Ints]:
-        """The mesh with every tetrahedron cut into eight, and between which nodes its own lie; made once.
-
-        See `warpbrain.mesh.refinement.refined`.
-        """
-        from warpbrain.mesh.refinement import inherited_sets, refined
-
-        if "finer" not in self._made:
-            self._made["finer"] = refined(self)
-            return self._made["finer"]
-        mesh, ends = self._made["finer"]
-        return mesh.with_node_sets(inherited_sets(self.node_sets, ends, mesh)), ends
+        return {}
 
     def with_node_sets(self, sets: Mapping[str, ArrayLike]) -> TetMesh:
         """The same mesh with other sets of nodes: only these are checked, and nothing that is known is made again.
@@ -224,9 +195,8 @@ class TetMesh:
             If a set is not a boolean array of one value a node.
         """
         checked = _sets(sets, len(self.points), "node")
-        shared = {"_made": self._made, **{name: value for name, value in vars(self).items() if name != "finer"}}
         other: TetMesh = object.__new__(TetMesh)
-        other.__dict__.update(shared, node_sets=checked)
+        other.__dict__.update({"shared": self.shared, **vars(self)}, node_sets=checked)
         return other
 
     def is_as(self, other: TetMesh) -> bool:
@@ -235,7 +205,7 @@ class TetMesh:
             return True
         sets, others = self.node_sets, other.node_sets
         return (
-            self._made is other._made
+            self.shared is other.shared
             and sets.keys() == others.keys()
             and all(sets[name] is others[name] or np.array_equal(sets[name], others[name]) for name in sets)
         )
@@ -289,9 +259,9 @@ class TetMesh:
             raise MeshError("removing every tetrahedron leaves no mesh")
         # hypotheses about one body take the same part out again and again
         what = removed.tobytes()
-        if self._made.get("taken out") != what:
-            self._made["taken out"], self._made["left"] = what, (self.node_sets, *self._left(~removed))
-        sets, mesh, node_ids, element_ids = self._made["left"]
+        if self.shared.get("taken out") != what:
+            self.shared["taken out"], self.shared["left"] = what, (self.node_sets, *self._left(~removed))
+        sets, mesh, node_ids, element_ids = self.shared["left"]
         if self.node_sets is not sets:
             mesh = mesh.with_node_sets({name: members[node_ids] for name, members in self.node_sets.items()})
         return mesh, node_ids, element_ids
@@ -375,7 +345,7 @@ def _defects(points: Floats, tetrahedra: Ints) -> list[str]:
 def _flat_or_inverted(points: Floats, tetrahedra: Ints, numbers: NDArray[np.int64], bad: Bools) -> list[str]:
     corner = points[tetrahedra]
     measurable = ~bad[tetrahedra].any(axis=1)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         volumes = signed_volumes(points, tetrahedra)
         longest = np.sqrt(((corner[:, :, None] - corner[:, None]) ** 2).sum(-1).max(axis=(1, 2)))
         # flat to rounding: such a volume has no sign that means anything

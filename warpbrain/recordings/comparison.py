@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
-from warpbrain.mesh.free_surfaces import faces_of
+from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.recordings.agreement import lengths, root_mean_square
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.location import Location, locate
-from warpbrain.recordings.recording import ForceRecording, PointsRecording, SurfaceRecording
+from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.times import rows_at
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 
@@ -147,18 +147,8 @@ def compare_points(
     squares = recording.sigma**2 if recording.sigma is not None else None
     if recording.sigmas is not None:
         squares = float(np.mean(recording.sigmas[rows] ** 2))
-    return Comparison(
-        name=recording.name,
-        kind=recording.kind,
-        role=recording.role,
-        unit="m",
-        rows=rows,
-        before=Error.of(before),
-        after=Error.of(after),
-        residuals_before=before,
-        residuals_after=after,
-        noise=None if squares is None else float(np.sqrt(3.0 * squares)),
-    )
+    noise = None if squares is None else float(np.sqrt(3.0 * squares))
+    return _comparison(recording, rows, before, after, noise)
 
 
 def compare_surface(
@@ -187,21 +177,9 @@ def compare_surface(
     for moved in (mesh.points, mesh.points + np.asarray(u, dtype=np.float64)):
         residuals.append(points - closest_points(points, moved, faces).position)
         reverse.append(Error.of(_to_recorded(moved[members], points, recording.faces)))
-    return Comparison(
-        name=recording.name,
-        kind=recording.kind,
-        role=recording.role,
-        unit="m",
-        rows=rows,
-        before=Error.of(residuals[0]),
-        after=Error.of(residuals[1]),
-        residuals_before=residuals[0],
-        residuals_after=residuals[1],
-        reverse_before=reverse[0],
-        reverse_after=reverse[1],
-        # noise along a surface is not seen: one component of three is left
-        noise=recording.sigma,
-    )
+    # noise along a surface is not seen: one component of three is left
+    compared = _comparison(recording, rows, residuals[0], residuals[1], recording.sigma)
+    return replace(compared, reverse_before=reverse[0], reverse_after=reverse[1])
 
 
 def compare_force(
@@ -231,17 +209,26 @@ def compare_force(
     if not recorded.any():
         raise InputError(f"recording '{recording.name}' has no component of the force, only the torque")
     after = before - np.asarray(reaction, dtype=np.float64).reshape(3)
+    noise = None if recording.sigma is None else float(np.sqrt(recorded.sum())) * recording.sigma
+    return _comparison(recording, rows, before, after, noise)
+
+
+def _comparison(
+    recording: Recording, rows: NDArray[np.int64], before: Floats, after: Floats, noise: float | None
+) -> Comparison:
+    """The comparison of residuals (n, 3), of whose components those count that were recorded throughout."""
+    unit, recorded = recording.noise_unit, np.isfinite(before).all(axis=0)
     return Comparison(
         name=recording.name,
         kind=recording.kind,
         role=recording.role,
-        unit="N",
+        unit=unit,
         rows=rows,
-        before=Error.of(before[:, recorded], "N"),
-        after=Error.of(after[:, recorded], "N"),
+        before=Error.of(before[:, recorded], unit),
+        after=Error.of(after[:, recorded], unit),
         residuals_before=before,
         residuals_after=after,
-        noise=None if recording.sigma is None else float(np.sqrt(recorded.sum())) * recording.sigma,
+        noise=noise,
     )
 
 
@@ -266,23 +253,6 @@ def joined(parts: Sequence[Comparison]) -> Comparison:
         residuals_after=after,
         noise=float(np.sqrt(sum(squares) / len(rows))) if len(squares) == len(parts) else None,
     )
-
-
-def faces_of_set(mesh: TetMesh, name: str, who: str) -> Ints:
-    """Boundary triangles (k, 3) all of whose nodes are in a node set; `who` asks for them, for the message.
-
-    Raises
-    ------
-    InputError
-        If there is no such set or no such triangle.
-    """
-    if name not in mesh.node_sets:
-        known = ", ".join(sorted(mesh.node_sets)) or "none"
-        raise InputError(f"{who}: the mesh has no node set '{name}', found {known}")
-    faces = faces_of(mesh, mesh.node_sets[name])
-    if len(faces) == 0:
-        raise InputError(f"{who}: no boundary triangle of the mesh has all its nodes in the set '{name}'")
-    return faces
 
 
 def _to_recorded(nodes: Floats, points: Floats, faces: Ints | None) -> Floats:

@@ -33,7 +33,7 @@ class Electrodes:
 
     Attributes
     ----------
-    names : tuple of str
+    labels : tuple of str
         Of those that have a position.
     points : (n, 3) array
         [m, RAS]
@@ -47,7 +47,7 @@ class Electrodes:
         Of one unit of the file.
     """
 
-    names: tuple[str, ...]
+    labels: tuple[str, ...]
     points: Floats
     header: list[str]
     cells: list[list[str]]

@@ -1,22 +1,21 @@
-"""Whether tracked points are in the mesh at all: where units and axes that were mixed up show first."""
+"""What cannot have been recorded of a body, known before anything is computed: units and axes that were mixed up."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
+from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.quality import extent
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.problems import Problems
+from warpbrain.recordings.base import TrackedPoints
 from warpbrain.recordings.closest import closest_points
-from warpbrain.recordings.comparison import faces_of_set
-from warpbrain.recordings.location import Location, locate
-from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
+from warpbrain.recordings.location import locate
 from warpbrain.recordings.text import collected, shown
-
-Floats = NDArray[np.float64]
 
 #: What is tried on points most of which are outside: factor on x, y and z, and what it would mean.
 _MISTAKES = (
@@ -31,37 +30,44 @@ _MISTAKES = (
 _DOT = 0.02
 #: Of the size of the mesh: a surface farther away than this is not a moved surface of it.
 _FAR = 0.25
+_FAR_MOVED = "are the units right, and are ux, uy, uz how far it went and not where?"
 #: Points that are enough to try it on.
 _SAMPLE = 1000
 
 
-def check_points_inside(
-    recording: PointsRecording, mesh: TetMesh, path: Path, problems: Problems, location: Location | None = None
-) -> Location:
-    """Note as problems the points that are farther outside the mesh than an edge is long there.
+def check_possible(
+    mesh: TetMesh,
+    path: Path,
+    problems: Problems,
+    noises: Sequence[float | Floats | None],
+    displacement: Floats | None = None,
+) -> None:
+    """Note as a problem points that move (n, 3) [m] farther than the body is long, and noise [m] larger than it."""
+    size = extent(mesh.points)
+    moved = np.zeros(0) if displacement is None else np.linalg.norm(displacement, axis=1)
+    with collected(path, problems) as found:
+        for row in np.flatnonzero(moved > size):
+            if found.enough:
+                break
+            message = f"moves {_metres(float(moved[row]))} in a body of {_metres(size)}"
+            found.add(path, f"point {row + 1}", message, _FAR_MOVED)
+        largest = max((float(np.max(noise)) for noise in noises if noise is not None), default=0.0)
+        if largest > size:
+            message = f"a noise of {_metres(largest)} in a body of {_metres(size)}"
+            found.add(path, "sigma", message, "in units of the case, one standard deviation of one component")
 
-    A recording with ``outside = "nearest"`` has no such problems. If most points are outside, that is one problem, and
-    its cure says so if a factor of 1000 or the signs of RAS and LPS would bring most of them inside.
 
-    Parameters
-    ----------
-    recording : PointsRecording
-    mesh : TetMesh
-        At rest.
-    path : Path
-        File of the recording.
-    problems : Problems
-    location : Location, optional
-        Of the points in the mesh, if it is known already.
+def _metres(length: float) -> str:
+    return f"{length:.3g} m" if length >= 1.0 else f"{1000.0 * length:.3g} mm"
 
-    Returns
-    -------
-    Location
-        Of the points in the mesh.
+
+def check_points_inside(recording: TrackedPoints, mesh: TetMesh, path: Path, problems: Problems) -> None:
+    """Note as problems the points that are farther outside the mesh at rest than an edge is long there.
+
+    If most points are outside, that is one problem, and its cure says so if a factor of 1000 or the signs of RAS and
+    LPS would bring most of them inside.
     """
-    place = locate(mesh.points, mesh.tetrahedra, recording.points) if location is None else location
-    if recording.outside == "nearest":
-        return place
+    place = locate(mesh.points, mesh.tetrahedra, recording.points)
     far = np.flatnonzero(place.distance > place.edge)
     inside = len(far) <= len(place) / 2
     if inside and recording.time is None and len(place) > 3 and _is_dot(recording.points, mesh):
@@ -72,9 +78,9 @@ def check_points_inside(
             f"all {len(place)} points lie within {size:.3g} mm of each other, a dot in the body",
             "multiplied by 1000 they would not: is one of mesh and recording in m, the other in mm?",
         )
-        return place
+        return
     if len(far) == 0:
-        return place
+        return
     far = far[np.argsort(-place.distance[far], kind="stable")]
     cure = "" if inside else _mistake(recording.points[far], mesh)
     cure = cure or 'check units and axes, or write outside = "nearest" for this recording'
@@ -92,7 +98,6 @@ def check_points_inside(
             found.add(
                 path, place_name, f"{head}{at} is {1000.0 * place.distance[row]:.4g} mm outside the mesh, {limit}", cure
             )
-    return place
 
 
 def _is_dot(points: Floats, mesh: TetMesh) -> bool:
@@ -100,10 +105,12 @@ def _is_dot(points: Floats, mesh: TetMesh) -> bool:
     return extent(points) < _DOT * extent(mesh.points)
 
 
-def check_surface_near(recording: SurfaceRecording, mesh: TetMesh, path: Path, problems: Problems) -> None:
-    """Note as a problem a recorded surface that is nowhere near the faces that it is compared with."""
-    faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
-    sample = recording.points[:: -(-len(recording.points) // _SAMPLE)]
+def check_surface_near(
+    points: Floats, mesh: TetMesh, nodes: str, recording: str, path: Path, problems: Problems
+) -> None:
+    """Note as a problem points (n, 3) of a surface that are nowhere near `faces_of_set`."""
+    faces = faces_of_set(mesh, nodes, recording)
+    sample = points[:: -(-len(points) // _SAMPLE)]
     limit = _FAR * extent(mesh.points)
 
     def away(points: Floats) -> float:
@@ -116,13 +123,13 @@ def check_surface_near(recording: SurfaceRecording, mesh: TetMesh, path: Path, p
         problems.add(
             path,
             "",
-            f"most points are {1000.0 * distance:.4g} mm or more from the faces of '{recording.nodes}'"
+            f"most points are {1000.0 * distance:.4g} mm or more from the faces of '{nodes}'"
             + (", all within a dot" if dot else ""),
             cure.replace("most are inside", "they are near") or "check units and axes",
         )
 
 
-def _name(recording: PointsRecording, row: int) -> str:
+def _name(recording: TrackedPoints, row: int) -> str:
     return f"point {row + 1}" if recording.ids is None else f"id {shown(recording.ids[row])}"
 
 

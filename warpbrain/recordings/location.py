@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.mesh.surface import EDGES, FACES, paired_faces
-from warpbrain.recordings.closest import closest_points
-from warpbrain.recordings.spheres import Spheres
+from warpbrain.recordings.closest import Spheres, closest_points
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 # how far outside a tetrahedron a point is still inside: as a weight, and as a length in parts of the longest edge.

@@ -1,4 +1,4 @@
-"""Control points of 3D Slicer markups, ``.mrk.json`` and ``.fcsv``: positions and labels, nothing else of them.
+"""Control points of 3D Slicer markups, ``.mrk.json`` and ``.fcsv``: positions and labels, and the file with others.
 
 Both kinds carry their own axes, and are in mm. A ``.mrk.json`` that names no coordinate system is in LPS, as its schema
 says; a ``.fcsv`` that names none may be either, depending on the version that wrote it, and is refused.
@@ -7,21 +7,21 @@ says; a ``.fcsv`` that names none may be either, depending on the version that w
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.frame import Frame
 from warpbrain.problems import Problems
 from warpbrain.recordings.tables import LARGEST
 from warpbrain.recordings.text import lines_of, read_text, shown
-
-Floats = NDArray[np.float64]
 
 ENDINGS = (".mrk.json", ".json", ".fcsv")
 #: Names of the axes in new files, numbers in old ones.
@@ -32,10 +32,21 @@ COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 
 @dataclass(frozen=True, eq=False)
 class Markup:
-    """Control points: positions (n, 3) [m, RAS] and the label of each, which may be empty."""
+    """Control points.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        [m, RAS]
+    labels : tuple of str
+        May be empty.
+    moved_text : callable
+        From other positions (n, 3) [m, RAS] to the text of the file that has them; all else in it stays as it is.
+    """
 
     points: Floats
     labels: tuple[str, ...]
+    moved_text: Callable[[Floats], str]
 
 
 def is_markup(path: Path) -> bool:
@@ -103,7 +114,13 @@ def _read_json(path: Path, text: str, problems: Problems) -> Markup | None:
         return None
     positions = [_position(control, number, path, problems) for number, control in enumerate(controls, 1)]
     labels = tuple(str(control.get("label", "")).strip() for control in controls)
-    return _markup([position for position in positions if position is not None], labels, axes)
+
+    def moved_text(points: Floats) -> str:
+        for control, position in zip(controls, Frame("mm", axes or "LPS").file_lengths(points), strict=True):
+            control["position"] = position.tolist()
+        return json.dumps(content, indent=4, ensure_ascii=False) + "\n"
+
+    return _markup([position for position in positions if position is not None], labels, axes, moved_text)
 
 
 def _position(control: dict[str, Any], number: int, path: Path, problems: Problems) -> list[float] | None:
@@ -130,7 +147,10 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
     columns = COLUMNS.split(",")
     positions: list[list[float]] = []
     labels: list[str] = []
-    for row, line in enumerate(lines_of(text), 1):
+    # of each point the line, its fields, and which of them are its position
+    points_in: list[tuple[int, list[str], list[int]]] = []
+    lines = lines_of(text)
+    for row, line in enumerate(lines, 1):
         if line.startswith("#"):
             key, _, value = line.lstrip("# ").partition("=")
             if key.strip() == "CoordinateSystem":
@@ -152,7 +172,8 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
             if len(fields) <= last:
                 problems.add(path, f"row {row}", f"found {len(fields)} fields, expected {len(columns)}")
                 continue
-            words = [fields[columns.index(name)].strip() for name in ("x", "y", "z")]
+            where = [columns.index(name) for name in ("x", "y", "z")]
+            words = [fields[column].strip() for column in where]
             try:
                 position = [float(word) for word in words]
             except ValueError:
@@ -162,10 +183,23 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
                 continue
             positions.append(position)
             labels.append(fields[columns.index("label")].strip())
+            points_in.append((row - 1, fields, where))
     if not named:
         cure = "write '# CoordinateSystem = RAS' or LPS as its second line, or save it as .mrk.json"
         problems.add(path, "header", "found no coordinate system", cure)
-    return _markup(positions, tuple(labels), axes)
+
+    def moved_text(points: Floats) -> str:
+        moved = list(lines)
+        for (at, fields, where), position in zip(
+            points_in, Frame("mm", axes or "RAS").file_lengths(points), strict=True
+        ):
+            written = dict(zip(where, (f"{value:.6f}" for value in position), strict=True))
+            line = io.StringIO()
+            csv.writer(line, lineterminator="").writerow([written.get(k, field) for k, field in enumerate(fields)])
+            moved[at] = line.getvalue()
+        return "\n".join(moved)
+
+    return _markup(positions, tuple(labels), axes, moved_text)
 
 
 def _axes(value: object, path: Path, place: str, problems: Problems) -> str | None:
@@ -175,7 +209,9 @@ def _axes(value: object, path: Path, place: str, problems: Problems) -> str | No
     return axes
 
 
-def _markup(positions: list[list[float]], labels: tuple[str, ...], axes: str | None) -> Markup | None:
+def _markup(
+    positions: list[list[float]], labels: tuple[str, ...], axes: str | None, moved_text: Callable[[Floats], str]
+) -> Markup | None:
     if axes is None:
         return None
-    return Markup(Frame("mm", axes).lengths(np.array(positions).reshape(-1, 3)), labels)
+    return Markup(Frame("mm", axes).lengths(np.array(positions).reshape(-1, 3)), labels, moved_text)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.frame import AXES
 from warpbrain.mesh.files import LARGEST_FILE, ends_inside_a_number
 from warpbrain.mesh.patience import patience
@@ -17,7 +18,6 @@ from warpbrain.problems import Problems
 from warpbrain.recordings.tables import LARGEST
 from warpbrain.recordings.text import is_readable, shown
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 # cells that have no area: markers, outlines and the points of point clouds

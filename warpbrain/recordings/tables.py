@@ -15,13 +15,10 @@ from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.problems import Problems
 from warpbrain.recordings.text import lines_of, read_text, remark_open_end, shown, without_comment
-
-Floats = NDArray[np.float64]
-
 
 #: No length, time, force or stress that anybody records is larger, in whatever unit; squares of it are still numbers.
 LARGEST = 1e12
@@ -210,6 +207,14 @@ def _is_header(path: Path, number: int, header: list[str], known: Sequence[str],
     if others:
         problems.remark(path, f"ignores column{'s' if len(others) > 1 else ''} {', '.join(others)[:150]}")
     return True
+
+
+def read_csv(path: Path, problems: Problems, known: Sequence[str]) -> Table | None:
+    """The same of a file that must be called ``.csv``."""
+    if path.suffix.lower() != ".csv":
+        problems.add(path, "", f"found ending {shown(path.suffix)}, expected .csv")
+        return None
+    return read_table(path, problems, known)
 
 
 def _split(line: str, separator: str) -> list[str]:

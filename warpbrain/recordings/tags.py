@@ -12,13 +12,11 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.problems import Problems
 from warpbrain.recordings.tables import LARGEST
 from warpbrain.recordings.text import lines_of, read_text, shown, without_comment
-
-Floats = NDArray[np.float64]
 
 TITLE = "MNI Tag Point File"
 

@@ -1,34 +1,23 @@
-"""Which rows of a recording a state is compared with, and how many numbers it holds."""
+"""Which rows of a recording a state is compared with."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError
-from warpbrain.recordings.recording import (
-    ForceRecording,
-    PointsRecording,
-    Recording,
-    SurfaceRecording,
-    TestRecording,
-)
-
-Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
-
-AnyRecording = PointsRecording | SurfaceRecording | ForceRecording | TestRecording
+from warpbrain.recordings.base import Recording
 
 
 def times_of(recording: Recording) -> Floats:
     """Time (n,) [s] of each row; infinite of the end, where a recording has no times, or none after the loads came."""
-    times = getattr(recording, "time", None)
+    times = recording.time
     if times is None or not (times > 0.0).any():
-        return np.full(_count(recording), np.inf)
+        return np.full(recording.count, np.inf)
     return np.asarray(times, dtype=np.float64)
 
 
-def compared_rows(recording: Recording) -> Rows:
+def compared_rows(recording: Recording) -> Ints:
     """Numbers (k,) of the rows that states are compared with, in the order of their times.
 
     Not of the time 0 or earlier, when nothing acts yet, nor of the time of the reference, which differs from itself by
@@ -45,17 +34,8 @@ def compared_rows(recording: Recording) -> Rows:
     return np.asarray(rows[np.argsort(times[rows], kind="stable")], dtype=np.int64)
 
 
-def components_of(recording: Recording) -> int:
-    """How many numbers a row holds: of points 3, of a surface its distance, of a force what was recorded of it."""
-    if isinstance(recording, PointsRecording):
-        return 3
-    if isinstance(recording, ForceRecording):
-        return int(np.isfinite(recording.force).all(axis=0).sum())
-    return 1
-
-
-def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
-    """Rows that say what was so at a time.
+def rows_at(recording: Recording, time: float | None = None) -> Ints:
+    """Ints that say what was so at a time.
 
     Without a time it is the end: every row of points or of a surface that has no times; of points with ids the last row
     of each; else the rows of the last time. At a time it is the rows of the recorded time nearest to it, the earlier of
@@ -64,7 +44,7 @@ def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
 
     Parameters
     ----------
-    recording : PointsRecording, SurfaceRecording, ForceRecording or TestRecording
+    recording : Recording
     time : float, optional
         [s]
 
@@ -82,9 +62,8 @@ def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
     if times is None:
         if time is not None:
             raise InputError(f"recording '{recording.name}' has no times: it can be compared with an end state only")
-        single = isinstance(recording, TestRecording)
-        return np.arange(_count(recording) - 1 if single else 0, _count(recording))
-    ids = recording.ids if isinstance(recording, PointsRecording) else None
+        return np.arange(recording.count - 1 if recording.of_specimen else 0, recording.count)
+    ids = getattr(recording, "ids", None)
     groups = np.zeros(len(times), dtype=np.int64) if ids is None else np.unique(ids, return_inverse=True)[1]
     apart = -times if time is None else np.abs(times - time)
     order = np.lexsort((times, apart, groups))
@@ -95,11 +74,6 @@ def rows_at(recording: AnyRecording, time: float | None = None) -> Rows:
         span = f"{times.min():g} s to {times.max():g} s"
         raise InputError(f"recording '{recording.name}' has nothing at {time:g} s: its times are {span}")
     return rows
-
-
-def _count(recording: Recording) -> int:
-    names = ("imposed", "force", "points")
-    return len(next(getattr(recording, name) for name in names if hasattr(recording, name)))
 
 
 def _half_interval(times: Floats) -> float:

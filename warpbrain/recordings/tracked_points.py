@@ -11,15 +11,11 @@ import numpy as np
 from warpbrain.frame import Frame
 from warpbrain.plugins import added_by_packages
 from warpbrain.problems import Problems
+from warpbrain.recordings.base import DISPLACEMENT, POSITION, TrackedPoints
 from warpbrain.recordings.markups import is_markup, paired, read_markup
-from warpbrain.recordings.recording import TrackedPoints
 from warpbrain.recordings.tables import Table, read_table
 from warpbrain.recordings.tags import read_tags
 from warpbrain.recordings.text import is_readable, shown
-
-POSITION = ("x", "y", "z")
-DISPLACEMENT = ("ux", "uy", "uz")
-
 
 #: Reads a file of the ending that it is registered for (entry points of the group `warpbrain.recordings`, named like
 #: ``".trc"``). It raises `ValueError`, or an error that derives from it, with what is wrong; the file is named for it.

@@ -14,9 +14,9 @@ from xml.etree import ElementTree as XML
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.mesh.files import LARGEST_FILE
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 _TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}

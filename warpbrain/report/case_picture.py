@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.mesh import TetMesh, face_vectors
-from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording, count_of
+from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.picture import Moved, cameras_of, notes_on, scene_of, show
@@ -120,7 +120,7 @@ class _Scene:
     @property
     def arrows(self) -> int:
         """How many there are."""
-        return sum(map(count_of, self.tracked))
+        return sum(recording.count for recording in self.tracked)
 
     @cached_property
     def enlarged(self) -> float:
@@ -152,7 +152,7 @@ def _headline(case: Case) -> str:
     mesh = case.mesh
     origin = "stand-in, not the patient's images" if case.origin == "stand-in" else case.origin
     size = f"{len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra, {1e6 * mesh.volume:.4g} cm3"
-    recorded = ", ".join(f"{r.name} ({r.kind}, {count_of(r)})" for r in case.recordings) or "nothing"
+    recorded = ", ".join(f"{r.name} ({r.kind}, {r.count})" for r in case.recordings) or "nothing"
     title, recordings = (
         "\n".join(textwrap.wrap(text, _CHARACTERS, max_lines=2, placeholder=" ..."))
         for text in (case.title, f"recorded: {recorded}")
@@ -303,7 +303,7 @@ def _recordings(scene: _Scene) -> list[tuple[Any, str]]:
     kinds: tuple[tuple[Sequence[Recording], Any, tuple[str, ...]], ...]
     kinds = ((scene.tracked, arrow, _ARROWS), (scene.surfaces, cross, _CROSSES))
     entries = [
-        (_mark(color=colours[number % len(colours)], **style), f"{_short(recording.name)}: {count_of(recording)}")
+        (_mark(color=colours[number % len(colours)], **style), f"{_short(recording.name)}: {recording.count}")
         for recordings, style, colours in kinds
         for number, recording in enumerate(recordings)
     ]

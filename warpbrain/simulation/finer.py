@@ -14,6 +14,7 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
+from warpbrain.mesh.refinement import finer_mesh
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Removing
@@ -54,7 +55,7 @@ class FinerCase:
 
     def __init__(self, case: Case) -> None:
         self._coarse, _ = case.remaining
-        mesh, ends = self._coarse.finer
+        mesh, ends = finer_mesh(self._coarse)
         self.prolongation = prolongation(ends, len(self._coarse.points))
         mechanisms = tuple(m for m in case.mechanisms if not isinstance(m, Removing))
         boundaries = tuple(b for b in case.boundaries if not isinstance(b, Forced))

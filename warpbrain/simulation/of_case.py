@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpbrain.cases.boundary import Contact, Displaced, Fixed, Forced, Pressed, Sliding
+from warpbrain.cases.boundary import Displaced, Fixed, Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.force import NodalForce
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.physics.mechanisms.contact import Contact as SkullContact
-from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.simulation.model import Material, Model, Motion, with_mechanisms
 
 
@@ -54,19 +52,8 @@ def plain_model_of(case: Case) -> Model:
                 motions.append(Motion(members, np.array(boundary.times), np.array(boundary.values)))
         elif isinstance(boundary, Forced):
             loads.append(NodalForce(nodes=boundary.nodes, total=boundary.total, ramp=boundary.ramp))
-        elif isinstance(boundary, Pressed):
-            mechanisms.append(Pressure(nodes=boundary.nodes, value=boundary.value, ramp=boundary.ramp))
-        elif isinstance(boundary, Sliding):
-            mechanisms.append(SkullContact(nodes=boundary.nodes))
-        elif isinstance(boundary, Contact):
-            mechanisms.append(
-                SkullContact(
-                    nodes=boundary.nodes,
-                    state="lifting",
-                    friction=boundary.friction,
-                    surface=boundary.surface,
-                )
-            )
+        elif boundary.mechanism is not None:
+            mechanisms.append(boundary.mechanism)
     try:
         materials = {
             label: Material(tissue.known_law, case.poisson, tissue.formulation)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from warpbrain.cases.format.keys import Table
 from warpbrain.frame import Frame
+from warpbrain.keys import Table
 from warpbrain.mesh import TetMesh
 from warpbrain.problems import Problems
 from warpbrain.values import short

@@ -12,8 +12,8 @@ import math
 from collections.abc import Collection
 from typing import Any
 
-from warpbrain.cases.format.keys import Key, Table
 from warpbrain.cases.format.tables import PRIOR, TABLES, TISSUE
+from warpbrain.keys import Key, Table
 from warpbrain.physics.laws import LAWS
 
 _NUMBER = {"type": "number"}

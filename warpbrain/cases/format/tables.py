@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from warpbrain.cases.format.keys import Key, Table
-from warpbrain.frame import AXES, METRES, PASCALS
+from warpbrain.frame import AXES, METRES
+from warpbrain.keys import Key, Table
 from warpbrain.physics.laws import FORMULATIONS, LAWS, Law
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.recordings.recording import RECORDINGS
 
 #: Groups of the generative model: method and anatomy of the published strain-energy functions.
 PRIOR_GROUPS = tuple(
@@ -169,14 +170,6 @@ MECHANISM = Table(
     several=True,
 )
 
-_REFERENCE = Key(
-    "reference",
-    "number",
-    "Time of the loaded state from which displacements and forces are counted; the body at rest if absent.",
-    "s",
-    above=0.0,
-)
-
 RECORDING = Table(
     "recording",
     "What was observed.",
@@ -192,50 +185,8 @@ RECORDING = Table(
             above=0.0,
         ),
     ),
-    by=Key("kind", "text", "What it holds.", needed=True, choices=("points", "surface", "force", "test")),
-    variants={
-        "points": (
-            Key("moved", "file", "Where the points went, if the file is a Slicer markup."),
-            Key(
-                "outside",
-                "text",
-                "What a point outside the mesh is: an error, or observed at the nearest point",
-                choices=("error", "nearest"),
-                default="error",
-            ),
-            _REFERENCE,
-        ),
-        "surface": (Key("nodes", "text", "Node set whose faces are compared with it.", needed=True), _REFERENCE),
-        "force": (Key("boundary", "text", "Name of the boundary that acts with it.", needed=True), _REFERENCE),
-        "test": (
-            Key(
-                "mode",
-                "text",
-                "How the specimen was loaded.",
-                needed=True,
-                choices=("axial", "shear", "torsion", "confined", "biaxial"),
-            ),
-            Key(
-                "stress",
-                "text",
-                "What the column stress is: force over the area at rest, or over that of an incompressible specimen",
-                choices=("nominal", "cauchy"),
-                default="nominal",
-            ),
-            Key("unit", "text", "Unit of the column stress", choices=tuple(PASCALS), default="Pa"),
-            Key(
-                "control",
-                "text",
-                "What the machine imposed, a displacement (stretch, angle) or a force (stress, torque); sigma is of "
-                "the other",
-                choices=("displacement", "force"),
-                default="displacement",
-            ),
-            Key("specimen", "text", "Which one was tested, where tests are of several of one shape."),
-            Key("axis", "vector", "Direction of the tissue along the machine's axis z; z if absent."),
-            Key("sheared", "vector", "Direction of the tissue along the machine's x, in which it shears; x if absent."),
-        ),
-    },
+    by=Key("kind", "text", "What it holds.", needed=True, choices=tuple(RECORDINGS)),
+    variants={kind: recording.keys for kind, recording in RECORDINGS.items()},
     several=True,
 )
 

@@ -85,7 +85,7 @@ def _triples(values: Any) -> tuple[tuple[float, float, float], ...]:
 def check_faces(context: Context, left: TetMesh, boundaries: tuple[Boundary, ...]) -> None:
     """Note boundaries that act on faces of the surface, of what is `left` after a resection, and have none there."""
     for boundary in boundaries:
-        if isinstance(boundary, Sliding | Pressed) and not len(faces_of(left, left.node_sets[boundary.nodes])):
+        if boundary.on_faces and not len(faces_of(left, left.node_sets[boundary.nodes])):
             wall = boundary.nodes in left.element_sets
             context.problems.add(
                 context.file,
@@ -111,7 +111,7 @@ def check_together(context: Context, mesh: TetMesh, boundaries: tuple[Boundary, 
         return
     held = np.zeros(len(mesh.points), dtype=bool)
     for boundary in boundaries:
-        if not isinstance(boundary, Forced | Pressed):
+        if boundary.holds:
             held |= mesh.node_sets[boundary.nodes]
     sizes = np.bincount(part)
     for number in np.argsort(sizes):

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import RECORDING
 from warpbrain.cases.parts.named import Named
-from warpbrain.errors import InputError
 from warpbrain.mesh import MeshInFile
-from warpbrain.recordings.reading import read_force, read_points, read_surface, read_test
-from warpbrain.recordings.recording import Recording, turn_of
+from warpbrain.recordings.recording import RECORDINGS, Recording
 from warpbrain.recordings.times import compared_rows
 
 
@@ -30,23 +26,13 @@ def read_recordings(
         names.add(name)
         if table.variant is None:
             continue
-        if (table.variant == "test") != specimen:
-            other = "a case with [specimen]" if table.variant == "test" else "a case with [mesh]"
+        kind = RECORDINGS[table.variant]
+        if kind.of_specimen != specimen:
+            other = "a case with [specimen]" if kind.of_specimen else "a case with [mesh]"
             table.problem("kind", f"'{table.variant}' belongs to {other}")
             continue
-        common = _common(table)
-        recording: Recording | None
-        if table.variant == "surface":
-            nodes = None if named is None or found is None else named.nodes(table, found)
-            recording = None if common is None or nodes is None else read_surface(**common, nodes=nodes)
-        elif table.variant == "points":
-            recording = _points(table, common)
-        elif table.variant == "force":
-            recording = _force(table, common, boundaries)
-        else:
-            recording = _test(table, common)
+        recording = _read(table, kind, _given(table, kind, named, found, boundaries))
         if recording is not None:
-            recording = replace(recording, reference=table.get("reference"))
             if not specimen and recording.reference is not None and not len(compared_rows(recording)):
                 at = f"{recording.reference:g} s"
                 table.problem("reference", f"no row is of another time than {at}: there is no difference to compare")
@@ -54,47 +40,38 @@ def read_recordings(
     return tuple(recordings)
 
 
-def _common(table: Reading) -> dict[str, Any] | None:
-    """What the readers of all kinds take; None if something of it is wrong."""
-    path, sigma = table.path("file"), table.get("sigma")
-    if path is None or not table.has("name"):
-        return None
-    scale = table.context.frame.metres if table.variant in ("points", "surface") else 1.0
-    texts = {key: table.get(key) for key in ("name", "file", "role")}
-    noise = None if sigma is None else scale * float(sigma)
-    return {"path": path, "frame": table.context.frame, "problems": table.problems, "sigma": noise, **texts}
+def _given(
+    table: Reading, kind: type[Recording], named: Named | None, found: MeshInFile | None, boundaries: set[str]
+) -> dict[str, Any] | None:
+    """Path and keys as `Recording.read` takes them; None, and problems noted, if something of them is wrong."""
+    given: dict[str, Any] = {"path": table.path("file")}
+    given |= {key: table.get(key) for key in ("name", "file", "role")}
+    right = given["path"] is not None and table.has("name")
+    for key in kind.keys:
+        value = table.si(key.name)
+        if key.name == "nodes":
+            value = None if named is None or found is None else named.nodes(table, found)
+        elif key.name == "boundary" and value is not None and value not in boundaries:
+            known = ", ".join(f"'{known}'" for known in sorted(boundaries)) or "none"
+            table.problem("boundary", f"no [[boundary]] is called '{value}' (there are: {known})")
+            right = False
+        elif "file" in key.kinds:
+            given[f"{key.name}_file"], value = value, table.path(key.name)
+            right &= value is not None or not table.named(key.name)
+        right &= value is not None or not key.needed
+        given[key.name] = value
+    sigma = table.get("sigma")
+    return given | {"sigma": None if sigma is None else float(sigma)} if right else None
 
 
-def _points(table: Reading, common: Mapping[str, Any] | None) -> Recording | None:
-    moved = table.path("moved")
-    if common is None or (table.named("moved") and moved is None):
+def _read(table: Reading, kind: type[Recording], given: dict[str, Any] | None) -> Recording | None:
+    if given is None:
         return None
-    return read_points(**common, outside=table.get("outside"), moved=moved, moved_file=table.get("moved"))
-
-
-def _force(table: Reading, common: Mapping[str, Any] | None, boundaries: set[str]) -> Recording | None:
-    name = table.get("boundary")
-    if name is not None and name not in boundaries:
-        known = ", ".join(f"'{known}'" for known in sorted(boundaries)) or "none"
-        table.problem("boundary", f"no [[boundary]] is called '{name}' (there are: {known})")
+    if fault := kind.fault_of_keys(given):
+        table.problem(*fault)
         return None
-    return None if common is None or name is None else read_force(**common, boundary=name)
-
-
-def _test(table: Reading, common: Mapping[str, Any] | None) -> Recording | None:
-    if common is None or not table.has("mode"):
-        return None
-    axis, sheared = table.si("axis") or (0.0, 0.0, 1.0), table.si("sheared")
-    try:
-        turn_of(axis, sheared)
-    except InputError as error:
-        table.problem("axis" if sheared is None else "sheared", str(error))
-        return None
-    texts = {key: table.get(key) for key in ("mode", "stress", "unit", "control")}
-    found = read_test(**common, **texts, specimen=table.get("specimen") or "")
-    if found is None:
-        return None
-    for key in ("stress", "unit"):
-        if table.named(key) and found.quantities[1] != "stress":
-            table.problem(key, f"means nothing of {' and '.join(found.quantities)}", "it says what a column stress is")
-    return replace(found, axis=axis, sheared=sheared)
+    recording = kind.read(frame=table.context.frame, problems=table.problems, **given)
+    for key, why in recording.without_meaning().items() if recording is not None else ():
+        if table.named(key):
+            table.problem(key, why, "it says what a column stress is")
+    return recording

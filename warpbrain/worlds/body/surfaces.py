@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools
-from warpbrain.cases.boundary import Forced, Pressed
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh, nodes_of, split_boundary
@@ -33,7 +32,7 @@ def held_nodes(case: Case) -> Bools:
     mesh, _ = case.remaining
     held = np.zeros(len(mesh.points), dtype=bool)
     for boundary in case.boundaries:
-        if not isinstance(boundary, Forced | Pressed):
+        if boundary.holds:
             held |= mesh.node_sets[boundary.nodes]
     for mechanism in case.mechanisms:
         held[mechanism.held(mesh)[0]] = True

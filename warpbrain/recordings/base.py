@@ -1,0 +1,208 @@
+"""What all recordings have and do; a file for each kind says the rest: keys, data, reading, writing, checks."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from warpbrain.arrays import Floats
+from warpbrain.atomic import whole_file
+from warpbrain.errors import InputError
+from warpbrain.frame import Frame
+from warpbrain.keys import Key
+from warpbrain.mesh import TetMesh
+from warpbrain.problems import Problems
+
+#: Columns of a file.
+Columns = dict[str, Floats | tuple[str, ...]]
+
+POSITION = ("x", "y", "z")
+DISPLACEMENT = ("ux", "uy", "uz")
+REFERENCE = Key(
+    "reference",
+    "number",
+    "Time of the loaded state from which displacements and forces are counted; the body at rest if absent.",
+    "s",
+    above=0.0,
+)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Recording:
+    """What all recordings have; `warpbrain.recordings.recording.RECORDINGS` has the kinds.
+
+    Attributes
+    ----------
+    name : str
+    file : str
+        File it came from, relative to the case folder.
+    role : {"fit", "check"}
+        A ``"check"`` recording is never fitted, only scored.
+    sigma : float or None
+        Noise of one component, one standard deviation, in the unit of what was recorded (m, N, Pa or N m); None: to be
+        estimated.
+    reference: float or None
+        Time [s] of the loaded state from which displacements and forces are counted; None: rest.
+    time : (n,) array or None
+        [s]
+    """
+
+    kind: ClassVar[str]
+    #: What `case.toml` says of this kind besides name, file, role and sigma.
+    keys: ClassVar[tuple[Key, ...]]
+    #: Whether it belongs to a laboratory specimen and not to a body.
+    of_specimen: ClassVar[bool] = False
+    name: str
+    file: str
+    role: str = "fit"
+    sigma: float | None = None
+    reference: float | None = None
+    time: Floats | None = None
+
+    @classmethod
+    def read(
+        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
+    ) -> Self | None:
+        """Read a file.
+
+        Parameters
+        ----------
+        path : Path
+        frame : Frame
+            Unit and axes of the file, unless it states its own.
+        problems : Problems
+            Gets everything that is wrong with the file.
+        name, file, role
+            As in `Recording`.
+        sigma : float, optional
+            As `case.toml` has it: noise of one component in the unit of the file.
+        **given
+            The `keys` of the kind in SI units and RAS axes, None where `case.toml` says nothing; of a key that names a
+            file its path, with the text as `KEY_file`.
+
+        Returns
+        -------
+        Recording or None
+            None if there were problems.
+        """
+        raise NotImplementedError
+
+    @classmethod
+    def fault_of_keys(cls, given: Mapping[str, Any]) -> tuple[str, str] | None:
+        """A key that cannot have its value whatever the file holds, and why; None if there is none."""
+        return None
+
+    @property
+    def count(self) -> int:
+        """How many rows, points or instants it has."""
+        raise NotImplementedError
+
+    @property
+    def components(self) -> int:
+        """How many numbers a row holds."""
+        return 1
+
+    @property
+    def noise_unit(self) -> str:
+        """Unit of `sigma`."""
+        return "m"
+
+    @property
+    def content(self) -> str:
+        """What it holds, for people to read."""
+        raise NotImplementedError
+
+    def in_case(self) -> Mapping[str, Any]:
+        """Values of the keys of `case.toml`, in SI units and RAS axes."""
+        return vars(self)
+
+    def without_meaning(self) -> Mapping[str, str]:
+        """Keys that mean nothing for what the file holds, and why."""
+        return {}
+
+    def check(self, mesh: TetMesh, path: Path, problems: Problems) -> None:
+        """Note as problems what cannot have been recorded of a body (its mesh at rest, without what was resected).
+
+        Raises
+        ------
+        InputError
+            If the mesh has nothing that it could have been recorded of.
+        """
+
+    @property
+    def ending(self) -> str:
+        """Of the file that `write` writes."""
+        return ".csv"
+
+    def columns(self, frame: Frame) -> Columns:
+        """Columns of a table that `read` gives back."""
+        raise NotImplementedError
+
+    def write(self, path: Path, frame: Frame) -> None:
+        """Write a file that reading gives back, whole or not at all.
+
+        Numbers are written with all their digits: in metres reading gives the same ones back, in mm the same to
+        rounding. What stands in `case.toml` (name, role, sigma, node set, boundary, mode) is not in the file.
+
+        Parameters
+        ----------
+        path : Path
+        frame : Frame
+            Unit and axes of the file.
+
+        Raises
+        ------
+        InputError
+            If the ending is not that of such a recording, or the file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix.lower() != self.ending:
+            recording = f"the {self.kind} recording '{self.name}'"
+            raise InputError(f"{path}: {recording} is written as {self.ending}, found '{path.suffix}'")
+        self._write(path, frame)
+
+    def _write(self, path: Path, frame: Frame) -> None:
+        columns = self.columns(frame)
+        values = [column if isinstance(column, tuple) else column.tolist() for column in columns.values()]
+        with whole_file(path) as scratch, scratch.open("w", encoding="utf-8", newline="") as file:
+            file.write(",".join(columns) + "\n")
+            csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC).writerows(zip(*values, strict=True))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrackedPoints:
+    """What a file tells of tracked points: where each was and how far it went.
+
+    Attributes
+    ----------
+    points, displacement : (n, 3) array
+        [m], RAS.
+    time : (n,) array or None
+        [s]
+    ids : tuple of n str, or None
+    sigmas : (n,) array or None
+        Noise of one component of each point [m]; takes precedence over that of the recording.
+    weights : (n,) array or None
+    """
+
+    points: Floats
+    displacement: Floats
+    time: Floats | None = None
+    ids: tuple[str, ...] | None = None
+    sigmas: Floats | None = None
+    weights: Floats | None = None
+
+
+def column_of_time(time: Floats | None) -> Columns:
+    """The column t, if there are times."""
+    return {} if time is None else {"t": time}
+
+
+def columns_of_vectors(names: Sequence[str], values: Floats) -> Columns:
+    """Vectors (n, k) as k columns."""
+    return dict(zip(names, np.asarray(values).T, strict=True))

@@ -1,0 +1,91 @@
+"""The resultant with which a boundary acts on a body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from warpbrain.arrays import Floats
+from warpbrain.frame import Frame
+from warpbrain.keys import Key
+from warpbrain.problems import Problems
+from warpbrain.recordings.base import REFERENCE, Columns, Recording
+from warpbrain.recordings.tables import read_csv
+from warpbrain.recordings.text import collected
+
+FORCE = ("fx", "fy", "fz")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ForceRecording(Recording):
+    """The resultant with which a boundary acts on the tissue.
+
+    Attributes
+    ----------
+    boundary : str
+        Name of the boundary.
+    time : (n,) array
+        [s], increasing.
+    force : (n, 3) array
+        [N]; a component that was not recorded is NaN throughout.
+    torque : (n,) array or None
+        [N m]
+    """
+
+    kind: ClassVar[str] = "force"
+    keys: ClassVar[tuple[Key, ...]] = (
+        Key("boundary", "text", "Name of the boundary that acts with it.", needed=True),
+        REFERENCE,
+    )
+    boundary: str
+    time: Floats
+    force: Floats
+    torque: Floats | None = None
+
+    @classmethod
+    def read(
+        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
+    ) -> Self | None:
+        """Read ``.csv``: columns ``t`` [s] and one or more of ``fx``, ``fy``, ``fz`` [N] and ``torque`` [N m].
+
+        See `Recording.read`; `sigma` is of the force, or of the torque if that is all there is.
+        """
+        with collected(path, problems) as found:
+            table = read_csv(path, found, ("t", *FORCE, "torque"))
+            if table is None:
+                return None
+            recorded = [column for column in FORCE if column in table]
+            if not recorded and "torque" not in table:
+                table.require("fx")
+            time = table.times(strictly=True) if table.require("t") else None
+            force = np.full((len(table), 3), np.nan)
+            for column in recorded:
+                force[:, FORCE.index(column)] = table.numbers(column)
+            torque = table.numbers("torque") if "torque" in table else None
+        if time is None or found:
+            return None
+        return cls(time=time, force=frame.directions(force), torque=torque, sigma=sigma, **given)
+
+    @property
+    def count(self) -> int:
+        return len(self.time)
+
+    @property
+    def components(self) -> int:
+        return int(np.isfinite(self.force).all(axis=0).sum())
+
+    @property
+    def noise_unit(self) -> str:
+        return "N"
+
+    @property
+    def content(self) -> str:
+        return f"{self.count} forces on '{self.boundary}'"
+
+    def columns(self, frame: Frame) -> Columns:
+        force = zip(FORCE, frame.directions(self.force).T, strict=True)
+        columns: Columns = {"t": self.time, **{name: values for name, values in force if np.isfinite(values).all()}}
+        return columns if self.torque is None else columns | {"torque": self.torque}

@@ -1,0 +1,140 @@
+"""Points on a moved surface of a body, not paired with places of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from warpbrain.arrays import Floats
+from warpbrain.atomic import whole_file
+from warpbrain.errors import InputError
+from warpbrain.frame import Frame
+from warpbrain.keys import Key
+from warpbrain.mesh import TetMesh
+from warpbrain.mesh.surface import Ints
+from warpbrain.mesh.vtu import write_vtu
+from warpbrain.problems import Problems
+from warpbrain.recordings.base import (
+    POSITION,
+    REFERENCE,
+    Columns,
+    Recording,
+    column_of_time,
+    columns_of_vectors,
+)
+from warpbrain.recordings.inside import check_possible, check_surface_near
+from warpbrain.recordings.markups import is_markup, read_markup
+from warpbrain.recordings.surfaces import read_surface_mesh
+from warpbrain.recordings.tables import Table, read_table
+from warpbrain.recordings.text import collected
+
+NORMAL = ("nx", "ny", "nz")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SurfaceRecording(Recording):
+    """Points on a moved surface, unpaired: compared with the moved faces of a node set.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        [m]
+    nodes : str
+        Name of the node set whose faces are the surface.
+    normals : (n, 3) array or None
+        Unit normals.
+    faces : (k, 3) int array or None
+        Triangles, if a surface mesh was recorded.
+    """
+
+    kind: ClassVar[str] = "surface"
+    keys: ClassVar[tuple[Key, ...]] = (
+        Key("nodes", "text", "Node set whose faces are compared with it.", needed=True),
+        REFERENCE,
+    )
+    points: Floats
+    nodes: str
+    normals: Floats | None = None
+    faces: Ints | None = None
+
+    @classmethod
+    def read(
+        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
+    ) -> Self | None:
+        """Read ``.csv``, a 3D Slicer markup or a surface mesh; see `Recording.read`.
+
+        A CSV file has columns ``x,y,z`` and perhaps ``t`` [s] and ``nx,ny,nz``; of a mesh (``.vtp``, ``.stl``,
+        ``.ply``, ``.obj``, ``.vtu``, ...) points and triangles are taken. Axes that a mesh states itself take
+        precedence, and a markup is in mm and its own.
+        """
+        points: Floats | None = None
+        normals = faces = time = None
+        with collected(path, problems) as found:
+            if path.suffix.lower() == ".csv":
+                table = read_table(path, found, (*POSITION, *NORMAL, "t"))
+                if table is not None and table.require(*POSITION):
+                    points = frame.lengths(table.vectors(*POSITION))
+                    normals = _normals(table, frame)
+                    time = table.times(strictly=False) if "t" in table else None
+            elif is_markup(path):
+                markup = read_markup(path, found)
+                points = markup.points if markup is not None else None
+            else:
+                mesh = read_surface_mesh(path, found)
+                if mesh is not None:
+                    if mesh.axes not in (None, frame.axes):
+                        found.remark(path, f"the file says that its axes are {mesh.axes}, which counts for it")
+                    points = Frame(frame.unit, mesh.axes or frame.axes).lengths(mesh.points)
+                    faces = mesh.faces
+        if points is None or found:
+            return None
+        noise = None if sigma is None else frame.metres * sigma
+        return cls(sigma=noise, points=points, normals=normals, faces=faces, time=time, **given)
+
+    @property
+    def count(self) -> int:
+        return len(self.points)
+
+    @property
+    def content(self) -> str:
+        return f"{self.count} points of the moved surface '{self.nodes}', not paired"
+
+    def check(self, mesh: TetMesh, path: Path, problems: Problems) -> None:
+        check_possible(mesh, path, problems, [self.sigma])
+        check_surface_near(self.points, mesh, self.nodes, f"recording '{self.name}'", path, problems)
+
+    @property
+    def ending(self) -> str:
+        return ".csv" if self.faces is None else ".vtu"
+
+    def columns(self, frame: Frame) -> Columns:
+        columns = columns_of_vectors(POSITION, frame.file_lengths(self.points)) | column_of_time(self.time)
+        if self.normals is not None:
+            columns |= columns_of_vectors(NORMAL, frame.directions(self.normals))
+        return columns
+
+    def _write(self, path: Path, frame: Frame) -> None:
+        if self.faces is None:
+            super()._write(path, frame)
+            return
+        import meshio
+
+        if self.time is not None or self.normals is not None:
+            raise InputError(f"{path}: a surface with triangles is written without times and normals; leave them out")
+        mesh = meshio.Mesh(frame.file_lengths(self.points), [("triangle", self.faces)])
+        with whole_file(path) as scratch:
+            write_vtu(scratch, mesh, frame.axes)
+
+
+def _normals(table: Table, frame: Frame) -> Floats | None:
+    """Unit normals (n, 3), RAS; all three columns or none of them."""
+    if not any(column in table for column in NORMAL) or not table.require(*NORMAL):
+        return None
+    normals = frame.directions(table.vectors(*NORMAL))
+    lengths = np.linalg.norm(normals, axis=1)
+    for index in np.flatnonzero(lengths == 0.0):
+        table.problem(int(index), "nx", "found a normal of length zero, expected a direction")
+    return normals / np.where(lengths > 0.0, lengths, 1.0)[:, None]
