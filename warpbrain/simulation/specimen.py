@@ -307,29 +307,28 @@ class Rig:
         min_J = found.history[-1].min_J if found.history else 1.0
         return _State(value, response, len(found.history), min_J, found.unstable_iterations)
 
-    def _impose(self, recording: TestRecording, value: float) -> None:
-        prescribed = np.where(self._led[:, None], self._platen(recording, value), 0.0)
-        model = self.system.model
-        # what a system is made from does not hold the prescribed values: only its solver asks the model for them
-        self.system.model = replace(model, prescribed=prescribed * model.constrained)
-
     def _step(self, recording: TestRecording, value: float, start: Floats, h: float, time: float) -> Equilibrium:
         """The state a time step `h` after another, at a time."""
-        return self._solved(recording, value, lambda: self.solver.step(start, h, time), at=f" at {time:.4g} s")
+        return self._solved(recording, value, lambda u: self.solver.step(start, h, time, u), at=f" at {time:.4g} s")
 
     def _equilibrium(
         self, recording: TestRecording, value: float, previous: float, start: Floats | None
     ) -> Equilibrium:
         """Equilibrium at an imposed value, from the state `start` at the value before it."""
         came = f", coming from {SHOWN[recording.quantities[0]][0] * previous:.4g}"
-        return self._solved(recording, value, lambda: self.solver.solve(start=start), came=came)
+        return self._solved(recording, value, lambda u: self.solver.solve(start=start, prescribed=u), came=came)
 
     def _solved(
-        self, recording: TestRecording, value: float, solve: Callable[[], Equilibrium], at: str = "", came: str = ""
+        self,
+        recording: TestRecording,
+        value: float,
+        solve: Callable[[Floats], Equilibrium],
+        at: str = "",
+        came: str = "",
     ) -> Equilibrium:
-        self._impose(recording, value)
+        led = np.where(self._led[:, None], self._platen(recording, value), 0.0)
         try:
-            return solve()
+            return solve(led * self.system.model.constrained)
         except SolveError as error:
             factor, unit = SHOWN[recording.quantities[0]]
             raise SolveError(

@@ -125,7 +125,7 @@ class System:
     def __init__(self, model: Model, device: str | None = None, precision: str = "double") -> None:
         require_kind(model, Model, "model", "a Model, as warpbrain.model_of(case) gives")
         start = time.perf_counter()
-        self.model = model
+        self._model = model
         self.device = find_device(device)
         self.precision = find_precision(precision)
         self.quadratic = model.quadratic
@@ -154,6 +154,11 @@ class System:
         self._place_fields()
         self.set_load()
         self.seconds = time.perf_counter() - start
+
+    @property
+    def model(self) -> Model:
+        """What is assumed; other numbers of it are set by `set_model` alone."""
+        return self._model
 
     # -- pre-processing -------------------------------------------------------------------------------------------
 
@@ -267,8 +272,8 @@ class System:
         """Other values of parameters in the same arrays: nothing is pre-processed again.
 
         A captured graph sees them. A mechanism's term is made anew from its mechanism and its arrays are copied into
-        those that are there; what it remembers stays. Of loads and prescribed displacements nothing is kept here: they
-        are asked of the model.
+        those that are there; what it remembers stays. Of loads and prescribed displacements nothing is kept here: the
+        model is asked for them.
 
         Parameters
         ----------
@@ -289,7 +294,7 @@ class System:
         before = self.model
         self._require_alike(model)
         # terms ask their body for its moduli
-        self.model = model
+        self._model = model
         others: dict[int, Term] = {}
         try:
             pairs = zip(before.mechanisms, model.mechanisms, strict=True)
@@ -306,7 +311,7 @@ class System:
                         f"mechanism {changed[place]}: acts on other nodes, or has more numbers, than before"
                     )
         except InputError:
-            self.model = before
+            self._model = before
             raise
         for place, term in enumerate(self._following):
             if place in others:
