@@ -8,8 +8,9 @@ sparse, and symmetric:
 
 but indefinite: MINRES (`warpbrain.kernels.minimal_residual`), preconditioned by the inverse diagonal blocks of `K` and
 the diagonal of `A + w B diag(K)^-1 B^T`. Of several such terms, as of two fluids in one skeleton, `p` are the unknowns
-of each in turn: they meet in the displacement alone, so `A` has a block for each term. `A` is next to nothing where fluid has no time to flow; what is left of the
-second row is a force many times larger. So a solve ends only when the residual of the eliminated system is small.
+of each in turn: they meet in the displacement alone, so `A` has a block for each term. `A` is next to nothing where
+fluid has no time to flow; what is left of the second row is a force many times larger. So a solve ends only when the
+residual of the eliminated system is small.
 """
 
 from __future__ import annotations
