@@ -30,13 +30,13 @@ from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.device import grown
 from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import Term
-from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
+from warpbrain.simulation.assembly import Assembly
+from warpbrain.simulation.averaged import PART, AveragedTerm, Patches, averaged_modulus, own_modulus, patches_of
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
 from warpbrain.simulation.factored import FactoredSolver, KeptFactors
 from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
-from warpbrain.simulation.placed import placed_mesh, placed_pattern
 
 
 def find_device(name: str | None) -> wp.Device:
@@ -167,9 +167,9 @@ class System:
 
     def _place_mesh(self) -> None:
         mesh, p = self.model.mesh, self.precision
-        placed = placed_mesh(mesh, self.device, p)
-        self.tetrahedra, self.shape_gradients = placed.tetrahedra, placed.shape_gradients
-        self.nodes, self.inverse_edges = placed.nodes, placed.inverse_edges
+        self.assembly = a = Assembly.of(mesh, self.device, p)
+        self.tetrahedra, self.shape_gradients = a.tetrahedra, a.shape_gradients
+        self.nodes, self.inverse_edges = a.nodes, a.inverse_edges
         self.stencils, self.element_nodes = self.tetrahedra, self.nodes
         if self.quadratic is not None:
             self.stencils = self.quadratic.elements
@@ -181,7 +181,7 @@ class System:
     def _place_pattern(self) -> None:
         p = self.precision
         stencils = [self.stencils, *(term.stencils for term in self.terms)]
-        pattern = placed_pattern(self.model.mesh, stencils, self.size, self.device)
+        pattern = self.assembly.pattern(stencils, self.size)
         self.pairs, self.pair_positions, self.pair_first = pattern.pairs, pattern.positions, pattern.first
         self.contributions, self.block_pairs = pattern.contributions, pattern.block_pairs
         self.corner_first, self.corners = pattern.corner_first, pattern.corners
@@ -199,12 +199,17 @@ class System:
             device_law = grown(device_law) if self.model.growing else device_law
             linear = self.quadratic is None
             kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
-            averaged = (
-                averaged_terms(self, list(materials), kernels, self.model.element_kinds) if self._averages else []
-            )
+            averaged = [AveragedTerm(self, patches, kernels) for patches in self._patches(list(materials))]
             parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
             groups.append(ElementGroup(kernels, self._array(members, int), parameters, averaged))
         return groups
+
+    def _patches(self, labels: list[int]) -> list[Patches]:
+        """Of tissues that share a law, where elements are averaged."""
+        if not self._averages:
+            return []
+        kinds = self.model.element_kinds
+        return self.assembly.once("patches", [np.array(labels), kinds], lambda: patches_of(self, labels, kinds))
 
     @property
     def _averages(self) -> bool:

@@ -1,15 +1,10 @@
-"""What a device is told of a mesh and of a pattern: made once for each mesh, and read by every system of it.
-
-Nothing here changes with a model's numbers, and no system writes to it. Meshes that differ in their node sets only
-share it, and it lives as long as one of them does.
-"""
+"""What is made once for a mesh on a device, and read by every system of it: elements, and patterns of matrices."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from hashlib import sha256
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import warp as wp
@@ -18,6 +13,8 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Floats
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +112,14 @@ def build_pattern(stencils: Sequence[NDArray[np.integer]], count: int) -> Patter
     )
 
 
-@dataclass(frozen=True, eq=False)
-class PlacedMesh:
-    """The elements of a mesh.
+#: Of each kind of thing made of arrays, how many are kept: patterns of a finer mesh take a tenth of a gigabyte.
+_KEPT = 6
+
+
+class Assembly:
+    """The elements of a mesh on a device, and what else no number of a model changes.
+
+    All systems of a mesh share it: of every hypothesis, sample and sensitivity, and of specimens.
 
     Attributes
     ----------
@@ -130,44 +132,39 @@ class PlacedMesh:
     inverse_edges : wp.array of mat33, shape (m,)
     """
 
-    tetrahedra: NDArray[np.int32]
-    shape_gradients: Floats
-    nodes: wp.array
-    inverse_edges: wp.array
+    def __init__(self, mesh: TetMesh, device: wp.Device, precision: Precision) -> None:
+        self._device = device
+        self.tetrahedra: NDArray[np.int32] = np.sort(mesh.tetrahedra, axis=1)
+        edges = mesh.points[self.tetrahedra[:, 1:]] - mesh.points[self.tetrahedra[:, :1]]
+        self.shape_gradients: Floats = np.linalg.inv(edges.transpose(0, 2, 1)).astype(np.float64, copy=False)
+        self.nodes = wp.array(self.tetrahedra, dtype=wp.vec4i, device=device)
+        self.inverse_edges = wp.array(self.shape_gradients, dtype=precision.mat33, device=device)
+        self._made: dict[str, list[tuple[list[NDArray[Any]], Any]]] = {}
 
+    @classmethod
+    def of(cls, mesh: TetMesh, device: wp.Device, precision: Precision) -> Assembly:
+        """That of a mesh, which meshes share that differ in their node sets only; it lives as long as one of them."""
+        made, key = mesh.shared.setdefault("assemblies", {}), (device.alias, precision.name)
+        if key not in made:
+            made[key] = cls(mesh, device, precision)
+        return made[key]
 
-#: Patterns of one mesh at most: those of a finer mesh take a tenth of a gigabyte.
-_PATTERNS = 6
+    def once(self, kind: str, arrays: Sequence[NDArray[Any]], make: Callable[[], T]) -> T:
+        """What was made of the same arrays before, or is made now; the last few of a kind are kept."""
+        made = self._made.setdefault(kind, [])
+        for earlier, value in made:
+            if len(earlier) == len(arrays) and all(map(np.array_equal, earlier, arrays)):
+                return value
+        value = make()
+        made[:] = [*made[1 - _KEPT :], (list(arrays), value)]
+        return value
 
+    def pattern(self, stencils: Sequence[NDArray[np.integer]], count: int) -> Pattern:
+        """The pattern of families of stencils over `count` nodes on the device; see `build_pattern`."""
 
-def placed_mesh(mesh: TetMesh, device: wp.Device, precision: Precision) -> PlacedMesh:
-    """The elements of a mesh on a device."""
-    known, key = mesh.shared.setdefault("placed", {}), (device.alias, precision.name)
-    if key not in known:
-        tetrahedra = np.sort(mesh.tetrahedra, axis=1)
-        edges = mesh.points[tetrahedra[:, 1:]] - mesh.points[tetrahedra[:, :1]]
-        gradients: Floats = np.linalg.inv(edges.transpose(0, 2, 1)).astype(np.float64, copy=False)
-        nodes = wp.array(tetrahedra, dtype=wp.vec4i, device=device)
-        known[key] = PlacedMesh(tetrahedra, gradients, nodes, wp.array(gradients, dtype=precision.mat33, device=device))
-    return known[key]
+        def make() -> Pattern:
+            kinds = {"pairs": wp.vec2i, "positions": wp.vec2i}
+            arrays = vars(build_pattern(stencils, count)).items()
+            return Pattern(**{k: wp.array(v, dtype=kinds.get(k, int), device=self._device) for k, v in arrays})
 
-
-def placed_pattern(mesh: TetMesh, stencils: Sequence[NDArray[np.integer]], count: int, device: wp.Device) -> Pattern:
-    """The pattern of families of stencils over `count` nodes on a device; see `build_pattern`."""
-    said = sha256()
-    for nodes in stencils:
-        said.update(str((nodes.shape, nodes.dtype)).encode())
-        said.update(np.ascontiguousarray(nodes).tobytes())
-    known, key = mesh.shared.setdefault("patterns", {}), (device.alias, count, said.digest())
-    if key not in known:
-        for oldest in list(known)[: max(len(known) + 1 - _PATTERNS, 0)]:
-            known.pop(oldest, None)
-        pattern = build_pattern(stencils, count)
-        kinds = {"pairs": wp.vec2i, "positions": wp.vec2i}
-        known[key] = Pattern(
-            **{
-                name: wp.array(values, dtype=kinds.get(name, int), device=device)
-                for name, values in vars(pattern).items()
-            }
-        )
-    return known[key]
+        return self.once("pattern", [*stencils, np.array(count)], make)
