@@ -24,52 +24,24 @@ class Pattern:
     What acts is a number of families of stencils: the four nodes of every tetrahedron, the three of every triangle that
     a pressure acts on. A stencil of s nodes has s forces and s (s + 1) / 2 blocks, those of its node pairs (a, b),
     a <= b, row by row. Forces and blocks of all families lie one after the other in one array each.
-
-    Attributes
-    ----------
-    offsets : (n + 1,) int
-        Start of each block row in `columns`.
-    columns : (nnz,) int
-        Block column of each stored block, ascending within a row.
-    diagonal : (n,) int
-        Position of each diagonal block.
-    block_pairs : (nnz,) int
-        Pair whose block is stored there, or -1 - pair where its transpose is.
-    pairs : (p, 2) int
-        Node pairs i <= j that share a stencil.
-    positions : (p, 2) int
-        Positions of the blocks (i, j) and (j, i) of each pair.
-    first : (p + 1,) int
-        Start of each pair's list in `contributions`.
-    contributions : (b,) int
-        Stencil blocks that add up to the pair's block, ascending.
-    corner_first : (n + 1,) int
-        Start of each node's list in `corners`.
-    corners : (c,) int
-        Stencil forces on the node, ascending.
     """
 
-    offsets: Any
-    columns: Any
-    diagonal: Any
-    block_pairs: Any
-    pairs: Any
-    positions: Any
-    first: Any
-    contributions: Any
-    corner_first: Any
-    corners: Any
+    offsets: Any  # start of each block row in `columns`
+    columns: Any  # block column of each stored block, ascending within a row
+    diagonal: Any  # position of each diagonal block
+    block_pairs: Any  # pair whose block is stored there, or -1 - pair where its transpose is
+    pairs: Any  # node pairs i <= j that share a stencil
+    positions: Any  # positions of the blocks (i, j) and (j, i) of each pair
+    first: Any  # start of each pair's list in `contributions`
+    contributions: Any  # stencil blocks that add up to the pair's block, ascending
+    corner_first: Any  # start of each node's list in `corners`
+    corners: Any  # stencil forces on the node, ascending
 
 
 def build_pattern(stencils: Sequence[NDArray[np.integer]], count: int) -> Pattern:
-    """Make the pattern of families of stencils.
+    """Make the pattern of families of stencils over `count` nodes, each of which is in a stencil.
 
-    Parameters
-    ----------
-    stencils : sequence of (k, s) int arrays
-        Node ids, ascending in each row, so that every block of a pair (a, b), a <= b, belongs to nodes i <= j.
-    count : int
-        Number of nodes; each must be in a stencil.
+    Node ids (k, s) ascend in each row, so that every block of a pair (a, b), a <= b, belongs to nodes i <= j.
     """
     keys = []
     for nodes in stencils:

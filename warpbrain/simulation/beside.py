@@ -41,21 +41,9 @@ _STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
 class Beside:
     """Places beside each of p parameters.
 
-    Parameters
-    ----------
-    system : System
-    models : callable
-        From parameters (p,) to models; smooth, and defined a little around `theta`.
-    theta : (p,) array
-    scales : (p,) array, optional
-        By how much each must change to change much; by default its size, or 1 if that is less or nothing.
-
-    Attributes
-    ----------
-    model : Model
-        At `theta`.
-    steps : (p,) array
-        `h` of each parameter.
+    `models`, from parameters (p,) to models, is smooth and defined a little around `theta` (p,), where the `model` is.
+    `scales` (p,) say by how much each must change to change much; by default its size, or 1 if that is less or nothing.
+    `steps` (p,) are the `h` of each.
     """
 
     def __init__(self, system: System, models: ModelOf, theta: ArrayLike, scales: ArrayLike | None = None) -> None:

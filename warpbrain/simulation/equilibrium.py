@@ -33,31 +33,15 @@ _TERMS = 2.0
 
 @dataclass(frozen=True)
 class NewtonStep:
-    """One line of the solver's history.
+    """One line of the solver's history."""
 
-    Attributes
-    ----------
-    load : float
-        Load fraction that is being solved for.
-    iteration : int
-        Newton iteration within the load step, from 1.
-    residual : float
-        Norm of the out-of-balance force before the iteration, relative to the forces in play.
-    cg_iterations : int
-    step : float
-        Length of the accepted step, 1 for a full one.
-    min_J : float
-        Smallest volume ratio after the step.
-    indefinite : bool
-        The tangent was seen not to be positive definite, and a multiple of the mass was added to it until it was.
-    """
-
-    load: float
-    iteration: int
-    residual: float
+    load: float  # load fraction that is being solved for
+    iteration: int  # Newton iteration within the load step, from 1
+    residual: float  # norm of the out-of-balance force before the iteration, relative to the forces in play
     cg_iterations: int
-    step: float
-    min_J: float
+    step: float  # length of the accepted step, 1 for a full one
+    min_J: float  # smallest volume ratio after the step
+    #: the tangent was seen not to be positive definite, and a multiple of the mass was added to it until it was
     indefinite: bool = False
 
 

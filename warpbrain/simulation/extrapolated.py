@@ -13,16 +13,10 @@ _STRETCH = 0.01
 
 
 def extrapolated(known: Sequence[tuple[Floats, Floats]], at: Floats) -> Floats:
-    """What is expected of a function of numbers (k,) at some of them, from its values (...) at others.
+    """What is expected of a function of numbers (k,) at some of them, from its values (...) at one or more others.
 
     Of the nearest value, and as much of the differences of others to it as makes up for the distance. It is only where
     to begin: nothing that is found depends on it.
-
-    Parameters
-    ----------
-    known : sequence of pairs of numbers (k,) and values (...)
-        One or more.
-    at : (k,) array
     """
     distances = [float(np.linalg.norm(at - one)) for one, _ in known]
     order = np.argsort(distances, kind="stable").tolist()

@@ -23,15 +23,9 @@ from warpbrain.simulation.of_case import plain_model_of
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GivenForces(Load):
-    """Forces on the nodes of one mesh.
+    """Forces on the nodes of one mesh."""
 
-    Parameters
-    ----------
-    forces : (n, 3) array
-        [N]
-    """
-
-    forces: Floats
+    forces: Floats  # (n, 3) [N]
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         return self.forces
@@ -40,16 +34,9 @@ class GivenForces(Load):
 class FinerCase:
     """A case with every element cut into eight.
 
-    Parameters
-    ----------
-    case : Case
-
-    Attributes
-    ----------
-    case : Case
-        Without its resection, which is done already, and without forces that are shared by nodes: see `spread`.
-    prolongation : scipy.sparse matrix, shape (n', n)
-        From nodal values of the mesh that there was to those on the finer one; linear in every old element.
+    `case` is then without its resection, which is done already, and without forces that are shared by nodes: see
+    `spread`. `prolongation`, SciPy sparse (n', n), is from nodal values of the mesh that there was to those on the
+    finer one; linear in every old element.
     """
 
     def __init__(self, case: Case) -> None:

@@ -38,13 +38,8 @@ def largest_poisson(model: Model) -> float:
 
 
 def choose_elements(model: Model, linear_only: Sequence[str] = ()) -> Choice:
-    """Elements of a model for which nobody asked for any.
-
-    Parameters
-    ----------
-    model : Model
-    linear_only : sequence of str
-        What is to be done with it that cannot be done with nodes in the middle of edges.
+    """Elements of a model for which nobody asked for any; `linear_only` is to be done with it, and cannot be done with
+    nodes in the middle of edges.
     """
     poisson = largest_poisson(model)
     if poisson <= NEARLY_INCOMPRESSIBLE:

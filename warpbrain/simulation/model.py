@@ -68,21 +68,11 @@ class Damping:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A displacement that some nodes are given over time.
+    """A displacement that some nodes are given over time."""
 
-    Attributes
-    ----------
-    nodes : (n,) bool array
-        Of the mesh's own nodes; midside nodes between them follow.
-    times : (k,) array
-        [s], increasing.
-    values : (k, 3) array
-        [m], linear between the times and constant outside them.
-    """
-
-    nodes: Bools
-    times: Floats
-    values: Floats
+    nodes: Bools  # (n,), of the mesh's own nodes; midside nodes between them follow
+    times: Floats  # (k,) [s], increasing
+    values: Floats  # (k, 3) [m], linear between the times and constant outside them
 
     def at(self, time: float) -> Floats:
         """Displacement (3,) [m] at a time [s]."""

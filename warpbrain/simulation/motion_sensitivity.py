@@ -36,26 +36,12 @@ from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, SeveralSolv
 class MotionSensitivity:
     """Steps a simulator, and the derivatives of its motion with it.
 
-    Parameters
-    ----------
-    simulator : Simulator
-        As it is now is where all begins: its state does not depend on the parameters.
-    models : callable
-        From parameters (p,) to a model that differs from the system's in numbers only.
-    theta : (p,) array
-        The simulator goes on with the model of these.
-    scales : (p,) array, optional
-        By how much each must change to change much; see `warpbrain.simulation.beside`.
-    tolerance : float
-        Relative: what may be left of what a parameter puts out of balance in a step.
-    max_cg : int
-        Iterations of a linear solve.
+    As the simulator is now is where all begins: its state does not depend on the parameters `theta` (p,), with whose
+    model it goes on. `models` and `scales` are those of `warpbrain.simulation.sensitivity`; the tolerance is relative,
+    of what a parameter puts out of balance in a step.
 
-    Attributes
-    ----------
-    u, v : (p, n, 3) array
-        Derivatives of displacement [m per unit of the parameter] and velocity [m/s per unit]; zero on constrained
-        components, which move as they are told to whatever the parameters are.
+    `u` and `v` (p, n, 3) are the derivatives of displacement [m per unit of the parameter] and velocity [m/s per unit];
+    zero on constrained components, which move as they are told to whatever the parameters are.
     """
 
     def __init__(
@@ -82,10 +68,7 @@ class MotionSensitivity:
     def step(self) -> None:
         """Advance motion and derivatives by one time step, which then stands: the simulator cannot go back.
 
-        Raises
-        ------
-        SolveError
-            If the step has no derivative, or a linear solve does not converge.
+        `SolveError` if the step has no derivative, or a linear solve does not converge.
         """
         simulator, system, beside = self.simulator, self.simulator.system, self._beside
         u_start, v_start = _host(system.u), _host(simulator.v)
@@ -160,31 +143,13 @@ class MotionSensitivity:
 def follow(
     simulator: Simulator, models: ModelOf, theta: ArrayLike, times: Sequence[float], scales: ArrayLike | None = None
 ) -> Floats:
-    """Derivatives of the displacement at times of a motion.
+    """Derivatives (t, p, n, 3) of the displacement [m per unit of the parameter] at times [s] of a motion that
+    increase.
 
-    Prescribed displacements without a history of their own are reached evenly over the whole.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        At a time before the first; it is at the last afterwards. Its time step is shortened so that a whole number of
-        equal steps leads from each time to the next.
-    models, theta, scales
-        See `MotionSensitivity`.
-    times : sequence of float
-        [s]
-
-    Returns
-    -------
-    (t, p, n, 3) array
-        [m per unit of the parameter]
-
-    Raises
-    ------
-    InputError
-        If the times do not increase.
-    SolveError
-        If a step fails, or has no derivative.
+    Prescribed displacements without a history of their own are reached evenly over the whole. The simulator, at a time
+    before the first, is at the last afterwards; its time step is shortened so that a whole number of equal steps leads
+    from each time to the next. For the others see `MotionSensitivity`. `InputError` if the times do not increase;
+    `SolveError` if a step fails, or has no derivative.
     """
     ends = [simulator.time, *map(float, times)]
     if not times or not all(a < b for a, b in itertools.pairwise(ends)):

@@ -28,19 +28,11 @@ class Statistics:
 
 @dataclass(frozen=True)
 class NodalState:
-    """The state of all nodes, midside nodes among them: what recordings are compared with.
+    """The state of all nodes, midside nodes among them: what recordings are compared with."""
 
-    Attributes
-    ----------
-    mesh : TetMesh
-        Linear tetrahedra with a corner at every node, undeformed.
-    u, reactions : (n, 3) array
-        As those of `Result`.
-    """
-
-    mesh: TetMesh
-    u: Floats
-    reactions: Floats
+    mesh: TetMesh  # linear tetrahedra with a corner at every node, undeformed
+    u: Floats  # (n, 3), as those of `Result`
+    reactions: Floats  # (n, 3), as those of `Result`
 
 
 @dataclass(frozen=True)

@@ -42,14 +42,8 @@ from warpbrain.simulation.system import System
 
 
 class InTurn:
-    """Solves the system's linear systems for several right-hand sides, one after the other.
-
-    Parameters
-    ----------
-    system : System
-    tolerance : float
-        Relative, of each.
-    max_iterations : int
+    """Solves the system's linear systems for several right-hand sides, one after the other; the tolerance is relative,
+    of each.
     """
 
     def __init__(self, system: System, tolerance: float, max_iterations: int) -> None:
@@ -92,32 +86,19 @@ _AUGMENTATIONS = 60
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Derivatives of an equilibrium by p parameters.
+    """Derivatives of an equilibrium by p parameters."""
 
-    Attributes
-    ----------
-    u : (p, n, 3) array
-        Of the displacement [m per unit of the parameter]; on constrained components, of what is prescribed.
-    reactions : (p, n, 3) array
-        Of what holds the constrained components [N per unit]; zero elsewhere.
-    cg_iterations : tuple of p ints
-    """
-
+    #: (p, n, 3), of the displacement [m per unit of the parameter]; on constrained components, of what is prescribed
     u: Floats
-    reactions: Floats
+    reactions: Floats  # (p, n, 3), of what holds the constrained components [N per unit]; zero elsewhere
     cg_iterations: tuple[int, ...]
 
 
 class SensitivitySolver:
     """Differentiates equilibria of one pre-processed model; what it needs is made once.
 
-    Parameters
-    ----------
-    system : System
-    tolerance : float
-        Relative: what may be left of the forces that a parameter puts out of balance. No smaller than rounding allows.
-    max_cg : int
-        Iterations of a linear solve.
+    The tolerance is relative: what may be left of the forces that a parameter puts out of balance, no less than
+    rounding allows.
     """
 
     def __init__(self, system: System, tolerance: float = 1e-10, max_cg: int = 10_000) -> None:
@@ -132,23 +113,13 @@ class SensitivitySolver:
         The system has the model of `theta` and the displacement `u` when this returns. What its terms remember is that
         of the equilibrium, which must be the last that was solved for in it if a term has augmented its constraints.
 
-        Parameters
-        ----------
-        u : (n, 3) array
-            Displacement [m], in equilibrium under the model of `theta` at full load.
-        models : callable
-            From parameters (p,) to a model that differs from the system's in numbers only; smooth, and defined a little
-            around `theta`.
-        theta : (p,) array
-        scales : (p,) array, optional
-            By how much each must change to change much, as `warpbrain.physics.continuous.scales_of` says; by default
-            its size, or 1 if that is less or nothing.
+        `u` (n, 3) [m] is in equilibrium under the model of `theta` (p,) at full load. `models`, from parameters (p,) to
+        a model that differs from the system's in numbers only, is smooth and defined a little around `theta`. `scales`
+        (p,) say by how much each must change to change much, as `warpbrain.physics.continuous.scales_of` does; by
+        default its size, or 1 if that is less or nothing.
 
-        Raises
-        ------
-        SolveError
-            If the equilibrium is unstable, so that it has no derivative, or a linear solve does not converge; or if it
-            is that of a step in which unknowns of a term's own follow the displacement.
+        `SolveError` if the equilibrium is unstable, so that it has no derivative, or a linear solve does not converge;
+        or if it is that of a step in which unknowns of a term's own follow the displacement.
         """
         system = self.system
         if system.coupled:
@@ -231,14 +202,8 @@ class SensitivitySolver:
 
 
 class Corrections:
-    """Solves with the system's matrix as it is now, and counts what they take.
-
-    Parameters
-    ----------
-    solver : SeveralSolver
-    system : System
-    tolerance : float
-        Of the first solve; later ones are rough.
+    """Solves with the system's matrix as it is now, and counts what they take; the first to the tolerance, later ones
+    roughly.
     """
 
     def __init__(self, solver: SeveralSolver, system: System, tolerance: float) -> None:
@@ -284,21 +249,11 @@ def _require_solved(linear: LinearResult, parameter: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Secant:
-    """A difference of two equilibria.
+    """A difference of two equilibria."""
 
-    Attributes
-    ----------
-    nodes : (n,) int array
-        Ids, in the model without, of the nodes that both models have.
-    u : (n, 3) array
-        Displacement with less that without [m].
-    reactions : (n, 3) array
-        Of what holds them [N].
-    """
-
-    nodes: NDArray[np.int64]
-    u: Floats
-    reactions: Floats
+    nodes: NDArray[np.int64]  # (n,), ids, in the model without, of the nodes that both models have
+    u: Floats  # (n, 3), displacement with less that without [m]
+    reactions: Floats  # (n, 3), of what holds them [N]
 
 
 def secant(
@@ -308,21 +263,10 @@ def secant(
     options: EquilibriumOptions | None = None,
     device: str | None = None,
 ) -> Secant:
-    """The difference that a switch makes.
+    """The difference that a switch makes: between two models that are alike but for it.
 
-    Parameters
-    ----------
-    without, present : Model
-        Alike but for the switch.
-    nodes : (n,) int array, optional
-        For each node of `present` its id in `without`; the same ones by default. A resection leaves some.
-    options : EquilibriumOptions, optional
-    device : str, optional
-
-    Raises
-    ------
-    SolveError
-        If one of the two has no equilibrium.
+    `nodes` (n,) are, for each node of `present`, its id in `without`; the same ones by default. A resection leaves
+    some. `SolveError` if one of the two has no equilibrium.
     """
     shared = np.arange(len(present.mesh.points)) if nodes is None else np.asarray(nodes, dtype=np.int64)
     found = []

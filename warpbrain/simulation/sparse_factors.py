@@ -18,18 +18,9 @@ from warpbrain.threads import thread_count
 
 
 class SparseFactors:
-    """Factors `L D L^T` of a symmetric matrix, or `L U` of another.
+    """Factors `L D L^T` of a symmetric matrix, or `L U` of another, SciPy sparse (n, n).
 
-    Parameters
-    ----------
-    matrix : SciPy sparse matrix (n, n)
-    symmetric : bool
-        Whether it is; of a symmetric one the lower triangle is read.
-
-    Raises
-    ------
-    RuntimeError
-        If it is singular.
+    Of a symmetric one the lower triangle is read. `RuntimeError` if it is singular.
     """
 
     def __init__(self, matrix: Any, symmetric: bool = True) -> None:

@@ -50,37 +50,22 @@ SHOWN = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TestResult:
-    """What was simulated of a test.
-
-    Attributes
-    ----------
-    imposed, response : (k,) array
-        The computed curve, `imposed` increasing and with the value at rest among it, or in the order of `time`, in the
-        units of the recording's quantities.
-    predicted : (n,) array
-        The response at the rows of the recording; of a force-controlled test the displacement (stretch, angle).
-    residuals : (n,) array
-        Recorded less predicted.
-    newton : (k,) int array
-        Newton iterations that each state took; 0 at rest.
-    min_J : (k,) array
-        Smallest volume ratio of an element in each state.
-    unstable_iterations : int
-        Newton iterations with an indefinite tangent, see `Equilibrium`: the specimen buckled, or its law softens.
-    time : (k,) array or None
-        Of each state [s]; None if a state depends on the imposed value alone.
-    """
+    """What was simulated of a test."""
 
     # not a test of pytest's
     __test__ = False
+    #: (k,), the computed curve, `imposed` increasing and with the value at rest among it, or in the order of `time`, in
+    #: the units of the recording's quantities
     imposed: Floats
     response: Floats
+    #: (n,), the response at the rows of the recording; of a force-controlled test the displacement (stretch, angle)
     predicted: Floats
-    residuals: Floats
-    newton: Ints
-    min_J: Floats
+    residuals: Floats  # (n,), recorded less predicted
+    newton: Ints  # (k,), Newton iterations that each state took; 0 at rest
+    min_J: Floats  # (k,), smallest volume ratio of an element in each state
+    #: Newton iterations with an indefinite tangent, see `Equilibrium`: the specimen buckled, or its law softens
     unstable_iterations: int
-    time: Floats | None = None
+    time: Floats | None = None  # (k,), of each state [s]; None if a state depends on the imposed value alone
 
     @property
     def r_squared(self) -> float:
@@ -111,32 +96,15 @@ class Rig:
     Between the lubricated walls of a confining chamber, and in a sheet that is stretched alike along two axes, the
     state is homogeneous too: all nodes of that element follow along the axes across z.
 
-    Mechanisms act in full before anything is imposed, between platens that stand as far apart as the specimen was
-    high: what swells then presses on them.
+    Mechanisms act in full before anything is imposed, between platens that stand as far apart as the specimen was high:
+    what swells then presses on them.
 
-    Parameters
-    ----------
-    case : Case
-        With a specimen.
-    device, precision
-        As of `System`.
-    options : EquilibriumOptions, optional
-    elements : str, optional
-        As of `Model`, of glued specimens; by default as `choose_elements` says.
-    mode : str, optional
-        One of `HOMOGENEOUS`, the only one of the rig's tests then.
+    `elements` are as of `Model`, of glued specimens; by default as `choose_elements` says. `mode` is one of
+    `HOMOGENEOUS`, the only one of the rig's tests then. The `system` is in the state that was computed last; the clock
+    of the `solver` has the wall times by phase.
 
-    Attributes
-    ----------
-    system : System
-        In the state that was computed last.
-    solver : EquilibriumSolver
-        Its clock has the wall times by phase.
-
-    Raises
-    ------
-    InputError
-        If the case has no specimen, assumes what means nothing in one, or leaves its law to the generative model.
+    `InputError` if the case has no specimen, assumes what means nothing in one, or leaves its law to the generative
+    model.
     """
 
     def __init__(
@@ -201,21 +169,12 @@ class Rig:
     ) -> TestResult:
         """Simulate a test at the values that were imposed in it.
 
-        Parameters
-        ----------
-        recording : TestRecording
-        steps : int
-            Imposed values from rest to the extreme that is farther from it; see `imposed_values` and, of a test that
-            depends on its history, `history_of`.
-        on_state : callable, optional
-            Called with the share of the states that are done, in (0, 1].
+        `steps` are imposed values from rest to the extreme that is farther from it; see `imposed_values` and, of a test
+        that depends on its history, `history_of`. `on_state` is called with the share of the states that are done, in
+        (0, 1].
 
-        Raises
-        ------
-        InputError
-            If the test is not possible, see `check`.
-        SolveError
-            If no equilibrium is found: in which test, at what imposed value, why.
+        `InputError` if the test is not possible, see `check`; `SolveError` if no equilibrium is found: in which test,
+        at what imposed value, why.
         """
         self.check(recording)
         return self._along(recording)._simulate(recording, steps, on_state)

@@ -48,16 +48,7 @@ class SpecimenRun(Shown):
 class SpecimenRunning:
     """A specimen that is about to be tested; parameters as of `Rig`.
 
-    Attributes
-    ----------
-    tests : tuple of TestRecording
-        What is to be simulated.
-    rig : Rig
-
-    Raises
-    ------
-    InputError
-        If nothing was tested, or a test is not possible.
+    `InputError` if nothing was tested, or a test is not possible.
     """
 
     def __init__(
@@ -83,10 +74,7 @@ class SpecimenRunning:
     def run(self, on_state: Callable[[float, str], None] = lambda _part, _name: None) -> SpecimenRun:
         """Simulate them all; `on_state` is told the part of each test that is done, and its name.
 
-        Raises
-        ------
-        SolveError
-            If a state of a test is not found.
+        `SolveError` if a state of a test is not found.
         """
         return SpecimenRun(self.case, self.rig, tuple(self._tested(recording, on_state) for recording in self.tests))
 
