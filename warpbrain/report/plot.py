@@ -19,7 +19,7 @@ from warpbrain.report.state_files import file_of_estimate
 from warpbrain.report.views import TISSUE_COLOURS
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.run import Run
-from warpbrain.simulation.specimen_run import SpecimenRun
+from warpbrain.simulation.specimen import SpecimenRun
 
 #: What the fields are called that are shown unless another is asked for, and in which colours.
 _UNITS = {

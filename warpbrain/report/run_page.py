@@ -31,7 +31,7 @@ from warpbrain.report.specimen import tests_figure
 from warpbrain.report.summary import SET_TITLES
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, QUIET, VERMILLION
 from warpbrain.simulation.result import Result
-from warpbrain.simulation.specimen_run import Tested
+from warpbrain.simulation.specimen import Tested
 
 #: Ground and letters of what stands on top.
 BADGES = {

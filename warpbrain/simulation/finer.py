@@ -14,8 +14,7 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
-from warpbrain.physics.force import NodalForce
-from warpbrain.physics.load import Load
+from warpbrain.physics.load import Load, NodalForce
 from warpbrain.physics.mechanism import Removing
 from warpbrain.simulation.model import Material, Model, with_mechanisms
 from warpbrain.simulation.of_case import plain_model_of

@@ -29,8 +29,7 @@ from warpbrain.errors import InputError
 from warpbrain.simulation.beside import Beside, ModelOf
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Model
-from warpbrain.simulation.refinement import lengths, refine
-from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, SeveralSolver, several_solver
+from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, SeveralSolver, lengths, refine, several_solver
 
 
 class MotionSensitivity:

@@ -20,8 +20,7 @@ from warpbrain.simulation.model import ELEMENTS, Model, require_held
 from warpbrain.simulation.observation import Observed, observe
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.result import Result, nodal_state_of, result_of
-from warpbrain.simulation.specimen import not_transmitted, specimen_of
-from warpbrain.simulation.specimen_run import SpecimenRun, SpecimenRunning
+from warpbrain.simulation.specimen import SpecimenRun, SpecimenRunning, not_transmitted, specimen_of
 from warpbrain.simulation.system import System
 
 
