@@ -46,8 +46,8 @@ class Ramped:
 def take_turns(ramped: Sequence[Ramped]) -> bool:
     """Whether they are together no more than one of them in full: their factors add up to 1, or the largest of all."""
     # a sum of absolute values of linear functions is largest at an end of a piece
-    times = sorted({time for one in ramped for time, _ in one.ramp})
-    sizes = np.array([[abs(one.factor(time)) for one in ramped] for time in (*times, math.inf)])
+    times = sorted({time for each in ramped for time, _ in each.ramp})
+    sizes = np.array([[abs(each.factor(time)) for each in ramped] for time in (*times, math.inf)])
     return bool(sizes.sum(axis=1).max() <= max(1.0, float(sizes.max())) * (1.0 + _ROUNDING))
 
 

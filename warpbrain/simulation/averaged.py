@@ -90,8 +90,8 @@ class AveragedTerm(Term):
 
     def _sum(self, values: Floats) -> Floats:
         """Sum of `w_e` times values of elements over each patch."""
-        found = np.bincount(self._owner, self._shares * values[self._members], minlength=len(self.stencils))
-        return found.astype(np.float64)
+        sums = np.bincount(self._owner, self._shares * values[self._members], minlength=len(self.stencils))
+        return sums.astype(np.float64)
 
     def set_elements(self, parameters: Floats, weight: Floats) -> None:
         """Take what the elements have: parameters (m, c) of the law, of which each patch takes the mean, and a factor

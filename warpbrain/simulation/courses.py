@@ -212,9 +212,9 @@ def states_at_rest(case: Case, system: System, end: NodalState, tolerance: float
         if number not in reached:
             model = replace(model_of(moments.cases[number]), elements=system.model.elements)
             other = System(model, str(system.device), system.precision.name)
-            found = EquilibriumSolver(other, EquilibriumOptions(tolerance=tolerance)).solve(start=near)
-            other.u.assign(found.u)
+            equilibrium = EquilibriumSolver(other, EquilibriumOptions(tolerance=tolerance)).solve(start=near)
+            other.u.assign(equilibrium.u)
             reached[number] = nodal_state_of(other)
-            near = found.u
+            near = equilibrium.u
         states[at] = reached[number]
     return states

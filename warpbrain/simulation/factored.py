@@ -163,12 +163,12 @@ class CoupledBlock:
         for c in captured.couplings:
             offsets, columns = c.offsets.numpy(), c.columns.numpy()
             components = (3 * columns[:, None] + np.arange(3)).ravel()
-            own = self._root * c.own.numpy().astype(np.float64).ravel() * free[components]
+            coupling = self._root * c.own.numpy().astype(np.float64).ravel() * free[components]
             A, Y = (
                 csr_matrix((values.numpy().astype(np.float64), columns, offsets), shape=(n, n))
                 for values in (c.compliance, c.yielding)
             )
-            parts.append((A, csr_matrix((own, components, 3 * offsets), shape=(n, 3 * n)), Y))
+            parts.append((A, csr_matrix((coupling, components, 3 * offsets), shape=(n, 3 * n)), Y))
         compliances, couplings, yielding = zip(*parts, strict=True)
         self._A = block_diag(compliances, format="csr")
         self._B = vstack(couplings, format="csr")
@@ -229,9 +229,9 @@ def _minimal_residual(
     for k in range(most):
         moved.append(preconditioner(basis[k] / weight))
         v = weight * operator(moved[k])
-        for i, one in enumerate(basis):
-            H[i, k] = one @ v
-            v -= H[i, k] * one
+        for i, vector in enumerate(basis):
+            H[i, k] = vector @ v
+            v -= H[i, k] * vector
         H[k + 1, k] = np.linalg.norm(v)
         begin = length * np.eye(1, k + 2)[0]
         answer = np.linalg.lstsq(H[: k + 2, : k + 1], begin, rcond=None)[0]

@@ -73,8 +73,8 @@ class FinerCase:
             for load in model.loads
             if isinstance(load, NodalForce)
         ]
-        known = plain.materials if materials is None else materials
-        loaded = replace(plain, materials=known, loads=[*plain.loads, *shared], elements=model.elements)
+        materials = plain.materials if materials is None else materials
+        loaded = replace(plain, materials=materials, loads=[*plain.loads, *shared], elements=model.elements)
         return with_mechanisms(loaded, self.case.mechanisms)
 
     @cached_property

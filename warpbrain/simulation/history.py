@@ -36,12 +36,12 @@ class History:
         """A computed response (k,) at any times between the first and the last; smooth between corners, not at them."""
         from scipy.interpolate import PchipInterpolator
 
-        found = np.full(len(time), response[0])
+        values = np.full(len(time), response[0])
         for a, b in zip(self.corners[:-1], self.corners[1:], strict=True):
             within = (time >= self.time[a]) & (time <= self.time[b])
             curve = PchipInterpolator(self.time[a : b + 1], response[a : b + 1])
-            found[within] = curve(time[within])
-        return found
+            values[within] = curve(time[within])
+        return values
 
 
 def history_of(

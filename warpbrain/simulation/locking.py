@@ -84,9 +84,9 @@ def elements_of_fits(poisson: float) -> str:
     return "tet4" if poisson <= NEARLY_INCOMPRESSIBLE else "tet4-averaged"
 
 
-def on_linear_elements(poisson: float, what: str) -> list[str]:
+def on_linear_elements(poisson: float, user: str) -> list[str]:
     """What is to be said of something that has linear tetrahedra only, of nearly incompressible tissue."""
     if poisson <= NEARLY_INCOMPRESSIBLE:
         return []
     elements = elements_of_fits(poisson)
-    return locking_sentences(elements, poisson, f"{what} has no other elements, and allows for what smaller ones show")
+    return locking_sentences(elements, poisson, f"{user} has no other elements, and allows for what smaller ones show")

@@ -95,8 +95,8 @@ def mesh_error(
 
     def solve(elements: str, small: bool, start: Floats) -> State:
         solved = replace(finer.model(model) if small and finer is not None else model, elements=elements)
-        what = "half the size" if small else elements
-        say = (lambda share: None) if on_share is None else (lambda share: on_share(share, what))
+        label = "half the size" if small else elements
+        say = (lambda share: None) if on_share is None else (lambda share: on_share(share, label))
         try:
             if steps is None:
                 return _equilibrium(System(solved, device), start, say)
@@ -115,8 +115,9 @@ def observe_without(case: Case, result: Result, error: MeshError, time: float | 
 def _equilibrium(system: System, start: Floats, say: Callable[[float], None]) -> NodalState:
     say(0.0)
     options = EquilibriumOptions(tolerance=TOLERANCE)
-    found = EquilibriumSolver(system, options, lambda step: say(step.load)).solve(start=start)
-    return NodalState(system.mesh, found.u, system.model.reactions(found.internal, system.model.external_forces()))
+    equilibrium = EquilibriumSolver(system, options, lambda step: say(step.load)).solve(start=start)
+    reactions = system.model.reactions(equilibrium.internal, system.model.external_forces())
+    return NodalState(system.mesh, equilibrium.u, reactions)
 
 
 def _motion(system: System, steps: int, say: Callable[[float], None]) -> NodalState:

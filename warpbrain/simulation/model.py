@@ -183,15 +183,14 @@ class Model:
     def prescribed_at(self, time: float, share: float) -> Floats:
         """Prescribed displacements (n, 3) [m] at a time [s]; a `share` of those that have no history."""
         displacement = share * self.prescribed
-        own = displacement[: len(self.mesh.points)]
-        moved: Bools = np.zeros(len(own), dtype=bool)
+        corners = displacement[: len(self.mesh.points)]
+        moved: Bools = np.zeros(len(corners), dtype=bool)
         for motion in self.motions:
-            own[motion.nodes] = motion.at(time)
+            corners[motion.nodes] = motion.at(time)
             moved[motion.nodes] = True
         if self.quadratic is not None and self.motions:
-            beside = np.any(moved[self.quadratic.ends], axis=1, keepdims=True)
-            follow = np.logical_and(self.constrained, beside)
-            displacement[follow] = self.quadratic.between(own)[follow]
+            follows = self.constrained & np.any(moved[self.quadratic.ends], axis=1, keepdims=True)
+            displacement[follows] = self.quadratic.between(corners)[follows]
         return displacement
 
     @property
@@ -321,11 +320,11 @@ def with_mechanisms(model: Model, mechanisms: Sequence[Mechanism]) -> Model:
 
 def all_substituted(materials: Mapping[int, Material], mechanisms: Iterable[Mechanism]) -> dict[int, Material]:
     """The materials of tissues as those mechanisms that say something of their law have them, in their order."""
-    found = dict(materials)
+    substitutes = dict(materials)
     for mechanism in mechanisms:
         if isinstance(mechanism, Substituting):
-            found = substituted(found, mechanism)
-    return found
+            substitutes = substituted(substitutes, mechanism)
+    return substitutes
 
 
 def substituted(materials: Mapping[int, Material], mechanism: Substituting) -> dict[int, Material]:
@@ -355,9 +354,9 @@ def require_held(model: Model) -> None:
             motions[:, :, 3 + axis] = np.cross(np.eye(3)[axis], x) / size
         held = motions[model.constrained[members]]
         for nodes, directions in holding:
-            own = np.isin(nodes, members)
-            rows = motions[np.searchsorted(members, nodes[own])]
-            held = np.concatenate([held, np.einsum("ki,kij->kj", directions[own], rows)])
+            inside = np.isin(nodes, members)
+            rows = motions[np.searchsorted(members, nodes[inside])]
+            held = np.concatenate([held, np.einsum("ki,kij->kj", directions[inside], rows)])
         rank = int(np.linalg.matrix_rank(held, tol=1e-6)) if len(held) else 0
         if rank < 6:
             where = 1000.0 * mesh.points[members].mean(axis=0)

@@ -84,14 +84,14 @@ def displacement_statistics(mesh: TetMesh, u: Floats) -> Mapping[str, Statistics
     groups = {"all nodes": np.ones(len(sizes), dtype=bool), **mesh.node_sets}
     return {
         name: Statistics(
-            nodes=len(own),
-            mean=float(own.mean()),
-            root_mean_square=float(np.sqrt(np.mean(own**2))),
-            percentile_95=float(np.percentile(own, 95.0)),
-            largest=float(own.max()),
+            nodes=len(lengths),
+            mean=float(lengths.mean()),
+            root_mean_square=float(np.sqrt(np.mean(lengths**2))),
+            percentile_95=float(np.percentile(lengths, 95.0)),
+            largest=float(lengths.max()),
         )
         for name, members in groups.items()
-        if len(own := sizes[members])
+        if len(lengths := sizes[members])
     }
 
 

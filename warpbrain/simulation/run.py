@@ -63,9 +63,8 @@ class Run(Shown):
     @property
     def errors(self) -> Mapping[str, tuple[float, float]]:
         """Root mean square distance to each recording before and after, in its unit (m, N)."""
-        return {
-            one.name: (one.before.root_mean_square, one.after.root_mean_square) for one in self.observed.comparisons
-        }
+        each = self.observed.comparisons
+        return {c.name: (c.before.root_mean_square, c.after.root_mean_square) for c in each}
 
 
 class Running:

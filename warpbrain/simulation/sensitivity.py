@@ -7,8 +7,8 @@ ones are where `theta` prescribes them. Hence
     dR/dtheta = dr/dtheta |_u + K du/dtheta            on the constrained ones, of the reactions `R`
 
 The whole derivative is one five-point difference along the way `(theta + d h e_k, u + d h du_k)`
-(`warpbrain.simulation.beside`), and `du_k` is corrected with the tangent that is stored until nothing is left of it
-(`refine`): once where the stored tangent is the true one.
+(`warpbrain.simulation.parameter_stencil`), and `du_k` is corrected with the tangent that is stored until nothing is
+left of it (`refine`): once where the stored tangent is the true one.
 
 A constraint that is met by augmentation (contact) is met beside `theta` too: the multipliers there are augmented along
 the same way, and all is balanced again, until nothing changes.
@@ -34,9 +34,9 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
 from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
-from warpbrain.simulation.beside import Beside, ModelOf
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Model
+from warpbrain.simulation.parameter_stencil import ModelOf, ParameterStencil
 from warpbrain.simulation.system import System
 
 #: Directions before it gives up.
@@ -125,14 +125,14 @@ class InTurn:
 
     def solve(self, right_hand_sides: Sequence[Floats], tolerance: float | None = None) -> Floats:
         """Solve from zero for right-hand sides (n, 3), which are zero on constrained components: (count, n, 3)."""
-        found, self._results = [], []
+        solutions, self._results = [], []
         for b in right_hand_sides:
             self._system.load.assign(b)
             self._system.solution.zero_()
             self._solver.solve(tolerance)
             self._results.append(self._solver.result())
-            found.append(self._system.solution.numpy().astype(np.float64))
-        return np.array(found)
+            solutions.append(self._system.solution.numpy().astype(np.float64))
+        return np.array(solutions)
 
     def results(self) -> list[LinearResult]:
         """How the last solve ended, for each right-hand side."""
@@ -197,47 +197,47 @@ class SensitivitySolver:
             )
         system.set_load()
         state = np.array(u, dtype=np.float64)
-        beside = Beside(system, models, theta, scales)
+        stencil = ParameterStencil(system, models, theta, scales)
         system.u.assign(state)
         system.evaluate_tangents()
         system.assemble(k=1.0, m=0.0)
-        if not len(beside):
+        if not len(stencil):
             none = np.zeros((0, system.size, 3))
             return Sensitivities(none, none, ())
-        corrections = Corrections(self._solver(len(beside)), system, self._tolerance)
-        with beside.away():
-            moved, left = self._balance(beside, state, corrections)
+        corrections = Corrections(self._solver(len(stencil)), system, self._tolerance)
+        with stencil.away():
+            moved, left = self._balance(stencil, state, corrections)
         constrained = system.model.constrained
         return Sensitivities(moved, np.where(constrained, -left, 0.0), corrections.cg_iterations)
 
-    def _balance(self, beside: Beside, state: Floats, corrections: Corrections) -> tuple[Floats, Floats]:
+    def _balance(self, stencil: ParameterStencil, state: Floats, corrections: Corrections) -> tuple[Floats, Floats]:
         """Derivatives of the displacement, and what is out of balance then on every component."""
         system = self.system
         free = ~system.model.constrained
-        loaded = [beside.by_loads(k, math.inf) for k in range(len(beside))]
-        start = np.array([beside.by_prescribed(k) for k in range(len(beside))])
+        loaded = [stencil.by_loads(k, math.inf) for k in range(len(stencil))]
+        start = np.array([stencil.by_prescribed(k) for k in range(len(stencil))])
 
         def left_of(k: int, moved: Floats) -> Floats:
-            return loaded[k] - self._by_path(beside, k, state, moved)
+            return loaded[k] - self._by_path(stencil, k, state, moved)
 
         left = np.array([left_of(k, moved) for k, moved in enumerate(start)])
         # differences are exact to the rounding of forces over the step
-        noise = ROUNDINGS * system.precision.epsilon * system.size_of_forces() / beside.steps
+        noise = ROUNDINGS * system.precision.epsilon * system.size_of_forces() / stencil.steps
         goals = 2.0 * self._tolerance * lengths(left, free) + noise
         # a skull's distance has fewer digits than forces have
         met = 2.0 * goals + _MET * lengths(left, free)
         moved = start
         for _ in range(_AUGMENTATIONS):
             moved, left = refine(left_of, corrections.correct, moved, left, goals, free)
-            if not beside.remembers:
+            if not stencil.remembers:
                 return moved, left
-            self._meet_constraints(beside, state, moved)
+            self._meet_constraints(stencil, state, moved)
             left = np.array([left_of(k, along) for k, along in enumerate(moved)])
             if np.all(lengths(left, free) <= met):
                 return moved, left
         raise SolveError(f"sensitivities: contacts are not met after {_AUGMENTATIONS} augmentations")
 
-    def _meet_constraints(self, beside: Beside, state: Floats, moved: Floats) -> None:
+    def _meet_constraints(self, stencil: ParameterStencil, state: Floats, moved: Floats) -> None:
         """Augment beside `theta` along the way, by as much more than in the state itself as belongs to the way."""
         system = self.system
 
@@ -246,14 +246,14 @@ class SensitivitySolver:
             for term in system.terms:
                 term.augment(system.u)
 
-        beside.remember(lambda k, offset: augment(offset, moved[k]))
-        with beside.here():
+        stencil.remember(lambda k, offset: augment(offset, moved[k]))
+        with stencil.here():
             before = system.remembered()
             augment(0.0, moved[0])
             after = system.remembered()
-        beside.shift_memory(after, before)
+        stencil.shift_memory(after, before)
 
-    def _by_path(self, beside: Beside, k: int, state: Floats, moved: Floats) -> Floats:
+    def _by_path(self, stencil: ParameterStencil, k: int, state: Floats, moved: Floats) -> Floats:
         """Derivative of the internal forces (n, 3) by parameter k along the way that the state takes with it."""
         system = self.system
 
@@ -261,7 +261,7 @@ class SensitivitySolver:
             system.u.assign(state + offset * moved)
             return system.internal_forces()
 
-        return beside.derivative(k, internal)
+        return stencil.derivative(k, internal)
 
     def _solver(self, count: int) -> SeveralSolver:
         if count not in self._solvers:
@@ -337,9 +337,9 @@ def secant(
     some. `SolveError` if one of the two has no equilibrium.
     """
     shared = np.arange(len(present.mesh.points)) if nodes is None else np.asarray(nodes, dtype=np.int64)
-    found = []
+    states = []
     for model in (present, without):
         state = solve_equilibrium(System(model, device), options)
-        found.append((state.u, model.reactions(state.internal, model.external_forces())))
-    (u, reactions), (u_without, reactions_without) = found
+        states.append((state.u, model.reactions(state.internal, model.external_forces())))
+    (u, reactions), (u_without, reactions_without) = states
     return Secant(shared, u - u_without[shared], reactions - reactions_without[shared])

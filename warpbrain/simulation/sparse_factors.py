@@ -72,9 +72,9 @@ def _analysed(lower: Any) -> Any:
     """The symbolic analysis of a lower triangle, SciPy CSC without duplicates; it does not depend on the values."""
     import rslab
 
-    for threads, known, analysis in _analyses:
-        same = threads == thread_count() and np.array_equal(known.indptr, lower.indptr)
-        if same and np.array_equal(known.indices, lower.indices):
+    for threads, pattern, analysis in _analyses:
+        same = threads == thread_count() and np.array_equal(pattern.indptr, lower.indptr)
+        if same and np.array_equal(pattern.indices, lower.indices):
             return analysis
     analysis = rslab.analyze(lower, path="ldlt", threads=thread_count())
     _analyses[:] = [(thread_count(), lower, analysis), *_analyses[: _KEPT - 1]]

@@ -205,14 +205,14 @@ class Rig:
         sides = imposed_values(recording.imposed, rest, steps)
         states, at_rest = [_State(rest)], None
         if self.system.model.mechanisms:
-            found = self._equilibrium(recording, rest, rest, None)
-            states, at_rest = [self._state(recording, rest, found)], found.u
+            equilibrium = self._equilibrium(recording, rest, rest, None)
+            states, at_rest = [self._state(recording, rest, equilibrium)], equilibrium.u
         for side in sides:
             u, previous = at_rest, rest
             for value in side.tolist():
-                found = self._equilibrium(recording, value, previous, u)
-                u, previous = found.u, value
-                states.append(self._state(recording, value, found))
+                equilibrium = self._equilibrium(recording, value, previous, u)
+                u, previous = equilibrium.u, value
+                states.append(self._state(recording, value, equilibrium))
                 if on_state is not None:
                     on_state((len(states) - 1) / sum(map(len, sides)))
         if recording.force_controlled:
@@ -221,7 +221,7 @@ class Rig:
 
     def _farther(self, recording: TestRecording, states: Sequence[_State], rest: float, steps: int) -> list[_State]:
         """States beyond what was read, until all forces that were imposed are answered."""
-        found: list[_State] = []
+        states_beyond: list[_State] = []
         reach = max(float(np.abs(recording.imposed - rest).max()), np.finfo(float).tiny)
         for sign, force in ((-1.0, float(recording.response.min())), (1.0, float(recording.response.max()))):
             last = max(states, key=lambda state: sign * state.imposed)
@@ -232,13 +232,13 @@ class Rig:
                 value = last.imposed + sign * reach / steps
                 state = self._equilibrium(recording, value, last.imposed, u)
                 u, last = state.u, self._state(recording, value, state)
-                found.append(last)
+                states_beyond.append(last)
             else:
                 raise SolveError(
                     f"test '{recording.name}' ({recording.mode}): no {recording.quantities[0]} within {_FARTHER} times "
                     f"what was read answers a {recording.quantities[1]} of {force:.4g}"
                 )
-        return found
+        return states_beyond
 
     def _through_time(
         self, recording: TestRecording, rest: float, steps: int, on_state: Callable[[float], None] | None
@@ -250,22 +250,22 @@ class Rig:
         history = history_of(recording.time, recording.imposed, reach, steps, self._shortest, ramps)
         start = float(history.time[0])
         self.system.forget()
-        found = self._step(recording, rest, np.zeros((len(self._top), 3)), math.inf, start)
+        equilibrium = self._step(recording, rest, np.zeros((len(self._top), 3)), math.inf, start)
         if history.imposed[0] != rest:
-            found = self._step(recording, float(history.imposed[0]), found.u, 0.0, start)
-        states = [self._state(recording, float(history.imposed[0]), found)]
+            equilibrium = self._step(recording, float(history.imposed[0]), equilibrium.u, 0.0, start)
+        states = [self._state(recording, float(history.imposed[0]), equilibrium)]
         for k in range(1, len(history.time)):
             before, time, value = (float(x) for x in (history.time[k - 1], history.time[k], history.imposed[k]))
-            found = self._step(recording, value, found.u, time - before, time)
-            states.append(self._state(recording, value, found))
+            equilibrium = self._step(recording, value, equilibrium.u, time - before, time)
+            states.append(self._state(recording, value, equilibrium))
             if on_state is not None:
                 on_state(len(states) / len(history.time))
         return _result(recording, states, history)
 
-    def _state(self, recording: TestRecording, value: float, found: Equilibrium) -> _State:
-        response = self._response(recording, found.u, found.internal)
-        min_J = found.history[-1].min_J if found.history else 1.0
-        return _State(value, response, len(found.history), min_J, found.unstable_iterations)
+    def _state(self, recording: TestRecording, value: float, equilibrium: Equilibrium) -> _State:
+        response = self._response(recording, equilibrium.u, equilibrium.internal)
+        min_J = equilibrium.history[-1].min_J if equilibrium.history else 1.0
+        return _State(value, response, len(equilibrium.history), min_J, equilibrium.unstable_iterations)
 
     def _step(self, recording: TestRecording, value: float, start: Floats, h: float, time: float) -> Equilibrium:
         """The state a time step `h` after another, at a time."""
@@ -417,7 +417,7 @@ def specimen_of(case: Case) -> Specimen:
     for mechanism in case.mechanisms:
         who = f"{case.path}: [[mechanism]] kind = '{mechanism.kind}'"
         if not mechanism.of_specimens:
-            can = ", ".join(kind for kind, known in mechanisms().items() if known.of_specimens)
+            can = ", ".join(kind for kind, mechanism_type in mechanisms().items() if mechanism_type.of_specimens)
             raise InputError(f"{who}: means nothing in a [specimen] between its grips; what can act there: {can}")
         if case.specimen.grips == "lubricated" and not mechanism.everywhere:
             raise InputError(
@@ -495,8 +495,8 @@ class SpecimenRun(Shown):
     @property
     def errors(self) -> Mapping[str, tuple[float, float]]:
         """Root mean square of each test's answer and of its error, in its unit (m, 1, rad, N, Pa, N m)."""
-        compared = (test.comparison for test in self.tests)
-        return {one.name: (one.before.root_mean_square, one.after.root_mean_square) for one in compared}
+        each = (test.comparison for test in self.tests)
+        return {c.name: (c.before.root_mean_square, c.after.root_mean_square) for c in each}
 
 
 class SpecimenRunning:

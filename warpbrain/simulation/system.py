@@ -685,8 +685,8 @@ class System:
 
     def recall(self, remembered: Sequence[tuple[wp.array, ...]]) -> None:
         """Let terms remember that instead."""
-        for term, own in zip(self.terms, remembered, strict=True):
-            term.recall(own)
+        for term, arrays in zip(self.terms, remembered, strict=True):
+            term.recall(arrays)
 
     def remember_as(self, other: System) -> None:
         """Let terms remember what those of another system of the same mechanisms do, in the same step."""
@@ -771,22 +771,22 @@ class System:
         P = wp.zeros(self.elements, dtype=p.mat33, device=self.device)
         for g in self.groups:
             self._launch(g.kernels.stress, len(g.elements), g.elements, F, g.parameters, density, P)
-        found = P.numpy().astype(np.float64)
+        total = P.numpy().astype(np.float64)
         if self._averages:
-            found *= PART
+            total *= PART
             for term in (term for group in self.groups for term in group.averaged):
                 # each of the four patches of an element has a quarter of it
                 elements, patch, stress = term.stress(self.u)
-                np.add.at(found, elements, 0.25 * (1.0 - PART) * stress[patch])
-        found *= self.stiffness_factors[:, None, None]
+                np.add.at(total, elements, 0.25 * (1.0 - PART) * stress[patch])
+        total *= self.stiffness_factors[:, None, None]
         if self._volumes_at_nodes is not None:
             F = self.deformation_gradients()
             cofactors = np.linalg.det(F)[:, None, None] * np.linalg.inv(F).transpose(0, 2, 1)
-            found += self._volumes_at_nodes.pressures(self.u)[:, None, None] * cofactors
+            total += self._volumes_at_nodes.pressures(self.u)[:, None, None] * cofactors
         for added in self.terms:
             if added.elements is not None:
-                found[added.elements] += self._mean_stress(added, added.elements)
-        return found
+                total[added.elements] += self._mean_stress(added, added.elements)
+        return total
 
     def _mean_stress(self, term: Term, elements: NDArray[np.integer]) -> Floats:
         """Mean of what a term adds to the stress of its elements [Pa], (k, 3, 3): `sum_a f_a (x) X_a / V`."""
