@@ -31,53 +31,23 @@ Ints = NDArray[np.int32]
 class Body(Protocol):
     """What a term may know of the system that it becomes part of."""
 
-    @property
-    def mesh(self) -> TetMesh:
-        """The reference shape."""
-
-    @property
-    def device(self) -> Any:
-        """Warp device."""
-
-    @property
-    def precision(self) -> Precision:
-        """Of every array."""
-
-    @property
-    def tetrahedra(self) -> NDArray[np.integer]:
-        """Corners (m, 4) of each element, ascending."""
-
-    @property
-    def nodes(self) -> wp.array:
-        """The same on the device."""
-
-    @property
-    def quadratic(self) -> QuadraticMesh | None:
-        """The reference shape with its midside nodes, if elements have some."""
-
-    @property
-    def node_mesh(self) -> TetMesh:
-        """Linear tetrahedra with a corner at every node: the reference shape, or its elements cut into eight."""
-
-    @property
-    def stencils(self) -> NDArray[np.integer]:
-        """Nodes of each element, ascending, (m, 4), or (m, 10) with midside nodes."""
-
-    @property
-    def element_nodes(self) -> wp.array:
-        """The same on the device: (m,) vec4i, or (m, 10) int."""
-
-    @property
-    def inverse_edges(self) -> wp.array:
-        """Gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]."""
-
-    @property
-    def constrained(self) -> Bools:
-        """Components (n, 3) of the displacement that are prescribed."""
-
-    @property
-    def movable(self) -> Bools:
-        """Nodes (n,) of which some component is not prescribed."""
+    mesh: TetMesh  # the reference shape
+    device: Any  # of Warp
+    precision: Precision  # of every array
+    tetrahedra: Ints  # corners (m, 4) of each element, ascending
+    nodes: wp.array  # the same on the device
+    quadratic: QuadraticMesh | None  # the reference shape with its midside nodes, if elements have some
+    node_mesh: TetMesh  # linear tetrahedra with a corner at every node: the mesh, or its elements cut into eight
+    stencils: Ints  # nodes of each element, ascending, (m, 4), or (m, 10) with midside nodes
+    element_nodes: wp.array  # the same on the device: (m,) vec4i, or (m, 10) int
+    inverse_edges: wp.array  # gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]
+    constrained: Bools  # components (n, 3) of the displacement that are prescribed
+    movable: Bools  # nodes (n,) of which some component is not prescribed
+    #: As they are now: a factor on all moduli of each element (m,), the part of it that is left, its stretch without
+    #: stress.
+    stiffness_factors: Floats
+    remaining_parts: Floats
+    growth_stretches: Floats
 
     @property
     def volumetric_moduli(self) -> Floats:
@@ -86,18 +56,6 @@ class Body(Protocol):
     @property
     def shear_moduli(self) -> Floats:
         """At rest, of each element (m,) [Pa]."""
-
-    @property
-    def stiffness_factors(self) -> Floats:
-        """Factor (m,) on all moduli of each element, as it is now."""
-
-    @property
-    def remaining_parts(self) -> Floats:
-        """Part (m,) of each element that is left, as it is now."""
-
-    @property
-    def growth_stretches(self) -> Floats:
-        """Stretch (m,) of each element without stress, as it is now."""
 
 
 @dataclass(frozen=True)

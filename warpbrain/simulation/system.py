@@ -14,7 +14,7 @@ import warp as wp
 from numpy.typing import NDArray
 from warp.sparse import BsrMatrix, bsr_zeros
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.linear import ConjugateGradient, solver_kernels
@@ -23,7 +23,6 @@ from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.ten_nodes import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
-from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import EDGES
 from warpbrain.physics.continuous import differ_in_numbers_only
 from warpbrain.physics.laws import Law
@@ -108,6 +107,8 @@ class System:
         1 for free components, 0 for constrained ones.
     mass : wp.array, shape (n,)
         Lumped masses [kg] of the tissue that is there.
+    mesh, node_mesh : TetMesh
+        The reference shape, and linear tetrahedra with a corner at every node: it, or its elements cut into eight.
     terms : list of Term
         What else acts with forces that follow the deformation.
     stiffness_factors : (m,) array
@@ -128,9 +129,10 @@ class System:
         self._model = model
         self.device = find_device(device)
         self.precision = find_precision(precision)
-        self.quadratic = model.quadratic
-        self.size = len(model.node_mesh.points)
-        self.elements = len(model.mesh.tetrahedra)
+        self.mesh, self.node_mesh, self.quadratic = model.mesh, model.node_mesh, model.quadratic
+        self.size, self.elements = len(self.node_mesh.points), len(self.mesh.tetrahedra)
+        self.constrained: Bools = model.constrained
+        self.movable: Bools = np.asarray(~model.constrained.all(axis=1))
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
         # of each element; terms ask for them
@@ -166,15 +168,15 @@ class System:
         return wp.array(values, dtype=dtype, device=self.device)
 
     def _place_mesh(self) -> None:
-        mesh, p = self.model.mesh, self.precision
-        self.assembly = a = Assembly.of(mesh, self.device, p)
+        p = self.precision
+        self.assembly = a = Assembly.of(self.mesh, self.device, p)
         self.tetrahedra, self.shape_gradients = a.tetrahedra, a.shape_gradients
         self.nodes, self.inverse_edges = a.nodes, a.inverse_edges
         self.stencils, self.element_nodes = self.tetrahedra, self.nodes
         if self.quadratic is not None:
             self.stencils = self.quadratic.elements
             self.element_nodes = self._array(self.stencils, int)
-        self._volumes = mesh.volumes
+        self._volumes = self.mesh.volumes
         self.volume = self._array(self._volumes, p.scalar)
         self.mass = self._array(self.model.node_masses, p.scalar)
 
@@ -194,7 +196,7 @@ class System:
     def _group_elements(self) -> list[ElementGroup]:
         groups = []
         for (law_type, formulation), materials in self._grouped(self.model).items():
-            members = np.flatnonzero(np.isin(self.model.mesh.tissue, list(materials)))
+            members = np.flatnonzero(np.isin(self.mesh.tissue, list(materials)))
             device_law = law_type.device_law(formulation)
             device_law = grown(device_law) if self.model.growing else device_law
             linear = self.quadratic is None
@@ -252,7 +254,7 @@ class System:
         # the last column, where something grows, is the growth stretch
         parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self.model.growing)))
         for (label, material), row in zip(materials.items(), rows, strict=True):
-            members = np.flatnonzero(self.model.mesh.tissue == label)
+            members = np.flatnonzero(self.mesh.tissue == label)
             parameters[members, : 1 + len(row)] = (modulus(material), *row)
         if self.model.growing:
             parameters[:, -1] = self.growth_stretches
@@ -442,7 +444,7 @@ class System:
         """
         stiffest = float(np.max(self.shear_moduli + np.abs(self.volumetric_moduli)))
         summed = float(np.linalg.norm(self._flat_forces.numpy().astype(np.float64)))
-        return summed + stiffest * self.model.mesh.volume ** (2.0 / 3.0)
+        return summed + stiffest * self.mesh.volume ** (2.0 / 3.0)
 
     def assemble(self, k: float, m: float, coupling: float | None = None) -> None:
         """`matrix = k K + m M` from the element blocks, constrained rows and columns replaced by the identity.
@@ -703,16 +705,6 @@ class System:
         return total
 
     @property
-    def constrained(self) -> NDArray[np.bool_]:
-        """Components (n, 3) of the displacement that are prescribed."""
-        return self.model.constrained
-
-    @property
-    def movable(self) -> NDArray[np.bool_]:
-        """Nodes (n,) of which some component is not prescribed."""
-        return np.asarray(~self.model.constrained.all(axis=1))
-
-    @property
     def shear_moduli(self) -> Floats:
         """Shear modulus at rest of each element [Pa], shape (m,)."""
         return self._by_element({label: m.law.shear_modulus for label, m in self.model.materials.items()})
@@ -723,21 +715,12 @@ class System:
         return self._by_element({label: m.volumetric_modulus for label, m in self.model.materials.items()})
 
     def _by_element(self, values: Mapping[int, float]) -> Floats:
-        return np.array([values[label] for label in self.model.mesh.tissue.tolist()])
-
-    @property
-    def mesh(self) -> TetMesh:
-        """The reference shape."""
-        return self.model.mesh
-
-    @property
-    def node_mesh(self) -> TetMesh:
-        """Linear tetrahedra with a corner at every node: the reference shape, or its elements cut into eight."""
-        return self.model.node_mesh
+        by_label = np.array([values[label] for label in self.mesh.labels])
+        return np.asarray(by_label[np.searchsorted(self.mesh.labels, self.mesh.tissue)])
 
     def most_compressed(self) -> str:
         """Which element had the smallest `J` when the energy was last evaluated, and where it is, for a message."""
-        mesh = self.model.mesh
+        mesh = self.mesh
         e = int(np.argmin(self.element_J.numpy()))
         x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
         return f"element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}"
