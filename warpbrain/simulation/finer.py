@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -16,7 +15,7 @@ from warpbrain.cases.case import Case
 from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
 from warpbrain.physics.load import Load, NodalForce
 from warpbrain.physics.mechanism import Removing
-from warpbrain.simulation.model import Material, Model, with_mechanisms
+from warpbrain.simulation.model import Model, with_mechanisms
 from warpbrain.simulation.of_case import plain_model_of
 
 
@@ -65,16 +64,15 @@ class FinerCase:
         density[loaded] = forces[loaded] / coarse[loaded, None]
         return np.asarray(fine[:, None] * (self.prolongation @ density))
 
-    def model(self, model: Model, materials: Mapping[int, Material] | None = None) -> Model:
-        """The finer model of what `model_of` makes of the case, with the same elements; of other materials if given."""
+    def model(self, model: Model) -> Model:
+        """The finer model of what `model_of` makes of the case, with the same elements."""
         plain = self._plain
         shared = [
             GivenForces(forces=self.spread(load.nodal_forces(model.mesh)), ramp=load.ramp)
             for load in model.loads
             if isinstance(load, NodalForce)
         ]
-        materials = plain.materials if materials is None else materials
-        loaded = replace(plain, materials=materials, loads=[*plain.loads, *shared], elements=model.elements)
+        loaded = replace(plain, loads=[*plain.loads, *shared], elements=model.elements)
         return with_mechanisms(loaded, self.case.mechanisms)
 
     @cached_property

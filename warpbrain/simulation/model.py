@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
@@ -150,11 +150,24 @@ class Model:
             raise InputError("prescribed: a component that is not constrained has a displacement")
         if not (math.isfinite(self.density) and self.density > 0.0):
             raise InputError(f"density = {self.density:g} kg/m3: expected a positive number")
+        self._require_materials()
+        object.__setattr__(self, "constrained", constrained)
+        object.__setattr__(self, "prescribed", prescribed)
+
+    def with_materials(self, materials: Mapping[int, Material]) -> Model:
+        """The model of other tissue: materials by label, before its mechanisms say what law or compressibility it has.
+
+        Nothing that is known of the model is found again. `InputError` if a tissue has no material.
+        """
+        other: Model = object.__new__(Model)
+        other.__dict__.update(vars(self), materials=all_substituted(materials, self.mechanisms))
+        other._require_materials()
+        return other
+
+    def _require_materials(self) -> None:
         missing = sorted(set(self.mesh.labels) - set(self.materials))
         if missing:
             raise InputError(f"materials: no material for tissue {', '.join(map(str, missing))} of the mesh")
-        object.__setattr__(self, "constrained", constrained)
-        object.__setattr__(self, "prescribed", prescribed)
 
     def _require_quadratic(self) -> None:
         """Raise `InputError` if something acts that knows nothing of the midside nodes that the elements have."""
@@ -318,7 +331,7 @@ def with_mechanisms(model: Model, mechanisms: Sequence[Mechanism]) -> Model:
     return replace(model, materials=materials, loads=(*loads, *model.loads), mechanisms=(*acting, *model.mechanisms))
 
 
-def all_substituted(materials: Mapping[int, Material], mechanisms: Iterable[Mechanism]) -> dict[int, Material]:
+def all_substituted(materials: Mapping[int, Material], mechanisms: Sequence[Mechanism]) -> dict[int, Material]:
     """The materials of tissues as those mechanisms that say something of their law have them, in their order."""
     substitutes = dict(materials)
     for mechanism in mechanisms:
