@@ -27,12 +27,12 @@ from warpbrain.mesh import MeshError as MeshError
 from warpbrain.mesh import TetMesh as TetMesh
 from warpbrain.mesh import read_mesh as read_mesh
 from warpbrain.mesh import write_mesh as write_mesh
-from warpbrain.physics.force import NodalForce as NodalForce
 from warpbrain.physics.laws import Law as Law
 from warpbrain.physics.laws import MooneyRivlin as MooneyRivlin
 from warpbrain.physics.laws import NeoHookean as NeoHookean
 from warpbrain.physics.laws import Ogden as Ogden
 from warpbrain.physics.laws.stability import require_stable as require_stable
+from warpbrain.physics.load import NodalForce as NodalForce
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.gravity import Gravity as Gravity
 from warpbrain.physics.mechanisms.resection import Resection as Resection
@@ -54,7 +54,7 @@ from warpbrain.simulation.result import Result as Result
 from warpbrain.simulation.result import result_of as result_of
 from warpbrain.simulation.run import Run as Run
 from warpbrain.simulation.run import run as run
-from warpbrain.simulation.specimen_run import SpecimenRun as SpecimenRun
+from warpbrain.simulation.specimen import SpecimenRun as SpecimenRun
 from warpbrain.simulation.system import System as System
 from warpbrain.worlds.options import DiagnosisOptions as DiagnosisOptions
 

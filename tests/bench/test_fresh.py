@@ -14,7 +14,7 @@ from warpbrain.bench.fresh import case_of, fresh_arrays
 from warpbrain.bench.table3 import TABLE3
 from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import TetMesh
-from warpbrain.simulation import placed
+from warpbrain.simulation import assembly
 from warpbrain.simulation.system import System
 
 BODIES = 3
@@ -47,7 +47,7 @@ def test_every_repetition_makes_everything_again(monkeypatch, case):
     meshes: list[TetMesh] = []
     patterns: list[int] = []
     systems: list[System] = []
-    check, build, begin = TetMesh.__post_init__, placed.build_pattern, System.__init__
+    check, build, begin = TetMesh.__post_init__, assembly.build_pattern, System.__init__
 
     def checked(self):
         check(self)
@@ -60,7 +60,7 @@ def test_every_repetition_makes_everything_again(monkeypatch, case):
     def begun(self, model, *rest):
         # the mesh was made in this repetition, and nothing of it is on a device
         assert model.mesh is meshes[-1] and len(meshes) == len(systems) + 1
-        assert "placed" not in model.mesh.shared
+        assert "assemblies" not in model.mesh.shared
         begin(self, model, *rest)
         systems.append(self)
 
@@ -71,7 +71,7 @@ def test_every_repetition_makes_everything_again(monkeypatch, case):
     assert again.pairs is warm.system.pairs, "the bench guards against a cache that is there"
 
     monkeypatch.setattr(TetMesh, "__post_init__", checked)
-    monkeypatch.setattr(placed, "build_pattern", built)
+    monkeypatch.setattr(assembly, "build_pattern", built)
     monkeypatch.setattr(System, "__init__", begun)
     hits = {name: cache.cache_info().hits for name, cache in caches_by_mesh().items()}
     assert "warpbrain.physics.regions._ball_weights" in hits, "caches by mesh are seen"

@@ -11,7 +11,7 @@ import warp as wp
 
 from febio.laws import Added
 from warpbrain.kernels.invariants import cofactor
-from warpbrain.physics.extra_energy import ExtraEnergy
+from warpbrain.physics.term import ExtraEnergy
 
 
 @cache

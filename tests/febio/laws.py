@@ -12,11 +12,10 @@ import numpy as np
 import warp as wp
 
 from warpbrain.kernels.invariants import cofactor
-from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.laws import Law, LawKey, MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.laws.device import InvariantLaw
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.physics.term import Body
+from warpbrain.physics.term import Body, ExtraEnergy, ExtraEnergyTerm
 
 
 class _WithoutVolume:

@@ -9,8 +9,8 @@ from material_point import LAWS
 from shapes import cube, distorted
 
 from warpbrain.kernels.precision import DOUBLE, Precision
+from warpbrain.simulation.assembly import build_pattern
 from warpbrain.simulation.model import Material
-from warpbrain.simulation.placed import build_pattern
 from warpbrain.simulation.system import System
 
 

@@ -10,8 +10,7 @@ from shapes import box, cube, distorted
 from warpbrain.errors import InputError
 from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.mesh.refinement import finer_mesh
-from warpbrain.physics.force import NodalForce
-from warpbrain.physics.load import Along, Load
+from warpbrain.physics.load import Along, Load, NodalForce
 from warpbrain.physics.mechanisms.gravity import CSF_DENSITY, STANDARD_GRAVITY, Gravity
 
 MESH = box((4, 3, 20), (0.08, 0.06, 0.1))

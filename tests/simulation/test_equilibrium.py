@@ -13,8 +13,8 @@ from verification_rows import Row
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean, Ogden
+from warpbrain.physics.load import NodalForce
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.residual_stress import ResidualStress

@@ -12,8 +12,8 @@ from verification_rows import Row
 
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.continuous import continuous, numbers_of, scales_of, with_numbers
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean, Ogden
+from warpbrain.physics.load import NodalForce
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import contact, mechanisms
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver

@@ -9,9 +9,8 @@ from shapes import box, distorted
 
 from warpbrain.errors import InputError
 from warpbrain.mesh import QuadraticMesh, TetMesh
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
-from warpbrain.physics.load import Load
+from warpbrain.physics.load import Load, NodalForce
 from warpbrain.physics.mechanisms.gravity import STANDARD_GRAVITY, Gravity
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity

@@ -10,8 +10,8 @@ from shapes import box, cube, distorted
 from warpbrain.errors import InputError
 from warpbrain.kernels.precision import DOUBLE, SINGLE
 from warpbrain.mesh import QuadraticMesh, TetMesh
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.load import NodalForce
 from warpbrain.physics.mechanisms.cavity import Cavity
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.dynamics import Simulator

@@ -12,8 +12,8 @@ from verification_rows import Row
 
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.load import NodalForce
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium

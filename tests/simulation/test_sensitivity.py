@@ -14,8 +14,8 @@ from verification_rows import Row
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.coordinates import from_coordinates, to_coordinates
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import FORMULATIONS, Law, MooneyRivlin, NeoHookean, Ogden
+from warpbrain.physics.load import NodalForce
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, solve_equilibrium
 from warpbrain.simulation.model import Material, Model

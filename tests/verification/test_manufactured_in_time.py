@@ -60,8 +60,8 @@ def followed(system: System, steps: int, end: float, at: Callable[[float], tuple
     for k in range(1, steps + 1):
         prescribed, forces = at(end * k / steps)
         prescribed = np.where(system.model.constrained, prescribed, 0.0)
-        system.model = replace(system.model, prescribed=prescribed, loads=(Given(forces=forces),))
-        u = solver.step(u, end / steps).u
+        system.set_model(replace(system.model, loads=(Given(forces=forces),)))
+        u = solver.step(u, end / steps, prescribed=prescribed).u
     return u
 
 

@@ -157,8 +157,7 @@ def test_viscoelasticity(verify: Row) -> None:
         forces = solid.assemble.vector(field).toarray().reshape(-1, 3)
         F = field.extract()[0][:, :, 0].transpose(2, 0, 1)
         q, S_before = branches(F, h), isochoric(F)
-        solver.system.model = replace(model, prescribed=share * model.prescribed)
-        found = solver.step(u, h)
+        found = solver.step(u, h, prescribed=share * model.prescribed)
         u = found.u
         agree(verify, "a stretched body with `viscoelasticity`, in eight steps", u, expected)
         top = forces[high].sum(axis=0)

@@ -14,8 +14,8 @@ from bodies import model_of
 from verification_rows import Row
 
 from warpbrain.mesh import TetMesh, read_mesh
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.load import NodalForce
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System

@@ -6,7 +6,7 @@ first. What is kept, and for how long:
 
 - as long as a `TetMesh` lives: its cached properties (labels, volumes, centres, boundary, node volumes), meshes made of
   it (`shared`: refined, without a resection), which `with_node_sets` passes on; what a device was told of it, the
-  elements by device and precision, patterns by the bytes of their stencils (`warpbrain.simulation.placed`);
+  elements by device and precision, patterns and patches by what they are of (`warpbrain.simulation.assembly`);
 - by mesh, the latest ones: connected parts (`simulation.held`), balls (`physics.regions`), patches of a traction
   (`physics.mechanisms.traction`), and what estimation and diagnosis ask of a mesh;
 - by bytes of coordinates: sites of a diagnosis (`diagnosis.sensors`);

@@ -28,7 +28,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     from warpbrain.report.specimen import write_tests_picture
     from warpbrain.report.summary import describe_opening, machine
     from warpbrain.simulation.observation import Observed
-    from warpbrain.simulation.specimen_run import SpecimenRunning
+    from warpbrain.simulation.specimen import SpecimenRunning
     from warpbrain.terminal.result_folder import results_in
 
     record: Record = options.record

@@ -190,7 +190,8 @@ class FinerMesh:
         self._factors: tuple[Any, Bools] | None = None
         # solver of the system with these factors
         self._linear: TwoLevelGradient | None = None
-        self._last: tuple[FinerCase, Model, Floats] | None = None
+        # to its mesh, its model and its displacement
+        self._last: tuple[Any, Model, Floats] | None = None
 
     def difference(
         self, case: Case, theta: Floats, system: System, u: Floats, reactions: Floats, tolerance: float = ROUGH
@@ -221,7 +222,7 @@ class FinerMesh:
         if linear is not None and linear.slow:
             self._factors = self._linear = None
         self._earlier = [*self._earlier[-_KEPT:], (acting, u.ravel(), solution.u - flat)]
-        self._last = finer, system.model, solution.u
+        self._last = finer.prolongation, model, solution.u
         finer_u, finer_reactions = restricted(
             finer.prolongation, solution.u, model.reactions(solution.internal, external)
         )
@@ -235,13 +236,11 @@ class FinerMesh:
         `materials` are those of parameters (p,) by label; `SolveError` if the state is unstable.
         """
         assert self._system is not None and self._last is not None
-        finer, coarse, u = self._last
-        sensitivities = SensitivitySolver(self._system, _DERIVATIVES).solve(
-            u, lambda at: finer.model(coarse, materials(at)), theta
-        )
+        prolongation, model, u = self._last
+        solver = SensitivitySolver(self._system, _DERIVATIVES)
+        sensitivities = solver.solve(u, lambda at: model.with_materials(materials(at)), theta)
         each = [
-            restricted(finer.prolongation, du, dR)
-            for du, dR in zip(sensitivities.u, sensitivities.reactions, strict=True)
+            restricted(prolongation, du, dR) for du, dR in zip(sensitivities.u, sensitivities.reactions, strict=True)
         ]
         return np.array([du for du, _ in each]), np.array([dR for _, dR in each])
 

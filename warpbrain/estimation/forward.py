@@ -17,8 +17,8 @@ from warpbrain.cases.moments import Moments
 from warpbrain.errors import SolveError
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.model import Model, with_mechanisms
-from warpbrain.simulation.of_case import plain_model_of
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.sensitivity import SensitivitySolver
 from warpbrain.simulation.system import System
 
@@ -107,8 +107,7 @@ class OneState:
 
     def __init__(self, case: Case, parameters: Parameters, theta: Floats, device: str | None, elements: str) -> None:
         self.case, self._parameters = case, parameters
-        self._plain = replace(plain_model_of(parameters.applied(case, theta)), elements=elements)
-        self.system = System(self._model(theta), device)
+        self.system = System(replace(model_of(parameters.applied(case, theta)), elements=elements), device)
         self._last: Floats | None = None
         self._external = self.system.model.external_forces()
         self._solvers = {
@@ -135,5 +134,4 @@ class OneState:
         return sensitivities.u, sensitivities.reactions
 
     def _model(self, theta: Floats) -> Model:
-        plain = replace(self._plain, materials=self._parameters.materials(theta))
-        return with_mechanisms(plain, self.case.mechanisms)
+        return self.system.model.with_materials(self._parameters.materials(theta))

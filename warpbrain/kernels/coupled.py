@@ -1,58 +1,82 @@
-"""Kernels of linear systems of displacements and of a scalar at each node; see `warpbrain.simulation.coupled`."""
+"""Kernels of linear systems of displacements and of some scalars at each node; see `warpbrain.simulation.coupled`."""
 
 from functools import cache
 
 import warp as wp
 
-from warpbrain.kernels.minimal_residual import four_vector
+from warpbrain.kernels.minimal_residual import node_vector
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
 
 @cache
-def coupled_kernels(precision: Precision) -> KernelSet:
-    """Make (once) the kernels of a precision, one thread for a node; the scalar is the fourth component."""
+def coupled_kernels(precision: Precision, scalars: int) -> KernelSet:
+    """Make (once) the kernels of a precision and a number of scalars, which follow the displacement in a vector."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    vec4 = four_vector(precision)
-    kernels = KernelSet(f"coupled_{precision.name}")
+    vector = node_vector(precision, scalars)
+    count = wp.constant(scalars)
+    kernels = KernelSet(f"coupled_{scalars}_{precision.name}")
 
     @wp.func
-    def displacement(x: vec4):
+    def displacement(x: vector):
         return vec3(x[0], x[1], x[2])
+
+    @wp.func
+    def with_displacement(d: vec3):
+        x = vector()
+        for c in range(3):
+            x[c] = d[c]
+        return x
 
     @kernels.add
     def multiply(
         offsets: wp.array[int],
         columns: wp.array[int],
         values: wp.array[mat33],
-        own_offsets: wp.array[int],
-        own_columns: wp.array[int],
+        x: wp.array[vector],
+        y: wp.array[vector],
+    ):
+        """`y = K x` of displacements, zero for scalars; one thread for a node, as in all of these."""
+        i = wp.tid()
+        f = vec3()
+        for k in range(offsets[i], offsets[i + 1]):
+            f += values[k] * displacement(x[columns[k]])
+        y[i] = with_displacement(f)
+
+    @kernels.add
+    def couple(
+        place: int,
+        offsets: wp.array[int],
+        columns: wp.array[int],
         compliance: wp.array[scalar],
         own: wp.array[vec3],
         others: wp.array[vec3],
         free: wp.array[vec3],
         root: wp.array[scalar],
-        x: wp.array[vec4],
-        y: wp.array[vec4],
+        x: wp.array[vector],
+        y: wp.array[vector],
     ):
+        """Add to `y` what one of the scalars does to displacements, and write its own row."""
         i = wp.tid()
-        f = vec3()
-        for k in range(offsets[i], offsets[i + 1]):
-            f += values[k] * displacement(x[columns[k]])
         pushed = vec3()
         taken = scalar(0.0)
         flow = scalar(0.0)
-        for k in range(own_offsets[i], own_offsets[i + 1]):
-            z = x[own_columns[k]]
+        for k in range(offsets[i], offsets[i + 1]):
+            z = x[columns[k]]
             # constrained components of a vector that is iterated on are zero
             taken += wp.dot(own[k], displacement(z))
-            pushed += z[3] * others[k]
-            flow += compliance[k] * z[3]
-        f -= root[0] * wp.cw_mul(free[i], pushed)
-        y[i] = vec4(f[0], f[1], f[2], -root[0] * taken - flow)
+            pushed += z[place] * others[k]
+            flow += compliance[k] * z[place]
+        push = root[0] * wp.cw_mul(free[i], pushed)
+        total = y[i]
+        for c in range(3):
+            total[c] = total[c] - push[c]
+        total[place] = -root[0] * taken - flow
+        y[i] = total
 
     @kernels.add
     def invert_coupled_diagonal(
+        place: int,
         offsets: wp.array[int],
         columns: wp.array[int],
         compliance: wp.array[scalar],
@@ -60,8 +84,9 @@ def coupled_kernels(precision: Precision) -> KernelSet:
         free: wp.array[vec3],
         root: wp.array[scalar],
         inverse: wp.array[mat33],
-        out: wp.array[scalar],
+        out: wp.array[vector],
     ):
+        """Of one of the scalars, given the inverse diagonal blocks of `K`."""
         i = wp.tid()
         total = scalar(0.0)
         for k in range(offsets[i], offsets[i + 1]):
@@ -70,23 +95,27 @@ def coupled_kernels(precision: Precision) -> KernelSet:
             total += root[0] * root[0] * wp.dot(along, inverse[j] * along)
             if j == i:
                 total += compliance[k]
-        out[i] = scalar(1.0)
+        diagonal = out[i]
+        diagonal[place] = scalar(1.0)
         if total > scalar(0.0):
-            out[i] = scalar(1.0) / total
+            diagonal[place] = scalar(1.0) / total
+        out[i] = diagonal
 
     @kernels.add
-    def apply_diagonal(inverse: wp.array[mat33], diagonal: wp.array[scalar], x: wp.array[vec4], y: wp.array[vec4]):
+    def apply_diagonal(inverse: wp.array[mat33], diagonal: wp.array[vector], x: wp.array[vector], y: wp.array[vector]):
         i = wp.tid()
-        f = inverse[i] * displacement(x[i])
-        y[i] = vec4(f[0], f[1], f[2], diagonal[i] * x[i][3])
+        z = with_displacement(inverse[i] * displacement(x[i]))
+        for place in range(3, 3 + count):
+            z[place] = diagonal[i][place] * x[i][place]
+        y[i] = z
 
     @kernels.add
-    def pack(x: wp.array[vec3], y: wp.array[vec4]):
+    def pack(x: wp.array[vec3], y: wp.array[vector]):
         i = wp.tid()
-        y[i] = vec4(x[i][0], x[i][1], x[i][2], scalar(0.0))
+        y[i] = with_displacement(x[i])
 
     @kernels.add
-    def unpack(x: wp.array[vec4], y: wp.array[vec3]):
+    def unpack(x: wp.array[vector], y: wp.array[vec3]):
         i = wp.tid()
         y[i] = displacement(x[i])
 

@@ -22,16 +22,16 @@ _CHUNK = 64
 _GAMMA_BEFORE, _GAMMA, _DELTA, _ETA, _C_BEFORE, _C, _S_BEFORE, _S, _ALPHA1, _ALPHA2, _ALPHA3, _NORM = range(12)
 
 
-def four_vector(precision: Precision) -> Any:
-    """The type of a displacement and a scalar at a node."""
-    return wp.types.vector(length=4, dtype=precision.scalar)
+def node_vector(precision: Precision, scalars: int) -> Any:
+    """The type of a displacement and some scalars at a node."""
+    return wp.types.vector(length=3 + scalars, dtype=precision.scalar)
 
 
 @cache
 def _kernels(precision: Precision, unknown: Any) -> KernelSet:
     scalar = precision.scalar
     is_scalar = unknown is scalar
-    kernels = KernelSet(f"minimal_residual_{'scalar' if is_scalar else 'four'}_{precision.name}")
+    kernels = KernelSet(f"minimal_residual_{1 if is_scalar else unknown._length_}_{precision.name}")
     chunk = wp.constant(_CHUNK)
     GAMMA_BEFORE, GAMMA, DELTA, ETA = (wp.constant(k) for k in (_GAMMA_BEFORE, _GAMMA, _DELTA, _ETA))
     C_BEFORE, C, S_BEFORE, S = (wp.constant(k) for k in (_C_BEFORE, _C, _S_BEFORE, _S))
@@ -169,7 +169,7 @@ class MinimalResidual:
     """MINRES for one symmetric operator and one symmetric positive definite preconditioner.
 
     An element of `b` (right-hand side) and `x` (first guess and result), both (size,), is an `unknown`: the scalar of
-    the precision, or its `four_vector`. `operator` and `preconditioner` write `A x` and `M^-1 x` by launches alone.
+    the precision, or a `node_vector`. `operator` and `preconditioner` write `A x` and `M^-1 x` by launches alone.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.refinement import inherited, refined
+from warpbrain.mesh.refinement import finer_mesh, inherited
 from warpbrain.mesh.surface import EDGES, Bools, Floats, Ints, nodes_of
 from warpbrain.mesh.tet_mesh import TetMesh
 
@@ -34,7 +34,7 @@ class QuadraticMesh:
     ----------
     node_mesh : TetMesh
         Linear tetrahedra with a corner at each of the N nodes: every element cut into eight. Sets are those of
-        `corners`, see `warpbrain.mesh.refinement.refined`.
+        `corners`, see `warpbrain.mesh.refinement.refined`; made once for a mesh.
     ends : (N, 2) int array
         Corners between which each node lies in the middle; a corner lies between itself and itself.
     elements : (m, 10) int array
@@ -48,10 +48,12 @@ class QuadraticMesh:
     elements: Ints = field(init=False)
 
     def __post_init__(self) -> None:
-        node_mesh, ends = refined(self.corners)
-        corners = np.sort(self.corners.tetrahedra, axis=1)
-        elements = np.concatenate([corners, _middles(len(self.corners.points), ends, corners[:, EDGES])], axis=1)
-        for name, value in (("node_mesh", node_mesh), ("ends", ends), ("elements", elements.astype(np.int32))):
+        node_mesh, ends = finer_mesh(self.corners)
+        if "ten nodes" not in self.corners.shared:
+            corners = np.sort(self.corners.tetrahedra, axis=1)
+            elements = np.concatenate([corners, _middles(len(self.corners.points), ends, corners[:, EDGES])], axis=1)
+            self.corners.shared["ten nodes"] = elements.astype(np.int32)
+        for name, value in (("node_mesh", node_mesh), ("ends", ends), ("elements", self.corners.shared["ten nodes"])):
             object.__setattr__(self, name, value)
 
     def middles(self, edges: NDArray[np.integer]) -> NDArray[np.int64]:

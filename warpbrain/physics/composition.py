@@ -20,8 +20,8 @@ class CompositionError(InputError):
 
 def require_composable(acting: Sequence[Mechanism], mesh: TetMesh) -> None:
     """Raise `CompositionError` if two mechanisms exclude each other on a mesh, without what has been removed."""
-    for one, other in itertools.combinations(acting, 2):
-        for first, second in ((one, other), (other, one)):
+    for mechanism, other in itertools.combinations(acting, 2):
+        for first, second in ((mechanism, other), (other, mechanism)):
             if reason := first.excludes(second, mesh):
                 raise CompositionError(f"{first.kind} and {second.kind} cannot act together: {reason}")
 
@@ -57,17 +57,17 @@ class Pair:
 
 def pairs() -> list[Pair]:
     """All pairs of the registry, each kind with itself too, in the order of their names."""
-    known = mechanisms().values()
-    return [_pair(one, other) for one, other in itertools.combinations_with_replacement(known, 2)]
+    kinds = mechanisms().values()
+    return [_pair(kind, other) for kind, other in itertools.combinations_with_replacement(kinds, 2)]
 
 
-def _pair(one: type[Mechanism], other: type[Mechanism]) -> Pair:
-    kinds = (one.kind, other.kind)
-    if one is other and not one.several:
-        at_a_time = " at a time" if issubclass(one, Load) else ""
+def _pair(first: type[Mechanism], second: type[Mechanism]) -> Pair:
+    kinds = (first.kind, second.kind)
+    if first is second and not first.several:
+        at_a_time = " at a time" if issubclass(first, Load) else ""
         turns = "; several take turns by their ramps" if at_a_time else ""
-        words = f"a case has one {one.kind}{at_a_time}, a second one would act twice{turns}"
+        words = f"a case has one {first.kind}{at_a_time}, a second one would act twice{turns}"
         return Pair(kinds, "", "", f"{words}; that of `--with` takes its place")
-    remark = one.together.get(other.kind, "") or other.together.get(one.kind, "")
-    refused = one.excluded(other) or other.excluded(one)
-    return Pair(kinds, potential([one.enters, other.enters]), remark, refused)
+    remark = first.together.get(second.kind, "") or second.together.get(first.kind, "")
+    refused = first.excluded(second) or second.excluded(first)
+    return Pair(kinds, potential([first.enters, second.enters]), remark, refused)

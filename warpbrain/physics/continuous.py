@@ -81,8 +81,8 @@ class Continuous:
 
 def smooth_parameters(mechanism: type[Mechanism]) -> dict[str, Says]:
     """What is known of the parameters of a kind of mechanism that are numbers, by name, in the order of its fields."""
-    known = mechanism.parameters().items()
-    return {key: says for key, says in known if says.kind in (*_ONE, *_SEVERAL) and not says.method}
+    parameters = mechanism.parameters().items()
+    return {key: says for key, says in parameters if says.kind in (*_ONE, *_SEVERAL) and not says.method}
 
 
 def continuous(mechanism: Mechanism) -> tuple[Continuous, ...]:
@@ -132,16 +132,15 @@ def with_numbers(mechanisms: Sequence[Mechanism], numbers: ArrayLike) -> tuple[M
     return tuple(made)
 
 
-def differ_in_numbers_only(one: Mechanism, other: Mechanism) -> bool:
+def differ_in_numbers_only(first: Mechanism, second: Mechanism) -> bool:
     """Whether two mechanisms are the same but for numbers, settings of the method and the ramp."""
-    if type(one) is not type(other):
+    if type(first) is not type(second):
         return False
-    settings = {key: getattr(one, key) for key, says in one.parameters().items() if says.method}
-    places = [continuous(mechanism) for mechanism in (one, other)]
-    if places[0] != places[1]:
+    settings = {key: getattr(first, key) for key, says in first.parameters().items() if says.method}
+    if continuous(first) != continuous(second):
         return False
-    [as_one], [alike] = (with_numbers([mechanism], numbers_of([one])) for mechanism in (one, other))
-    return replace(alike, ramp=one.ramp, **settings) == as_one
+    [alike, other] = (with_numbers([mechanism], numbers_of([first]))[0] for mechanism in (first, second))
+    return replace(other, ramp=first.ramp, **settings) == alike
 
 
 def alternatives(mechanism: Mechanism) -> tuple[Mechanism | None, ...]:

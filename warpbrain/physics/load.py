@@ -46,8 +46,8 @@ class Ramped:
 def take_turns(ramped: Sequence[Ramped]) -> bool:
     """Whether they are together no more than one of them in full: their factors add up to 1, or the largest of all."""
     # a sum of absolute values of linear functions is largest at an end of a piece
-    times = sorted({time for one in ramped for time, _ in one.ramp})
-    sizes = np.array([[abs(one.factor(time)) for one in ramped] for time in (*times, math.inf)])
+    times = sorted({time for each in ramped for time, _ in each.ramp})
+    sizes = np.array([[abs(each.factor(time)) for each in ramped] for time in (*times, math.inf)])
     return bool(sizes.sum(axis=1).max() <= max(1.0, float(sizes.max())) * (1.0 + _ROUNDING))
 
 
@@ -84,3 +84,43 @@ class BodyForce(Load):
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         return summed_at_nodes(mesh, self.unit_forces(mesh))
+
+
+@dataclass(frozen=True, kw_only=True)
+class NodalForce(Load):
+    """A force divided evenly among the nodes of a set.
+
+    Parameters
+    ----------
+    nodes : str
+        Name of the node set.
+    total : tuple of three floats
+        Total force [N]; each of the k nodes of the set carries ``total / k``, midside nodes like corners.
+
+    Raises
+    ------
+    InputError
+        If the total is not finite; by `nodal_forces`, if the mesh has no such set or it is empty.
+    """
+
+    nodes: str
+    total: tuple[float, float, float]
+    quadratic: ClassVar[bool] = True
+    sentence: ClassVar[str] = "A force presses on part of the surface."
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.total) != 3 or not np.all(np.isfinite(self.total)):
+            raise InputError(f"force on '{self.nodes}': total = {self.total}: expected three finite numbers [N]")
+
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
+        members = mesh.node_sets.get(self.nodes)
+        if members is None:
+            raise InputError(
+                f"force: the mesh has no node set '{self.nodes}' (it has {', '.join(sorted(mesh.node_sets)) or 'none'})"
+            )
+        if not members.any():
+            raise InputError(f"force: node set '{self.nodes}' is empty")
+        forces = np.zeros(mesh.points.shape)
+        forces[members] = np.asarray(self.total, dtype=float) / members.sum()
+        return forces

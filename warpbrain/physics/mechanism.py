@@ -11,9 +11,9 @@
 5. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), an `example`, and how it
    may act where a case does not declare it (`proposals`).
 
-Its derivatives by its parameters are nobody's work: `warpbrain.simulation.beside` differences what it does. For that a
-`Following` one's term names the arrays of what it remembers (`Term.memory`), keeps solvers and rigid shapes as they are
-(`Term.lasting`) and takes the body's moduli in `Term.take_moduli`, if it has any of these.
+Its derivatives by its parameters are nobody's work: `warpbrain.simulation.parameter_stencil` differences what it does.
+For that a `Following` one's term names the arrays of what it remembers (`Term.memory`), keeps solvers and rigid shapes
+as they are (`Term.lasting`) and takes the body's moduli in `Term.take_moduli`, if it has any of these.
 
 Whoever lists mechanisms (reading, writing, simulation, diagnosis, docs) walks the registry,
 `warpbrain.physics.mechanisms`.
@@ -213,10 +213,10 @@ class Mechanism(Ramped, abc.ABC):
     @classmethod
     def required(cls) -> tuple[str, ...]:
         """Names of the parameters that a case must give."""
-        known, defaults = cls.parameters(), {f.name: f.default for f in dataclasses.fields(cls)}
+        parameters, defaults = cls.parameters(), {f.name: f.default for f in dataclasses.fields(cls)}
         return tuple(
             name
-            for name, says in known.items()
+            for name, says in parameters.items()
             if says.needed or (defaults[name] is dataclasses.MISSING and not says.absent)
         )
 
@@ -275,8 +275,8 @@ class Mechanism(Ramped, abc.ABC):
                 continue
             sets = mesh.node_sets if says.kind == "node set" else mesh.element_sets
             if value not in sets:
-                known = ", ".join(sorted(sets)) or "none"
-                raise ParameterError(name, f"the mesh has no {says.kind} '{value}' (it has {known})")
+                present = ", ".join(sorted(sets)) or "none"
+                raise ParameterError(name, f"the mesh has no {says.kind} '{value}' (it has {present})")
             if not sets[value].any():
                 raise ParameterError(name, f"the {says.kind} '{value}' is empty")
 

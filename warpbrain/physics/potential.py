@@ -60,10 +60,10 @@ def potential(entering: Sequence[Enters]) -> str:
     'sum V Psi(F) - f_1 . u - f_2 . u'
     """
     symbols: dict[str, list[str]] = {place: [] for place in PLACES}
-    names = [one.symbol for one in entering]
-    for number, one in enumerate(entering):
-        twice = names.count(one.symbol) > 1
-        symbols[one.place].append(f"{one.symbol}_{number + 1}" if twice else one.symbol)
+    names = [each.symbol for each in entering]
+    for number, entry in enumerate(entering):
+        twice = names.count(entry.symbol) > 1
+        symbols[entry.place].append(f"{entry.symbol}_{number + 1}" if twice else entry.symbol)
     strain = "F_e" if symbols["growth"] else "F"
     law = f"Psi_({', '.join(symbols['law'])})" if symbols["law"] else "Psi"
     elastic = [f"{name}({strain})" for name in (law, *symbols["energy"])]
@@ -75,7 +75,7 @@ def potential(entering: Sequence[Enters]) -> str:
     outer = [*symbols["part"], *(f"(1 + {name})" for name in symbols["growth"]), *([factors] if factors else [])]
     over = "".join(f" without {name}" for name in symbols["body"])
     text = " ".join([f"sum{over} V", *outer, _bracketed([*elastic, *tensions])])
-    filled = [one.fills for one in entering if one.fills]
+    filled = [each.fills for each in entering if each.fills]
     text += "".join(f" + {name}(u)" for name in (*filled, *symbols["beside"]))
     weights = [f"{' '.join([*symbols['part'], name])}" for name in symbols["weight"]]
     return text + "".join(f" - {name} . u" for name in (*symbols["load"], *weights))

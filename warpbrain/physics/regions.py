@@ -87,8 +87,8 @@ def element_directions(
     if direction is not None:
         return np.tile(unit_vector("direction", direction), (len(elements), 1))
     if field not in mesh.element_vectors:
-        known = ", ".join(sorted(mesh.element_vectors)) or "none"
-        raise ParameterError("field", f"the mesh has no array of directions '{field}' (it has {known})")
+        present = ", ".join(sorted(mesh.element_vectors)) or "none"
+        raise ParameterError("field", f"the mesh has no array of directions '{field}' (it has {present})")
     vectors = mesh.element_vectors[field][elements]
     with np.errstate(over="ignore", invalid="ignore"):
         lengths = np.linalg.norm(vectors, axis=1)

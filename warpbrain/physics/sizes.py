@@ -24,7 +24,7 @@ def size_in_words(
     """
     by_name = {value.name: value for value in values if math.isfinite(value.value)}
     if kind not in mechanisms():
-        return tuple(f"{name} {measured(one.value, one.sd, one.unit)}" for name, one in by_name.items())
+        return tuple(f"{name} {measured(value.value, value.sd, value.unit)}" for name, value in by_name.items())
     return tuple(mechanisms()[kind].size_in_words(by_name, gravity_axis))
 
 

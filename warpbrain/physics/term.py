@@ -18,8 +18,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats
+from warpbrain.kernels.extra_energy import extra_kernels
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.ten_nodes import TEN_NODES
+from warpbrain.kernels.tetrahedron import FOUR_NODES
 from warpbrain.mesh import QuadraticMesh, TetMesh
 
 Ints = NDArray[np.int32]
@@ -28,53 +31,23 @@ Ints = NDArray[np.int32]
 class Body(Protocol):
     """What a term may know of the system that it becomes part of."""
 
-    @property
-    def mesh(self) -> TetMesh:
-        """The reference shape."""
-
-    @property
-    def device(self) -> Any:
-        """Warp device."""
-
-    @property
-    def precision(self) -> Precision:
-        """Of every array."""
-
-    @property
-    def tetrahedra(self) -> NDArray[np.integer]:
-        """Corners (m, 4) of each element, ascending."""
-
-    @property
-    def nodes(self) -> wp.array:
-        """The same on the device."""
-
-    @property
-    def quadratic(self) -> QuadraticMesh | None:
-        """The reference shape with its midside nodes, if elements have some."""
-
-    @property
-    def node_mesh(self) -> TetMesh:
-        """Linear tetrahedra with a corner at every node: the reference shape, or its elements cut into eight."""
-
-    @property
-    def stencils(self) -> NDArray[np.integer]:
-        """Nodes of each element, ascending, (m, 4), or (m, 10) with midside nodes."""
-
-    @property
-    def element_nodes(self) -> wp.array:
-        """The same on the device: (m,) vec4i, or (m, 10) int."""
-
-    @property
-    def inverse_edges(self) -> wp.array:
-        """Gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]."""
-
-    @property
-    def constrained(self) -> Bools:
-        """Components (n, 3) of the displacement that are prescribed."""
-
-    @property
-    def movable(self) -> Bools:
-        """Nodes (n,) of which some component is not prescribed."""
+    mesh: TetMesh  # the reference shape
+    device: Any  # of Warp
+    precision: Precision  # of every array
+    tetrahedra: Ints  # corners (m, 4) of each element, ascending
+    nodes: wp.array  # the same on the device
+    quadratic: QuadraticMesh | None  # the reference shape with its midside nodes, if elements have some
+    node_mesh: TetMesh  # linear tetrahedra with a corner at every node: the mesh, or its elements cut into eight
+    stencils: Ints  # nodes of each element, ascending, (m, 4), or (m, 10) with midside nodes
+    element_nodes: wp.array  # the same on the device: (m,) vec4i, or (m, 10) int
+    inverse_edges: wp.array  # gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]
+    constrained: Bools  # components (n, 3) of the displacement that are prescribed
+    movable: Bools  # nodes (n,) of which some component is not prescribed
+    #: As they are now: a factor on all moduli of each element (m,), the part of it that is left, its stretch without
+    #: stress.
+    stiffness_factors: Floats
+    remaining_parts: Floats
+    growth_stretches: Floats
 
     @property
     def volumetric_moduli(self) -> Floats:
@@ -83,18 +56,6 @@ class Body(Protocol):
     @property
     def shear_moduli(self) -> Floats:
         """At rest, of each element (m,) [Pa]."""
-
-    @property
-    def stiffness_factors(self) -> Floats:
-        """Factor (m,) on all moduli of each element, as it is now."""
-
-    @property
-    def remaining_parts(self) -> Floats:
-        """Part (m,) of each element that is left, as it is now."""
-
-    @property
-    def growth_stretches(self) -> Floats:
-        """Stretch (m,) of each element without stress, as it is now."""
 
 
 @dataclass(frozen=True)
@@ -317,3 +278,55 @@ class Following(Protocol):
 
     def bind(self, body: Body) -> Term:
         """The term on a body."""
+
+
+@dataclass(frozen=True)
+class ExtraEnergy:
+    """Device functions of an added energy; see `warpbrain.kernels.extra_energy`."""
+
+    key: str  # part of the name of the compiled module
+    energy: Any
+    stress: Any
+    moduli: Any
+    #: ``"moduli"``: times the factor on the moduli of an element (fibres); ``"tissue"``: times the part of it that is
+    #: left (a tension, which is no modulus)
+    goes_with: str = "moduli"
+
+
+class ExtraEnergyTerm(KernelTerm):
+    """An added energy on some elements (k,) of a body, with numbers (k, c) of each; the ramp is over time [s].
+
+    It is part of the tissue: an energy of the elastic deformation `F_e = F F_g^-1` on the grown volume, times a factor
+    of each element: that on its moduli, or the part of it that is left.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        code: ExtraEnergy,
+        elements: NDArray[np.integer],
+        data: Floats,
+        ramp: Callable[[float], float],
+    ) -> None:
+        stencil = FOUR_NODES if body.quadratic is None else TEN_NODES
+        kernels = extra_kernels(code.key, code.energy, code.stress, code.moduli, body.precision, stencil)
+        super().__init__(body, body.stencils[elements], kernels, ramp)
+        scalar = body.precision.scalar
+        self.elements, self.of_moduli = elements, code.goes_with == "moduli"
+        self._elements = self.array(elements, int)
+        self._volume = self.array(body.mesh.volumes[elements], scalar)
+        self._stretch = self.array(np.ones(len(elements)), scalar)
+        self.take_moduli()
+        self._data = self.array(data, scalar)
+
+    def take_moduli(self) -> None:
+        assert self.elements is not None
+        body = self.body
+        factor = body.stiffness_factors if self.of_moduli else body.remaining_parts
+        self._volume.assign((factor * body.mesh.volumes)[self.elements])
+        self._stretch.assign(body.growth_stretches[self.elements])
+
+    def _inputs(self) -> list[Any]:
+        body = self.body
+        geometry = [self._elements, body.element_nodes, body.inverse_edges, self._volume, self._stretch]
+        return [*geometry, self._data, self.scale]

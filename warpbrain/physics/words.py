@@ -150,7 +150,7 @@ def unsure(value: Value) -> bool:
 def vector_in(values: Values, name: str) -> Floats:
     """Components (3,) of a parameter that is a vector; zero where nothing is known."""
     components = (values.get(f"{name}_{axis}") for axis in "xyz")
-    return np.array([0.0 if one is None else one.value for one in components])
+    return np.array([0.0 if component is None else component.value for component in components])
 
 
 def radius_in_words(values: Values) -> list[str]:
@@ -171,8 +171,8 @@ def clauses(parameters: Mapping[str, Says], values: Values) -> list[str]:
         if says is None or says.kind not in ("number", "numbers"):
             continue
         clause = label(says.doc)
-        whose = "" if "'" in clause.split(" ")[0] else "its "
-        positive, *others = says.told or (f"{whose}{clause} is {{}}",)
+        possessive = "" if "'" in clause.split(" ")[0] else "its "
+        positive, *others = says.told or (f"{possessive}{clause} is {{}}",)
         size = value.value
         if others and unsure(value):
             positive = f"{others[1]}, {HARDLY}"

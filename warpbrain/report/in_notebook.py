@@ -23,7 +23,7 @@ from warpbrain.report.page import part
 from warpbrain.report.summary import SET_TITLES, describe_result, left_out
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.run import Run
-from warpbrain.simulation.specimen_run import SpecimenRun
+from warpbrain.simulation.specimen import SpecimenRun
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: A row: what, and what of it.

@@ -19,7 +19,7 @@ from warpbrain.report.files import body_file, file_of_result, sets_of
 from warpbrain.report.views import TISSUE_COLOURS
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.run import Run
-from warpbrain.simulation.specimen_run import SpecimenRun
+from warpbrain.simulation.specimen import SpecimenRun
 
 #: What the fields are called that are shown unless another is asked for, and in which colours.
 _UNITS = {

@@ -29,7 +29,7 @@ from warpbrain.report.specimen import tests_figure
 from warpbrain.report.summary import displacement_rows
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, QUIET, VERMILLION
 from warpbrain.simulation.run import Run
-from warpbrain.simulation.specimen_run import Tested
+from warpbrain.simulation.specimen import Tested
 
 #: Letters of a line of a picture's title.
 _LINE = 150

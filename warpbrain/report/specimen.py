@@ -21,8 +21,7 @@ from warpbrain.report.summary import describe_case
 from warpbrain.report.views import BLACK, BLUE, VERMILLION
 from warpbrain.simulation.locking import largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model
-from warpbrain.simulation.specimen import SHOWN, interpolated
-from warpbrain.simulation.specimen_run import Tested
+from warpbrain.simulation.specimen import SHOWN, Tested, interpolated
 
 #: Colour and shape of recorded points by role; told apart by the colour-blind and without any colour.
 _STYLES = {"fit": (BLUE, "o"), "check": (VERMILLION, "x")}

@@ -13,6 +13,7 @@ are linear in the volumetric modulus, so the first sum is the law with another o
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
@@ -39,24 +40,47 @@ def averaged_modulus(material: Material) -> float:
     return (material.volumetric_modulus - PART * own_modulus(material)) / (1.0 - PART)
 
 
-class AveragedTerm(Term):
-    """Patches of as many nodes each, under the law of some kernels: nodes (k, s), ascending, and elements of each
-    patch.
-    """
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Patches of as many nodes each: nodes (k, s), ascending, and by pairs of element and patch what each has of it."""
 
-    def __init__(self, body: Body, nodes: Ints, elements: list[Ints], kernels: ElementKernels) -> None:
-        super().__init__(body, nodes)
-        p, device, count = body.precision, body.device, len(nodes)
+    nodes: Ints
+    members: Ints  # elements (c,)
+    owner: Ints  # patch (c,) of each
+    shares: Floats  # volume (c,) [m3] of the element that is the patch's
+    gradients: Floats  # `G_b` (k, s, 3) [1/m]: means of the gradients of shape functions
+
+    @classmethod
+    def of(cls, body: Body, nodes: Ints, elements: list[Ints]) -> Patches:
+        """Of the nodes (k, s) and the elements of each."""
+        members = np.concatenate(elements)
+        owner = np.repeat(np.arange(len(nodes)), [len(each) for each in elements])
+        shares = 0.25 * body.mesh.volumes[members]
+        last = body.inverse_edges.numpy().astype(np.float64)[members]
+        gradients = np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1)
+        corners = body.tetrahedra[members]
+        # where each corner stands among the patch's nodes
+        places = np.stack([np.sum(nodes[owner] < corners[:, a, None], axis=1) for a in range(4)], axis=1)
+        means = np.zeros((*nodes.shape, 3))
+        np.add.at(means, (owner[:, None], places), shares[:, None, None] * gradients)
+        volumes = np.bincount(owner, shares, minlength=len(nodes)).astype(np.float64)
+        return cls(nodes, members, owner, shares, means / volumes[:, None, None])
+
+
+class AveragedTerm(Term):
+    """Patches of as many nodes each, under the law of some kernels."""
+
+    def __init__(self, body: Body, patches: Patches, kernels: ElementKernels) -> None:
+        super().__init__(body, patches.nodes)
+        p, device, count = body.precision, body.device, len(patches.nodes)
         self._law, self._kernels = kernels, averaged_kernels(p)
-        self._members = np.concatenate(elements)
-        self._owner = np.repeat(np.arange(count), [len(own) for own in elements])
-        self._shares = 0.25 * body.mesh.volumes[self._members]
+        self._members, self._owner, self._shares = patches.members, patches.owner, patches.shares
         self._nodes = wp.array(self.stencils, dtype=int, device=device)
-        self._gradients = self.array(self._mean_gradients(body), p.vec3)
+        self._gradients = self.array(patches.gradients, p.vec3)
         self._volumes = np.zeros(count)
         self._volume = wp.zeros(count, dtype=p.scalar, device=device)
         self._parameters: wp.array = None
-        rows, columns = np.triu_indices(nodes.shape[1])
+        rows, columns = np.triu_indices(patches.nodes.shape[1])
         self._rows, self._columns = self.array(rows, int), self.array(columns, int)
         self._all = self.array(np.arange(count), int)
         self._F = wp.zeros(count, dtype=p.mat33, device=device)
@@ -64,21 +88,10 @@ class AveragedTerm(Term):
         self._density = wp.zeros(count, dtype=p.scalar, device=device)
         self._moduli = wp.zeros((count, 3, 3), dtype=p.mat33, device=device)
 
-    def _mean_gradients(self, body: Body) -> Floats:
-        """`G_b` (k, s, 3) [1/m]."""
-        last = body.inverse_edges.numpy().astype(np.float64)[self._members]
-        own = np.concatenate([-last.sum(axis=1, keepdims=True), last], axis=1)
-        corners = body.tetrahedra[self._members]
-        # where each corner stands among the patch's nodes
-        places = np.stack([np.sum(self.stencils[self._owner] < corners[:, a, None], axis=1) for a in range(4)], axis=1)
-        found = np.zeros((*self.stencils.shape, 3))
-        np.add.at(found, (self._owner[:, None], places), self._shares[:, None, None] * own)
-        return found / self._sum(np.ones(len(body.tetrahedra)))[:, None, None]
-
     def _sum(self, values: Floats) -> Floats:
         """Sum of `w_e` times values of elements over each patch."""
-        found = np.bincount(self._owner, self._shares * values[self._members], minlength=len(self.stencils))
-        return found.astype(np.float64)
+        sums = np.bincount(self._owner, self._shares * values[self._members], minlength=len(self.stencils))
+        return sums.astype(np.float64)
 
     def set_elements(self, parameters: Floats, weight: Floats) -> None:
         """Take what the elements have: parameters (m, c) of the law, of which each patch takes the mean, and a factor
@@ -146,13 +159,13 @@ def node_patches(tetrahedra: NDArray[np.integer], kinds: NDArray[np.integer]) ->
         yield elements, np.unique(tetrahedra[elements])
 
 
-def averaged_terms(body: Body, labels: Sequence[int], kernels: ElementKernels, kinds: Ints) -> list[AveragedTerm]:
-    """The patches of some tissues that have one law, of elements of one kind each: a term for each number of nodes."""
+def patches_of(body: Body, labels: Sequence[int], kinds: Ints) -> list[Patches]:
+    """Those of some tissues, of elements of one kind each: a family for each number of nodes."""
     families: dict[int, list[tuple[Ints, Ints]]] = {}
     for elements, nodes in node_patches(body.tetrahedra, kinds):
         if int(body.mesh.tissue[elements[0]]) in labels:
             families.setdefault(len(nodes), []).append((nodes, elements))
     return [
-        AveragedTerm(body, np.array([nodes for nodes, _ in patches]), [elements for _, elements in patches], kernels)
+        Patches.of(body, np.array([nodes for nodes, _ in patches]), [elements for _, elements in patches])
         for _, patches in sorted(families.items())
     ]

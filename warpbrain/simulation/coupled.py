@@ -7,8 +7,10 @@ sparse, and symmetric:
     [ -sqrt(w) B        -A      ] [ p ] = [ 0 ]
 
 but indefinite: MINRES (`warpbrain.kernels.minimal_residual`), preconditioned by the inverse diagonal blocks of `K` and
-the diagonal of `A + w B diag(K)^-1 B^T`. `A` is next to nothing where fluid has no time to flow; what is left of the
-second row is a force many times larger. So a solve ends only when the residual of the eliminated system is small.
+the diagonal of `A + w B diag(K)^-1 B^T`. Of several such terms, as of two fluids in one skeleton, `p` are the unknowns
+of each in turn: they meet in the displacement alone, so `A` has a block for each term. `A` is next to nothing where
+fluid has no time to flow; what is left of the second row is a force many times larger. So a solve ends only when the
+residual of the eliminated system is small.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ import warp as wp
 
 from warpbrain.kernels.coupled import coupled_kernels
 from warpbrain.kernels.linear import ConjugateGradient, LinearResult, linear_kernels
-from warpbrain.kernels.minimal_residual import MinimalResidual, four_vector
+from warpbrain.kernels.minimal_residual import MinimalResidual, node_vector
 from warpbrain.kernels.multicore import launch
 from warpbrain.physics.term import Coupling, Term
 
@@ -49,9 +51,9 @@ class LinearSolver(Protocol):
 
 
 class CoupledSolver:
-    """Solves the system's matrix together with what a term with unknowns of its own adds to it: one of them.
+    """Solves the system's matrix together with what terms with unknowns of their own add to it.
 
-    `conjugate_gradient` is for times when these do not follow the displacement; the tolerance is relative.
+    `conjugate_gradient` is for times when none of these follow the displacement; the tolerance is relative.
     """
 
     def __init__(
@@ -63,57 +65,64 @@ class CoupledSolver:
         tolerance: float,
         max_iterations: int,
     ) -> None:
-        [self._term] = terms
-        self._system, self._plain = system, conjugate_gradient
-        self._tolerance = tolerance
+        self._system, self._terms, self._plain = system, terms, conjugate_gradient
+        self._tolerance, self._max_iterations = tolerance, max_iterations
         p, n, device = system.precision, system.size, system.device
-        self._kernels = coupled_kernels(p)
         self._inverse = wp.zeros(n, dtype=p.mat33, device=device)
-        self._diagonal = wp.zeros(n, dtype=p.scalar, device=device)
         self._product = wp.zeros(n, dtype=p.vec3, device=device)
-        self._solver = MinimalResidual(
-            n, four_vector(p), p, device,
-            operator=self._multiply, preconditioner=self._precondition, max_iterations=max_iterations,
-        )  # fmt: skip
+        #: Of the terms whose unknowns follow the displacement, as of the last `prepare`.
+        self.couplings: list[Coupling] = []
         self._result: LinearResult | None = None
+
+    def _begin(self, couplings: list[Coupling]) -> None:
+        """Make what is needed for as many unknowns at each node."""
+        p, n, device, count = self._system.precision, self._system.size, self._system.device, len(couplings)
+        self.couplings = couplings
+        self._kernels = coupled_kernels(p, count)
+        self._diagonal = wp.zeros(n, dtype=node_vector(p, count), device=device)
+        self._solver = MinimalResidual(
+            n, node_vector(p, count), p, device,
+            operator=self._multiply, preconditioner=self._precondition, max_iterations=self._max_iterations,
+        )  # fmt: skip
 
     def _launch(self, kernel: object, *inputs: object) -> None:
         launch(kernel, self._system.size, inputs, self._system.device)
 
     def _multiply(self, x: wp.array, y: wp.array) -> None:
-        s, c = self._system, self.coupling
-        self._launch(
-            self._kernels.multiply, s.matrix.offsets, s.matrix.columns, s.matrix.values, c.offsets, c.columns,
-            c.compliance, c.own, c.others, s.free, s.coupling_root, x, y,
-        )  # fmt: skip
+        s, matrix = self._system, self._system.matrix
+        self._launch(self._kernels.multiply, matrix.offsets, matrix.columns, matrix.values, x, y)
+        for place, c in enumerate(self.couplings, 3):
+            self._launch(
+                self._kernels.couple, place, c.offsets, c.columns, c.compliance, c.own, c.others, s.free,
+                s.coupling_root, x, y,
+            )  # fmt: skip
 
     def _precondition(self, x: wp.array, y: wp.array) -> None:
         self._launch(self._kernels.apply_diagonal, self._inverse, self._diagonal, x, y)
-
-    @property
-    def coupling(self) -> Coupling:
-        """Of the term with unknowns of its own."""
-        assert self._term.coupling is not None
-        return self._term.coupling
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         self._plain.multiply(x, z)
 
     def prepare(self) -> None:
-        if not self._term.coupled:
+        couplings = [term.coupling for term in self._terms if term.coupled and term.coupling is not None]
+        if not couplings:
+            self.couplings = couplings
             self._plain.prepare()
             return
-        s, c = self._system, self.coupling
+        if [id(coupling) for coupling in couplings] != [id(coupling) for coupling in self.couplings]:
+            self._begin(couplings)
+        s = self._system
         self._launch(linear_kernels(s.precision).invert_diagonal, s.diagonal, s.matrix.values, self._inverse)
-        self._launch(
-            self._kernels.invert_coupled_diagonal, c.offsets, c.columns, c.compliance, c.own, s.free, s.coupling_root,
-            self._inverse, self._diagonal,
-        )  # fmt: skip
+        for place, c in enumerate(couplings, 3):
+            self._launch(
+                self._kernels.invert_coupled_diagonal, place, c.offsets, c.columns, c.compliance, c.own, s.free,
+                s.coupling_root, self._inverse, self._diagonal,
+            )  # fmt: skip
 
     def solve(self, tolerance: float | None = None) -> None:
         """See `LinearSolver`; begins with zero, for a guess of the displacement alone is none for both."""
         self._result = None
-        if not self._term.coupled:
+        if not self.couplings:
             self._plain.solve(tolerance)
             return
         s = self._system
@@ -164,7 +173,7 @@ class CoupledSolver:
         return LinearResult(iterations, residual, wanted * float(np.linalg.norm(load)), curvature)
 
     def result(self) -> LinearResult:
-        if not self._term.coupled:
+        if not self.couplings:
             return self._plain.result()
         # of a captured solve there is nothing but what it left
         return self._result or self.look(self._solver.result()[0], self._tolerance)

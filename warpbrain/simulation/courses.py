@@ -28,27 +28,17 @@ SLOW_STEPS = 20
 class Course:
     """How far a case is followed, and how closely. Of the first three at most one, but `steps` may go with `until`.
 
-    Parameters
-    ----------
-    steps : int, optional
-        Follow the motion for so many time steps of 1 ms; of slow change into how many it is divided.
-    to_rest : bool
-        Follow the damped motion until it is at rest.
-    until : float, optional
-        Follow slow change without inertia until then [s].
-    tolerance : float
-        Out-of-balance force in the end, relative to all nodal forces; see `EquilibriumOptions`.
-
     Raises
     ------
     InputError
         If they mean nothing together, or a number makes no sense.
     """
 
+    #: follow the motion for so many time steps of 1 ms; of slow change into how many it is divided
     steps: int | None = None
-    to_rest: bool = False
-    until: float | None = None
-    tolerance: float = 1e-8
+    to_rest: bool = False  # follow the damped motion until it is at rest
+    until: float | None = None  # follow slow change without inertia until then [s]
+    tolerance: float = 1e-8  # out-of-balance force in the end, relative to all nodal forces; see `EquilibriumOptions`
 
     def __post_init__(self) -> None:
         if self.steps is not None and (not isinstance(self.steps, int) or self.steps < 1):
@@ -64,63 +54,33 @@ class Course:
 
 @dataclass(frozen=True)
 class Watching:
-    """Who wants to know how a simulation gets on.
+    """Who wants to know how a simulation gets on."""
 
-    Attributes
-    ----------
-    newton : callable
-        Called with each Newton step to an equilibrium.
-    relaxation : callable
-        Called with each step of a motion to rest.
-    motion : callable
-        Called with the number of each step of a motion, and what is noted of it: nine of ten times nothing.
-    slow_newton : callable
-        Called with the part that is done of slow change, and each Newton step.
-    slow : callable
-        Called with the number of a moment of slow change, how many there will be, and what is noted of it.
-    """
-
-    newton: Callable[[NewtonStep], None] = lambda _step: None
-    relaxation: Callable[[RelaxationStep], None] = lambda _step: None
+    newton: Callable[[NewtonStep], None] = lambda _step: None  # called with each Newton step to an equilibrium
+    relaxation: Callable[[RelaxationStep], None] = lambda _step: None  # called with each step of a motion to rest
+    #: called with the number of each step of a motion, and what is noted of it: nine of ten times nothing
     motion: Callable[[int, float, dict[str, Any] | None], None] = lambda _number, _time, _noted: None
+    #: called with the part that is done of slow change, and each Newton step
     slow_newton: Callable[[float, NewtonStep], None] = lambda _part, _step: None
+    #: called with the number of a moment of slow change, how many there will be, and what is noted of it
     slow: Callable[[int, int, dict[str, Any]], None] = lambda _number, _count, _noted: None
 
 
 @dataclass(frozen=True)
 class Followed:
-    """What a course came to; the system has its last state.
+    """What a course came to; the system has its last state."""
 
-    Attributes
-    ----------
-    solution : dict
-        For `summary.json`: what kind of state it is, how closely it was found, and the steps to it.
-    time : float or None
-        Of the state [s]; None of one at rest.
-    states : mapping of float to NodalState
-        Earlier ones at which something was recorded.
-    begun : float
-        When the first step was done, of `time.perf_counter`.
-    seconds, calls : mapping of str
-        By phase.
-    """
-
+    #: for `summary.json`: what kind of state it is, how closely it was found, and the steps to it.
     solution: dict[str, Any]
-    time: float | None
-    begun: float
-    seconds: Mapping[str, float]
-    calls: Mapping[str, int]
-    states: Mapping[float, NodalState] = field(default_factory=dict)
+    time: float | None  # of the state [s]; None of one at rest
+    begun: float  # when the first step was done, of `time.perf_counter`
+    seconds: Mapping[str, float]  # by phase
+    calls: Mapping[str, int]  # by phase
+    states: Mapping[float, NodalState] = field(default_factory=dict)  # earlier ones at which something was recorded
 
 
 def follow(case: Case, system: System, course: Course, watching: Watching) -> Followed:
-    """Simulate a system of a case.
-
-    Raises
-    ------
-    SolveError
-        If there is no such state, or none was found.
-    """
+    """Simulate a system of a case; `SolveError` if there is no such state, or none was found."""
     if course.until is not None:
         return _slowly(case, system, course.until, course, watching)
     if course.steps is not None:
@@ -238,22 +198,10 @@ def _slowly(case: Case, system: System, until: float, course: Course, watching: 
 
 
 def states_at_rest(case: Case, system: System, end: NodalState, tolerance: float) -> dict[float, NodalState]:
-    """The state of each time at which something was recorded, or from which it is counted.
+    """The state of each time at which something was recorded, or from which it is counted, of the case of a system.
 
-    Parameters
-    ----------
-    case : Case
-    system : System
-        Of the case.
-    end : NodalState
-        Its state long after everything.
-    tolerance : float
-        Of the other equilibria; see `EquilibriumOptions`.
-
-    Raises
-    ------
-    SolveError
-        If there is no equilibrium at one of the times.
+    `end` is its state long after everything; the tolerance is that of the other equilibria. `SolveError` if there is
+    none at one of the times.
     """
     moments = Moments.recorded(case)
     states, near = {math.inf: end}, end.u
@@ -264,9 +212,9 @@ def states_at_rest(case: Case, system: System, end: NodalState, tolerance: float
         if number not in reached:
             model = replace(model_of(moments.cases[number]), elements=system.model.elements)
             other = System(model, str(system.device), system.precision.name)
-            found = EquilibriumSolver(other, EquilibriumOptions(tolerance=tolerance)).solve(start=near)
-            other.u.assign(found.u)
+            equilibrium = EquilibriumSolver(other, EquilibriumOptions(tolerance=tolerance)).solve(start=near)
+            other.u.assign(equilibrium.u)
             reached[number] = nodal_state_of(other)
-            near = found.u
+            near = equilibrium.u
         states[at] = reached[number]
     return states

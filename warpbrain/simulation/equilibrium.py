@@ -33,31 +33,15 @@ _TERMS = 2.0
 
 @dataclass(frozen=True)
 class NewtonStep:
-    """One line of the solver's history.
+    """One line of the solver's history."""
 
-    Attributes
-    ----------
-    load : float
-        Load fraction that is being solved for.
-    iteration : int
-        Newton iteration within the load step, from 1.
-    residual : float
-        Norm of the out-of-balance force before the iteration, relative to the forces in play.
-    cg_iterations : int
-    step : float
-        Length of the accepted step, 1 for a full one.
-    min_J : float
-        Smallest volume ratio after the step.
-    indefinite : bool
-        The tangent was seen not to be positive definite, and a multiple of the mass was added to it until it was.
-    """
-
-    load: float
-    iteration: int
-    residual: float
+    load: float  # load fraction that is being solved for
+    iteration: int  # Newton iteration within the load step, from 1
+    residual: float  # norm of the out-of-balance force before the iteration, relative to the forces in play
     cg_iterations: int
-    step: float
-    min_J: float
+    step: float  # length of the accepted step, 1 for a full one
+    min_J: float  # smallest volume ratio after the step
+    #: the tangent was seen not to be positive definite, and a multiple of the mass was added to it until it was
     indefinite: bool = False
 
 
@@ -199,7 +183,9 @@ class EquilibriumSolver:
         self._noise = _TERMS * system.precision.epsilon * stiffest * system.model.mesh.volume ** (2.0 / 3.0)
         self._energy_noise = _TERMS * system.precision.epsilon * stiffest * system.model.mesh.volume
 
-    def solve(self, external: Floats | None = None, start: Floats | None = None) -> Equilibrium:
+    def solve(
+        self, external: Floats | None = None, start: Floats | None = None, prescribed: Floats | None = None
+    ) -> Equilibrium:
         """Go from a start (rest by default) to equilibrium at full load.
 
         Parameters
@@ -208,6 +194,8 @@ class EquilibriumSolver:
             Nodal forces at full load [N]; those of the model by default.
         start : (n, 3) array, optional
             Displacement to start from [m], taken as in equilibrium at no load.
+        prescribed : (n, 3) array, optional
+            Displacement of the constrained components at full load [m]; that of the model by default.
 
         Returns
         -------
@@ -226,7 +214,7 @@ class EquilibriumSolver:
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
         self.system.set_time_step(math.inf)
         self.system.forget()
-        return self._follow(u, full)
+        return self._follow(u, full, model.prescribed if prescribed is None else prescribed)
 
     def linear_estimate(self) -> Floats:
         """Displacement (n, 3) [m] at full load if the body kept the stiffness that it has at rest.
@@ -254,7 +242,9 @@ class EquilibriumSolver:
             raise SolveError("the stiffness of the body at rest is not positive definite")
         return d
 
-    def step(self, start: Floats, time_step: float, time: float = math.inf) -> Equilibrium:
+    def step(
+        self, start: Floats, time_step: float, time: float = math.inf, prescribed: Floats | None = None
+    ) -> Equilibrium:
         """Go on from a state to the equilibrium a time step later, slowly: without inertia, but with memory.
 
         Terms with a memory keep it and take the step into it. To begin at rest, let them forget first (`Term.forget`).
@@ -267,28 +257,33 @@ class EquilibriumSolver:
             [s]; 0 for a change that is over at once.
         time : float
             At the end of the step [s], for what has a ramp; by default long after every one.
+        prescribed : (n, 3) array, optional
+            Displacement of the constrained components at the end of the step [m]; that of the model by default.
 
         Raises
         ------
         InputError, SolveError
             As `solve`.
         """
-        found = self.try_step(start, time_step, time)
-        self.system.u.assign(found.u)
+        equilibrium = self.try_step(start, time_step, time, prescribed)
+        self.system.u.assign(equilibrium.u)
         self.system.advance()
-        return found
+        return equilibrium
 
-    def try_step(self, start: Floats, time_step: float, time: float = math.inf) -> Equilibrium:
+    def try_step(
+        self, start: Floats, time_step: float, time: float = math.inf, prescribed: Floats | None = None
+    ) -> Equilibrium:
         """As `step`, but terms with a memory do not take the step into it: what they say is still of its end."""
-        require_held(self.system.model)
+        model = self.system.model
+        require_held(model)
         self.system.set_time_step(time_step)
-        return self._follow(np.array(start, dtype=np.float64), self.system.model.external_forces(time), time)
+        prescribed = model.prescribed_at(time, 1.0) if prescribed is None else prescribed
+        return self._follow(np.array(start, dtype=np.float64), model.external_forces(time), prescribed, time)
 
-    def _follow(self, u: Floats, full: Floats, time: float | None = None) -> Equilibrium:
+    def _follow(self, u: Floats, full: Floats, prescribed: Floats, time: float | None = None) -> Equilibrium:
         """Go from a state to full load; at a time, what acts is all there and only what is prescribed moves."""
         model = self.system.model
         origin = np.where(model.constrained, u, 0.0)
-        prescribed = model.prescribed if time is None else model.prescribed_at(time, 1.0)
         self._history = []
         done, step = 0.0, self.options.max_load_step
         while done < 1.0:
@@ -394,9 +389,9 @@ class EquilibriumSolver:
                 )
             # far from equilibrium the tangent changes too much from step to step
             near = secants is not None and not moving and relative < _NEAR
-            known, left = secants.split(u, r) if secants is not None and near else (0.0, r)
+            predicted, left = secants.split(u, r) if secants is not None and near else (0.0, r)
             d, linear, shift, indefinite = self._descent(left, prescribed, moving, min(eta, 0.5), shift)
-            d = d + known
+            d = d + predicted
             with self.clock.phase("line search"):
                 alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)
             record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J, indefinite)

@@ -12,27 +12,21 @@ from warpbrain.arrays import Floats
 _STRETCH = 0.01
 
 
-def extrapolated(known: Sequence[tuple[Floats, Floats]], at: Floats) -> Floats:
-    """What is expected of a function of numbers (k,) at some of them, from its values (...) at others.
+def extrapolated(values: Sequence[tuple[Floats, Floats]], at: Floats) -> Floats:
+    """What is expected of a function of numbers (k,) at some of them, from its values (...) at one or more others.
 
     Of the nearest value, and as much of the differences of others to it as makes up for the distance. It is only where
     to begin: nothing that is found depends on it.
-
-    Parameters
-    ----------
-    known : sequence of pairs of numbers (k,) and values (...)
-        One or more.
-    at : (k,) array
     """
-    distances = [float(np.linalg.norm(at - one)) for one, _ in known]
+    distances = [float(np.linalg.norm(at - numbers)) for numbers, _ in values]
     order = np.argsort(distances, kind="stable").tolist()
-    nearest, value = known[order[0]]
+    nearest, value = values[order[0]]
     away = at - nearest
     size = float(np.linalg.norm(away))
-    others = [known[number] for number in order[1:]]
+    others = [values[number] for number in order[1:]]
     if size == 0.0 or not others:
         return value
-    between = np.column_stack([one - nearest for one, _ in others]) / size
+    between = np.column_stack([numbers - nearest for numbers, _ in others]) / size
     # by least squares: normal equations are singular where some states are many times as far away as the nearest one
     stretch = np.sqrt(_STRETCH) * np.eye(len(others))
     target = np.append(away / size, np.zeros(len(others)))

@@ -146,7 +146,7 @@ class FactoredSolver:
 
 
 class CoupledBlock:
-    """The system's matrix with a term's own unknowns, on the host.
+    """The system's matrix with the unknowns of terms of their own, on the host.
 
     `K` is what is in blocks [N/m], SciPy BSR (3 n, 3 n), constrained rows and columns replaced by the identity, and
     `free` (3 n,) says which are not. Of the matrix `before` the factors of `S0` are taken if that is still the same.
@@ -155,19 +155,25 @@ class CoupledBlock:
     def __init__(
         self, system: System, captured: CoupledSolver, K: Any, free: NDArray[np.bool_], before: CoupledBlock | None
     ) -> None:
-        from scipy.sparse import csr_matrix, diags
+        from scipy.sparse import block_diag, csr_matrix, diags, vstack
 
         self._system, self._captured, self._K = system, captured, K
         self._root = float(system.coupling_root.numpy()[0])
-        n, c = system.size, captured.coupling
-        offsets, columns = c.offsets.numpy(), c.columns.numpy()
-        self._A = csr_matrix((c.compliance.numpy().astype(np.float64), columns, offsets), shape=(n, n))
-        components = (3 * columns[:, None] + np.arange(3)).ravel()
-        own = self._root * c.own.numpy().astype(np.float64).ravel() * free[components]
-        self._B = csr_matrix((own, components, 3 * offsets), shape=(n, 3 * n))
+        n, parts = system.size, []
+        for c in captured.couplings:
+            offsets, columns = c.offsets.numpy(), c.columns.numpy()
+            components = (3 * columns[:, None] + np.arange(3)).ravel()
+            coupling = self._root * c.own.numpy().astype(np.float64).ravel() * free[components]
+            A, Y = (
+                csr_matrix((values.numpy().astype(np.float64), columns, offsets), shape=(n, n))
+                for values in (c.compliance, c.yielding)
+            )
+            parts.append((A, csr_matrix((coupling, components, 3 * offsets), shape=(n, 3 * n)), Y))
+        compliances, couplings, yielding = zip(*parts, strict=True)
+        self._A = block_diag(compliances, format="csr")
+        self._B = vstack(couplings, format="csr")
         self._BT = self._B.T
-        Y = csr_matrix((c.yielding.numpy().astype(np.float64), columns, offsets), shape=(n, n))
-        S = self._A + self._root**2 * Y
+        S = self._A + self._root**2 * block_diag(yielding, format="csr")
         # a node without an unknown has no row
         self._S = (S + diags((S.diagonal() == 0.0).astype(np.float64))).tocsc()
         # it changes from step to step, not within one
@@ -194,7 +200,7 @@ class CoupledBlock:
 
         # both kinds of residual as parts of what their own unknown makes of one unit of energy
         weight = 1.0 / np.sqrt(np.abs(np.concatenate([self._K.diagonal(), self._S.diagonal()])))
-        b = np.concatenate([load, np.zeros(self._system.size)])
+        b = np.concatenate([load, np.zeros(self._A.shape[0])])
         x, length = np.zeros_like(b), float(np.linalg.norm(weight * b))
 
         def go_on(tolerance: float, done: int) -> int:
@@ -223,9 +229,9 @@ def _minimal_residual(
     for k in range(most):
         moved.append(preconditioner(basis[k] / weight))
         v = weight * operator(moved[k])
-        for i, one in enumerate(basis):
-            H[i, k] = one @ v
-            v -= H[i, k] * one
+        for i, vector in enumerate(basis):
+            H[i, k] = vector @ v
+            v -= H[i, k] * vector
         H[k + 1, k] = np.linalg.norm(v)
         begin = length * np.eye(1, k + 2)[0]
         answer = np.linalg.lstsq(H[: k + 2, : k + 1], begin, rcond=None)[0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,24 +14,17 @@ from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, nodes_of
 from warpbrain.mesh.refinement import finer_mesh
-from warpbrain.physics.force import NodalForce
-from warpbrain.physics.load import Load
+from warpbrain.physics.load import Load, NodalForce
 from warpbrain.physics.mechanism import Removing
-from warpbrain.simulation.model import Material, Model, with_mechanisms
+from warpbrain.simulation.model import Model, with_mechanisms
 from warpbrain.simulation.of_case import plain_model_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GivenForces(Load):
-    """Forces on the nodes of one mesh.
+    """Forces on the nodes of one mesh."""
 
-    Parameters
-    ----------
-    forces : (n, 3) array
-        [N]
-    """
-
-    forces: Floats
+    forces: Floats  # (n, 3) [N]
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         return self.forces
@@ -41,16 +33,9 @@ class GivenForces(Load):
 class FinerCase:
     """A case with every element cut into eight.
 
-    Parameters
-    ----------
-    case : Case
-
-    Attributes
-    ----------
-    case : Case
-        Without its resection, which is done already, and without forces that are shared by nodes: see `spread`.
-    prolongation : scipy.sparse matrix, shape (n', n)
-        From nodal values of the mesh that there was to those on the finer one; linear in every old element.
+    `case` is then without its resection, which is done already, and without forces that are shared by nodes: see
+    `spread`. `prolongation`, SciPy sparse (n', n), is from nodal values of the mesh that there was to those on the
+    finer one; linear in every old element.
     """
 
     def __init__(self, case: Case) -> None:
@@ -80,16 +65,15 @@ class FinerCase:
         density[loaded] = forces[loaded] / coarse[loaded, None]
         return np.asarray(fine[:, None] * (self.prolongation @ density))
 
-    def model(self, model: Model, materials: Mapping[int, Material] | None = None) -> Model:
-        """The finer model of what `model_of` makes of the case, with the same elements; of other materials if given."""
+    def model(self, model: Model) -> Model:
+        """The finer model of what `model_of` makes of the case, with the same elements."""
         plain = self._plain
         shared = [
             GivenForces(forces=self.spread(load.nodal_forces(model.mesh)), ramp=load.ramp)
             for load in model.loads
             if isinstance(load, NodalForce)
         ]
-        known = plain.materials if materials is None else materials
-        loaded = replace(plain, materials=known, loads=[*plain.loads, *shared], elements=model.elements)
+        loaded = replace(plain, loads=[*plain.loads, *shared], elements=model.elements)
         return with_mechanisms(loaded, self.case.mechanisms)
 
     @cached_property

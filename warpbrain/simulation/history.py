@@ -26,30 +26,22 @@ SHORTER = 4
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """States to compute.
+    """States to compute."""
 
-    Attributes
-    ----------
-    time, imposed : (k,) array
-        In the order of time; the first is that of the first row.
-    corners : (c,) int array
-        Which of them are corners of the polygon, the first and the last among them.
-    """
-
-    time: Floats
-    imposed: Floats
-    corners: Ints
+    time: Floats  # (k,), increasing; the first is that of the first row
+    imposed: Floats  # (k,)
+    corners: Ints  # (c,), which of them are corners of the polygon, the first and the last among them
 
     def interpolated(self, response: Floats, time: Floats) -> Floats:
         """A computed response (k,) at any times between the first and the last; smooth between corners, not at them."""
         from scipy.interpolate import PchipInterpolator
 
-        found = np.full(len(time), response[0])
+        values = np.full(len(time), response[0])
         for a, b in zip(self.corners[:-1], self.corners[1:], strict=True):
             within = (time >= self.time[a]) & (time <= self.time[b])
             curve = PchipInterpolator(self.time[a : b + 1], response[a : b + 1])
-            found[within] = curve(time[within])
-        return found
+            values[within] = curve(time[within])
+        return values
 
 
 def history_of(
@@ -60,20 +52,11 @@ def history_of(
     shortest: float | None,
     ramps: Sequence[Sequence[float]] = (),
 ) -> History:
-    """The states of a record.
+    """The states of a record: its rows `time` (n,) [s], increasing, and `imposed` (n,).
 
-    Parameters
-    ----------
-    time, imposed : (n,) array
-        Rows; times [s] increase.
-    reach : float
-        Largest distance of an imposed value from rest.
-    steps : int
-        In which a side as long as the reach, or within a ramp, is cut at least.
-    shortest : float or None
-        Shortest time of relaxation [s]; None: nothing relaxes, and a rest is one step.
-    ramps : sequence of sequences of floats
-        Times of the corners of what acts with a ramp [s].
+    `reach` is the largest distance of an imposed value from rest; a side as long as that, or within a ramp, is cut into
+    `steps` at least. `shortest` is the shortest time of relaxation [s]; None: nothing relaxes, and a rest is one step.
+    `ramps` are times [s] of the corners of what acts with a ramp.
     """
     rows = corners_of(time, imposed, MISSED * reach)
     turns = [t for ramp in ramps for t in ramp if time[0] < t < time[-1]]

@@ -142,10 +142,10 @@ def _dense(matrix: Any) -> Any:
     rows = cupy.asarray(3 * np.repeat(np.arange(count), np.diff(offsets)))
     columns = 3 * cupy.asarray(matrix.columns)[: int(offsets[-1])]
     within = cupy.arange(3)
-    found = cupy.zeros((3 * count, 3 * count), dtype=np.float32)
+    dense = cupy.zeros((3 * count, 3 * count), dtype=np.float32)
     at = rows[:, None, None] + within[:, None], columns[:, None, None] + within
-    found[at] = cupy.asarray(matrix.values)[: int(offsets[-1])]
-    return found
+    dense[at] = cupy.asarray(matrix.values)[: int(offsets[-1])]
+    return dense
 
 
 def kept_for(device: Any) -> KeptFactors | None:

@@ -38,13 +38,8 @@ def largest_poisson(model: Model) -> float:
 
 
 def choose_elements(model: Model, linear_only: Sequence[str] = ()) -> Choice:
-    """Elements of a model for which nobody asked for any.
-
-    Parameters
-    ----------
-    model : Model
-    linear_only : sequence of str
-        What is to be done with it that cannot be done with nodes in the middle of edges.
+    """Elements of a model for which nobody asked for any; `linear_only` is to be done with it, and cannot be done with
+    nodes in the middle of edges.
     """
     poisson = largest_poisson(model)
     if poisson <= NEARLY_INCOMPRESSIBLE:
@@ -89,9 +84,9 @@ def elements_of_fits(poisson: float) -> str:
     return "tet4" if poisson <= NEARLY_INCOMPRESSIBLE else "tet4-averaged"
 
 
-def on_linear_elements(poisson: float, what: str) -> list[str]:
+def on_linear_elements(poisson: float, user: str) -> list[str]:
     """What is to be said of something that has linear tetrahedra only, of nearly incompressible tissue."""
     if poisson <= NEARLY_INCOMPRESSIBLE:
         return []
     elements = elements_of_fits(poisson)
-    return locking_sentences(elements, poisson, f"{what} has no other elements, and allows for what smaller ones show")
+    return locking_sentences(elements, poisson, f"{user} has no other elements, and allows for what smaller ones show")

@@ -35,21 +35,11 @@ _RICHARDSON = 4.0 / 3.0
 
 @dataclass(frozen=True, eq=False)
 class MeshError:
-    """An estimate of the error of a displacement: what is to be added to it.
+    """An estimate of the error of a displacement: what is to be added to it."""
 
-    Attributes
-    ----------
-    locking : (n, 3) array
-        `L` [m].
-    size : (n, 3) array or None
-        `M` [m]; None if no smaller elements were tried.
-    reactions : (n, 3) array
-        The same of the reactions, both parts together [N].
-    """
-
-    locking: Floats
-    size: Floats | None
-    reactions: Floats
+    locking: Floats  # (n, 3), `L` [m]
+    size: Floats | None  # (n, 3), `M` [m]; None if no smaller elements were tried
+    reactions: Floats  # (n, 3), the same of the reactions, both parts together [N]
 
     @property
     def u(self) -> Floats:
@@ -68,21 +58,10 @@ Solve = Callable[[str, bool, Floats], State]
 
 
 def estimate(state: State, elements: str, solve: Solve, prolongation: Any = None) -> MeshError:
-    """Estimate the error of a state.
+    """Estimate the error of a state on a kind of `elements`.
 
-    Parameters
-    ----------
-    state : State
-    elements : str
-        Its kind of elements.
-    solve : callable
-    prolongation : sparse matrix (n', n), optional
-        To the finer mesh, see `FinerCase`; without it no smaller elements are tried.
-
-    Raises
-    ------
-    SolveError
-        If a state is not found on other elements.
+    Without a `prolongation` (n', n) to the finer mesh, see `FinerCase`, no smaller elements are tried. `SolveError` if
+    a state is not found on other elements.
     """
     other = "tet4-averaged" if elements == "tet4" else elements
     free = state if other == elements else solve(other, False, state.u)
@@ -106,34 +85,18 @@ def mesh_error(
     device: str | None = None,
     on_share: Callable[[float, str], None] | None = None,
 ) -> MeshError:
-    """Estimate the error of what was simulated of a case.
+    """Estimate the error of what was simulated of a case and its model.
 
-    Parameters
-    ----------
-    case : Case
-    model : Model
-        Of the case.
-    result : Result
-        An equilibrium or the end of a motion to rest; the end of a motion if `steps` says so.
-    smaller : bool
-        Whether elements of half the size are tried, at about ten times the cost.
-    steps : int, optional
-        Time steps of the motion, of 1 ms.
-    device : str, optional
-    on_share : callable, optional
-        Called with the share of the present solve that is done, and what it is.
-
-    Raises
-    ------
-    SolveError
-        If the state is not found on other elements.
+    The result is an equilibrium or the end of a motion to rest; the end of a motion if `steps`, of 1 ms, says so. With
+    `smaller` elements of half the size are tried, at about ten times the cost. `on_share` is called with the share of
+    the present solve that is done, and what it is. `SolveError` if the state is not found on other elements.
     """
     finer = FinerCase(case) if smaller else None
 
     def solve(elements: str, small: bool, start: Floats) -> State:
         solved = replace(finer.model(model) if small and finer is not None else model, elements=elements)
-        what = "half the size" if small else elements
-        say = (lambda share: None) if on_share is None else (lambda share: on_share(share, what))
+        label = "half the size" if small else elements
+        say = (lambda share: None) if on_share is None else (lambda share: on_share(share, label))
         try:
             if steps is None:
                 return _equilibrium(System(solved, device), start, say)
@@ -152,8 +115,9 @@ def observe_without(case: Case, result: Result, error: MeshError, time: float | 
 def _equilibrium(system: System, start: Floats, say: Callable[[float], None]) -> NodalState:
     say(0.0)
     options = EquilibriumOptions(tolerance=TOLERANCE)
-    found = EquilibriumSolver(system, options, lambda step: say(step.load)).solve(start=start)
-    return NodalState(system.mesh, found.u, system.model.reactions(found.internal, system.model.external_forces()))
+    equilibrium = EquilibriumSolver(system, options, lambda step: say(step.load)).solve(start=start)
+    reactions = system.model.reactions(equilibrium.internal, system.model.external_forces())
+    return NodalState(system.mesh, equilibrium.u, reactions)
 
 
 def _motion(system: System, steps: int, say: Callable[[float], None]) -> NodalState:

@@ -95,8 +95,8 @@ class NodalVolumeTerm(_PatchTerm):
         """
 
         def total(values: Floats) -> Floats:
-            found = np.bincount(self._patches.ravel(), self._shares * np.repeat(values, 4), self.count)
-            return found.astype(np.float64)
+            sums = np.bincount(self._patches.ravel(), self._shares * np.repeat(values, 4), self.count)
+            return sums.astype(np.float64)
 
         self._volumes = total(growth)
         with np.errstate(divide="ignore"):
@@ -204,8 +204,8 @@ class PatchStiffnessTerm(_PatchTerm):
         columns = 3 * self._nodes.numpy()[self._entries.numpy(), None] + np.arange(3)
         shape = (self._volumes.count, 3 * len(self.stencils))
         G = csr_matrix((g.ravel(), (np.repeat(self._patches.numpy(), 3), columns.ravel())), shape)
-        own = block_diag(list(self.blocks.numpy()[:, 0].astype(np.float64)))
-        return G.T @ diags(self._volumes.curvature.numpy().astype(np.float64)) @ G - own
+        diagonal = block_diag(list(self.blocks.numpy()[:, 0].astype(np.float64)))
+        return G.T @ diags(self._volumes.curvature.numpy().astype(np.float64)) @ G - diagonal
 
     def energy(self, u: wp.array) -> float:
         return 0.0

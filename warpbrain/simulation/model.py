@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
@@ -68,21 +68,11 @@ class Damping:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A displacement that some nodes are given over time.
+    """A displacement that some nodes are given over time."""
 
-    Attributes
-    ----------
-    nodes : (n,) bool array
-        Of the mesh's own nodes; midside nodes between them follow.
-    times : (k,) array
-        [s], increasing.
-    values : (k, 3) array
-        [m], linear between the times and constant outside them.
-    """
-
-    nodes: Bools
-    times: Floats
-    values: Floats
+    nodes: Bools  # (n,), of the mesh's own nodes; midside nodes between them follow
+    times: Floats  # (k,) [s], increasing
+    values: Floats  # (k, 3) [m], linear between the times and constant outside them
 
     def at(self, time: float) -> Floats:
         """Displacement (3,) [m] at a time [s]."""
@@ -160,11 +150,24 @@ class Model:
             raise InputError("prescribed: a component that is not constrained has a displacement")
         if not (math.isfinite(self.density) and self.density > 0.0):
             raise InputError(f"density = {self.density:g} kg/m3: expected a positive number")
+        self._require_materials()
+        object.__setattr__(self, "constrained", constrained)
+        object.__setattr__(self, "prescribed", prescribed)
+
+    def with_materials(self, materials: Mapping[int, Material]) -> Model:
+        """The model of other tissue: materials by label, before its mechanisms say what law or compressibility it has.
+
+        Nothing that is known of the model is found again. `InputError` if a tissue has no material.
+        """
+        other: Model = object.__new__(Model)
+        other.__dict__.update(vars(self), materials=all_substituted(materials, self.mechanisms))
+        other._require_materials()
+        return other
+
+    def _require_materials(self) -> None:
         missing = sorted(set(self.mesh.labels) - set(self.materials))
         if missing:
             raise InputError(f"materials: no material for tissue {', '.join(map(str, missing))} of the mesh")
-        object.__setattr__(self, "constrained", constrained)
-        object.__setattr__(self, "prescribed", prescribed)
 
     def _require_quadratic(self) -> None:
         """Raise `InputError` if something acts that knows nothing of the midside nodes that the elements have."""
@@ -193,15 +196,14 @@ class Model:
     def prescribed_at(self, time: float, share: float) -> Floats:
         """Prescribed displacements (n, 3) [m] at a time [s]; a `share` of those that have no history."""
         displacement = share * self.prescribed
-        own = displacement[: len(self.mesh.points)]
-        moved: Bools = np.zeros(len(own), dtype=bool)
+        corners = displacement[: len(self.mesh.points)]
+        moved: Bools = np.zeros(len(corners), dtype=bool)
         for motion in self.motions:
-            own[motion.nodes] = motion.at(time)
+            corners[motion.nodes] = motion.at(time)
             moved[motion.nodes] = True
         if self.quadratic is not None and self.motions:
-            beside = np.any(moved[self.quadratic.ends], axis=1, keepdims=True)
-            follow = np.logical_and(self.constrained, beside)
-            displacement[follow] = self.quadratic.between(own)[follow]
+            follows = self.constrained & np.any(moved[self.quadratic.ends], axis=1, keepdims=True)
+            displacement[follows] = self.quadratic.between(corners)[follows]
         return displacement
 
     @property
@@ -329,13 +331,13 @@ def with_mechanisms(model: Model, mechanisms: Sequence[Mechanism]) -> Model:
     return replace(model, materials=materials, loads=(*loads, *model.loads), mechanisms=(*acting, *model.mechanisms))
 
 
-def all_substituted(materials: Mapping[int, Material], mechanisms: Iterable[Mechanism]) -> dict[int, Material]:
+def all_substituted(materials: Mapping[int, Material], mechanisms: Sequence[Mechanism]) -> dict[int, Material]:
     """The materials of tissues as those mechanisms that say something of their law have them, in their order."""
-    found = dict(materials)
+    substitutes = dict(materials)
     for mechanism in mechanisms:
         if isinstance(mechanism, Substituting):
-            found = substituted(found, mechanism)
-    return found
+            substitutes = substituted(substitutes, mechanism)
+    return substitutes
 
 
 def substituted(materials: Mapping[int, Material], mechanism: Substituting) -> dict[int, Material]:
@@ -365,9 +367,9 @@ def require_held(model: Model) -> None:
             motions[:, :, 3 + axis] = np.cross(np.eye(3)[axis], x) / size
         held = motions[model.constrained[members]]
         for nodes, directions in holding:
-            own = np.isin(nodes, members)
-            rows = motions[np.searchsorted(members, nodes[own])]
-            held = np.concatenate([held, np.einsum("ki,kij->kj", directions[own], rows)])
+            inside = np.isin(nodes, members)
+            rows = motions[np.searchsorted(members, nodes[inside])]
+            held = np.concatenate([held, np.einsum("ki,kij->kj", directions[inside], rows)])
         rank = int(np.linalg.matrix_rank(held, tol=1e-6)) if len(held) else 0
         if rank < 6:
             where = 1000.0 * mesh.points[members].mean(axis=0)

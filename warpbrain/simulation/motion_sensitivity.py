@@ -7,8 +7,8 @@ A step (`warpbrain.simulation.dynamics`) ends with nothing left of
 on the free components, where the linearised step has `u* = u0` and `c = h k_d + h^2`, and the implicit one
 `u* = u0 + h v` and `c = h k_d`. Its whole derivative is one five-point difference along the way of the parameter, the
 start of the step, the velocity at its end, and what terms with a memory remember there: a history beside each
-parameter, advanced along the way after each step (`warpbrain.simulation.beside`). So mechanisms that need times or
-rates are differentiated without knowing it. What is left is corrected with the matrix of the step.
+parameter, advanced along the way after each step (`warpbrain.simulation.parameter_stencil`). So mechanisms that need
+times or rates are differentiated without knowing it. What is left is corrected with the matrix of the step.
 
 Steps of many seconds are a series of states that are all but at rest, as recordings over minutes have them: inertia and
 damping vanish beside the stiffness.
@@ -26,36 +26,21 @@ from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
-from warpbrain.simulation.beside import Beside, ModelOf
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Model
-from warpbrain.simulation.refinement import lengths, refine
-from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, SeveralSolver, several_solver
+from warpbrain.simulation.parameter_stencil import ModelOf, ParameterStencil
+from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, SeveralSolver, lengths, refine, several_solver
 
 
 class MotionSensitivity:
     """Steps a simulator, and the derivatives of its motion with it.
 
-    Parameters
-    ----------
-    simulator : Simulator
-        As it is now is where all begins: its state does not depend on the parameters.
-    models : callable
-        From parameters (p,) to a model that differs from the system's in numbers only.
-    theta : (p,) array
-        The simulator goes on with the model of these.
-    scales : (p,) array, optional
-        By how much each must change to change much; see `warpbrain.simulation.beside`.
-    tolerance : float
-        Relative: what may be left of what a parameter puts out of balance in a step.
-    max_cg : int
-        Iterations of a linear solve.
+    As the simulator is now is where all begins: its state does not depend on the parameters `theta` (p,), with whose
+    model it goes on. `models` and `scales` are those of `warpbrain.simulation.sensitivity`; the tolerance is relative,
+    of what a parameter puts out of balance in a step.
 
-    Attributes
-    ----------
-    u, v : (p, n, 3) array
-        Derivatives of displacement [m per unit of the parameter] and velocity [m/s per unit]; zero on constrained
-        components, which move as they are told to whatever the parameters are.
+    `u` and `v` (p, n, 3) are the derivatives of displacement [m per unit of the parameter] and velocity [m/s per unit];
+    zero on constrained components, which move as they are told to whatever the parameters are.
     """
 
     def __init__(
@@ -72,8 +57,8 @@ class MotionSensitivity:
         self._tolerance = max(tolerance, 20.0 * system.precision.epsilon)
         # a step that was taken stands: terms keep what they need of it
         simulator.set_time_step(simulator.time_step)
-        self._beside = Beside(system, models, theta, scales)
-        count = len(self._beside)
+        self._stencil = ParameterStencil(system, models, theta, scales)
+        count = len(self._stencil)
         self._solver: SeveralSolver | None = None
         if count:
             self._solver = several_solver(system, count, self._tolerance, max_cg)
@@ -82,22 +67,19 @@ class MotionSensitivity:
     def step(self) -> None:
         """Advance motion and derivatives by one time step, which then stands: the simulator cannot go back.
 
-        Raises
-        ------
-        SolveError
-            If the step has no derivative, or a linear solve does not converge.
+        `SolveError` if the step has no derivative, or a linear solve does not converge.
         """
-        simulator, system, beside = self.simulator, self.simulator.system, self._beside
+        simulator, system, stencil = self.simulator, self.simulator.system, self._stencil
         u_start, v_start = _host(system.u), _host(simulator.v)
         simulator.step()
         if self._solver is None:
             return
         u_end = _host(system.u)
-        with beside.away():
+        with stencil.away():
             self.v = self._by_parameters(self._solver, u_start, v_start, u_end)
             self.u = self.u + simulator.time_step * self.v
-            if beside.remembers:
-                beside.remember(lambda k, offset: self._advance(u_end + offset * self.u[k]))
+            if stencil.remembers:
+                stencil.remember(lambda k, offset: self._advance(u_end + offset * self.u[k]))
 
     def _advance(self, u: Floats) -> None:
         system = self.simulator.system
@@ -106,13 +88,13 @@ class MotionSensitivity:
 
     def _by_parameters(self, solver: SeveralSolver, u_start: Floats, v_start: Floats, u_end: Floats) -> Floats:
         """Derivatives (p, n, 3) of the velocity at the end of the step."""
-        simulator, system, beside = self.simulator, self.simulator.system, self._beside
+        simulator, system, stencil = self.simulator, self.simulator.system, self._stencil
         h, damping = simulator.time_step, system.model.damping
         v_end = _host(simulator.v)
         linearised = simulator.newton == 1
         undamped = h * h if linearised else 0.0
         share = h * damping.stiffness + undamped
-        loaded = [h * beside.by_loads(k, simulator.time) for k in range(len(beside))]
+        loaded = [h * stencil.by_loads(k, simulator.time) for k in range(len(stencil))]
 
         def unbalanced(start: Floats, v_before: Floats, v: Floats) -> Floats:
             """`r` but for the loads, where the step begins at a displacement and a velocity."""
@@ -127,7 +109,7 @@ class MotionSensitivity:
             def look(offset: float, _: Model) -> Floats:
                 return unbalanced(u_start + offset * self.u[k], v_start + offset * self.v[k], v_end + offset * dv)
 
-            return beside.derivative(k, look)
+            return stencil.derivative(k, look)
 
         def left_of(k: int, dv: Floats) -> Floats:
             return loaded[k] - along(k, dv)
@@ -139,11 +121,11 @@ class MotionSensitivity:
         def correct(left: Floats) -> Floats:
             if system.coupled:
                 # what terms have of their own is in no matrix, and a look beside changes it
-                with beside.here():
+                with stencil.here():
                     stand()
             return corrections.correct(left)
 
-        with beside.here():
+        with stencil.here():
             stand()
             system.assemble(h * damping.stiffness + h * h, 1.0 + h * damping.mass, coupling=h * h)
             inertia = float(np.linalg.norm(_host(system.mass)[:, None] * v_end))
@@ -153,44 +135,26 @@ class MotionSensitivity:
         free = ~system.model.constrained
         # differences are exact to the rounding of what is summed over the step of a parameter
         rounding = ROUNDINGS * system.precision.epsilon * (h * system.size_of_forces() + inertia)
-        goals = 2.0 * self._tolerance * lengths(left, free) + rounding / beside.steps
+        goals = 2.0 * self._tolerance * lengths(left, free) + rounding / stencil.steps
         return refine(left_of, correct, start, left, goals, free)[0]
 
 
 def follow(
     simulator: Simulator, models: ModelOf, theta: ArrayLike, times: Sequence[float], scales: ArrayLike | None = None
 ) -> Floats:
-    """Derivatives of the displacement at times of a motion.
+    """Derivatives (t, p, n, 3) of the displacement [m per unit of the parameter] at times [s] of a motion that
+    increase.
 
-    Prescribed displacements without a history of their own are reached evenly over the whole.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        At a time before the first; it is at the last afterwards. Its time step is shortened so that a whole number of
-        equal steps leads from each time to the next.
-    models, theta, scales
-        See `MotionSensitivity`.
-    times : sequence of float
-        [s]
-
-    Returns
-    -------
-    (t, p, n, 3) array
-        [m per unit of the parameter]
-
-    Raises
-    ------
-    InputError
-        If the times do not increase.
-    SolveError
-        If a step fails, or has no derivative.
+    Prescribed displacements without a history of their own are reached evenly over the whole. The simulator, at a time
+    before the first, is at the last afterwards; its time step is shortened so that a whole number of equal steps leads
+    from each time to the next. For the others see `MotionSensitivity`. `InputError` if the times do not increase;
+    `SolveError` if a step fails, or has no derivative.
     """
     ends = [simulator.time, *map(float, times)]
     if not times or not all(a < b for a, b in itertools.pairwise(ends)):
         raise InputError(f"times = {list(times)}: expected times that increase, after {simulator.time:g} s")
     longest, begin = simulator.time_step, simulator.time
-    found = []
+    rates = []
     derivatives = MotionSensitivity(simulator, models, theta, scales)
     for start, end in itertools.pairwise(ends):
         steps = max(1, math.ceil((end - start) / longest * (1.0 - 1e-9)))
@@ -200,8 +164,8 @@ def follow(
             simulator.prescribe(simulator.system.model.prescribed_at(due, (due - begin) / (ends[-1] - begin)))
             derivatives.step()
             simulator.check()
-        found.append(derivatives.u)
-    return np.array(found)
+        rates.append(derivatives.u)
+    return np.array(rates)
 
 
 def _host(values: wp.array) -> Floats:

@@ -88,6 +88,6 @@ def toward_equilibrium(
         norms.append(norm)
         if norm <= tolerance * float(np.linalg.norm(internal) + np.linalg.norm(external)):
             break
-        known, left = secants.split(u, r)
-        u = u + known + inverse(left)
+        predicted, left = secants.split(u, r)
+        u = u + predicted + inverse(left)
     return best

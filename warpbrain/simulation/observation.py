@@ -39,18 +39,10 @@ class State(Protocol):
 
 @dataclass(frozen=True)
 class Observed:
-    """Comparisons of a state.
+    """Comparisons of a state."""
 
-    Attributes
-    ----------
-    comparisons : tuple of Comparison
-        One for each recording that has something to say of the state.
-    skipped : tuple of str
-        Why the others have not, a sentence each.
-    """
-
-    comparisons: tuple[Comparison, ...]
-    skipped: tuple[str, ...]
+    comparisons: tuple[Comparison, ...]  # one for each recording that has something to say of the state
+    skipped: tuple[str, ...]  # why the others have not, a sentence each
 
 
 def observe(

@@ -7,8 +7,7 @@ import numpy as np
 from warpbrain.cases.boundary import Displaced, Fixed, Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, require_kind
-from warpbrain.physics.force import NodalForce
-from warpbrain.physics.load import Load
+from warpbrain.physics.load import Load, NodalForce
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.model import Material, Model, Motion, with_mechanisms
 

@@ -26,21 +26,11 @@ _HALVINGS = 6
 
 @dataclass(frozen=True)
 class Moment:
-    """The state at one of the times.
+    """The state at one of the times."""
 
-    Attributes
-    ----------
-    time : float
-        [s]
-    state : Equilibrium
-        Its history is that of the last step alone.
-    steps : int
-        Steps since the time before; more than one where a step was halved.
-    """
-
-    time: float
-    state: Equilibrium
-    steps: int
+    time: float  # [s]
+    state: Equilibrium  # its history is that of the last step alone
+    steps: int  # steps since the time before; more than one where a step was halved
 
     @property
     def largest(self) -> float:
@@ -67,38 +57,16 @@ def follow_slowly(
     near: Sequence[Floats] = (),
     factors: KeptFactors | None = None,
 ) -> Iterator[Moment]:
-    """Equilibria at a series of times, from rest at the time 0.
+    """Equilibria at a series of times [s] that increase from 0, where the body is at rest.
 
-    What acts without a ramp of its own is there from the first step on. A course that is near to this one changes no
-    equilibrium, only where the search for each begins: at the state before and what the other course goes on by.
+    What acts without a ramp of its own is there from the first step on. A course that is near to this one, `near`, its
+    displacements (n, 3) [m] at each of the times or at the first alone, changes no equilibrium, only where the search
+    for each begins: at the state before and what the other course goes on by. `options.max_load_step` shares what is
+    prescribed within a step; `on_step` is called with each `NewtonStep`; for `factors` see `EquilibriumSolver`.
 
-    Parameters
-    ----------
-    system : System
-    times : sequence of float
-        [s], positive and increasing.
-    options : EquilibriumOptions
-        Its load steps share what is prescribed within a step.
-    on_step : callable, optional
-        Called with each `NewtonStep`.
-    clock : PhaseClock, optional
-        Adds up the wall time by phase.
-    near : sequence of (n, 3) arrays, optional
-        Displacement [m] at each of the times in a course that is near to this one; its first alone will do.
-    factors : KeptFactors, optional
-        See `EquilibriumSolver`.
-
-    Yields
-    ------
-    Moment
-        As soon as it is reached: the system has its displacement, and its terms are at the end of the step.
-
-    Raises
-    ------
-    InputError
-        If the times do not increase from 0, or nothing holds the body.
-    SolveError
-        If no equilibrium is found: when, where and why.
+    Each `Moment` is yielded as soon as it is reached: the system has its displacement, and its terms are at the end of
+    the step. `InputError` if the times do not increase from 0, or nothing holds the body; `SolveError` if no
+    equilibrium is found: when, where and why.
     """
     series = np.asarray(times, dtype=np.float64)
     if series.ndim != 1 or not len(series) or not (np.isfinite(series) & (np.diff(series, prepend=0) > 0)).all():

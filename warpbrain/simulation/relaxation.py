@@ -27,65 +27,36 @@ LINEAR_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class RelaxationStep:
-    """One line of the history.
+    """One line of the history."""
 
-    Attributes
-    ----------
-    time, time_step : float
-        [s]
-    residual : float
-        Out-of-balance force relative to the forces in play, at the end of the step.
-    cg_iterations : int
-    min_J : float
-    """
-
-    time: float
-    time_step: float
-    residual: float
+    time: float  # [s]
+    time_step: float  # [s]
+    residual: float  # out-of-balance force relative to the forces in play, at the end of the step
     cg_iterations: int
     min_J: float
 
 
 @dataclass(frozen=True)
 class Relaxed:
-    """A state at rest.
+    """A state at rest."""
 
-    Attributes
-    ----------
-    u, internal : (n, 3) array
-        Displacement [m] and internal forces [N].
-    residual, tolerance : float
-        Relative out-of-balance force that was reached, and that was to be reached in this precision.
-    history : tuple of RelaxationStep
-    """
-
-    u: NDArray[np.float64]
-    internal: NDArray[np.float64]
-    residual: float
-    tolerance: float
+    u: NDArray[np.float64]  # displacement (n, 3) [m]
+    internal: NDArray[np.float64]  # forces (n, 3) [N]
+    residual: float  # relative out-of-balance force
+    tolerance: float  # what that was to be in this precision
     history: tuple[RelaxationStep, ...]
 
 
 @dataclass(frozen=True)
 class RelaxationOptions:
-    """How to come to rest.
+    """How to come to rest."""
 
-    Attributes
-    ----------
-    tolerance : float
-        At rest when ``|f_ext - f_int| <= tolerance (|f_int| + |f_ext|)`` on the free components.
-    time_step : float
-        First time step [s]; doubled after a good step, cut to a quarter when an element would turn inside out.
-    largest_step : float
-        [s]
-    max_steps : int
-        Steps before giving up.
-    """
-
+    #: at rest when ``|f_ext - f_int| <= tolerance (|f_int| + |f_ext|)`` on the free components
     tolerance: float = 1e-8
+    #: first time step [s]; doubled after a good step, cut to a quarter when an element would turn inside out
     time_step: float = 0.001
-    largest_step: float = 1e4
-    max_steps: int = 400
+    largest_step: float = 1e4  # [s]
+    max_steps: int = 400  # steps before giving up
 
 
 def least_residual(tolerance: float, precision: Precision) -> float:

@@ -28,19 +28,11 @@ class Statistics:
 
 @dataclass(frozen=True)
 class NodalState:
-    """The state of all nodes, midside nodes among them: what recordings are compared with.
+    """The state of all nodes, midside nodes among them: what recordings are compared with."""
 
-    Attributes
-    ----------
-    mesh : TetMesh
-        Linear tetrahedra with a corner at every node, undeformed.
-    u, reactions : (n, 3) array
-        As those of `Result`.
-    """
-
-    mesh: TetMesh
-    u: Floats
-    reactions: Floats
+    mesh: TetMesh  # linear tetrahedra with a corner at every node, undeformed
+    u: Floats  # (n, 3), as those of `Result`
+    reactions: Floats  # (n, 3), as those of `Result`
 
 
 @dataclass(frozen=True)
@@ -92,14 +84,14 @@ def displacement_statistics(mesh: TetMesh, u: Floats) -> Mapping[str, Statistics
     groups = {"all nodes": np.ones(len(sizes), dtype=bool), **mesh.node_sets}
     return {
         name: Statistics(
-            nodes=len(own),
-            mean=float(own.mean()),
-            root_mean_square=float(np.sqrt(np.mean(own**2))),
-            percentile_95=float(np.percentile(own, 95.0)),
-            largest=float(own.max()),
+            nodes=len(lengths),
+            mean=float(lengths.mean()),
+            root_mean_square=float(np.sqrt(np.mean(lengths**2))),
+            percentile_95=float(np.percentile(lengths, 95.0)),
+            largest=float(lengths.max()),
         )
         for name, members in groups.items()
-        if len(own := sizes[members])
+        if len(lengths := sizes[members])
     }
 
 

@@ -20,8 +20,7 @@ from warpbrain.simulation.model import ELEMENTS, Model, require_held
 from warpbrain.simulation.observation import Observed, observe
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.result import Result, nodal_state_of, result_of
-from warpbrain.simulation.specimen import not_transmitted, specimen_of
-from warpbrain.simulation.specimen_run import SpecimenRun, SpecimenRunning
+from warpbrain.simulation.specimen import SpecimenRun, SpecimenRunning, not_transmitted, specimen_of
 from warpbrain.simulation.system import System
 
 
@@ -64,34 +63,15 @@ class Run(Shown):
     @property
     def errors(self) -> Mapping[str, tuple[float, float]]:
         """Root mean square distance to each recording before and after, in its unit (m, N)."""
-        return {
-            one.name: (one.before.root_mean_square, one.after.root_mean_square) for one in self.observed.comparisons
-        }
+        each = self.observed.comparisons
+        return {c.name: (c.before.root_mean_square, c.after.root_mean_square) for c in each}
 
 
 class Running:
-    """A case that is about to be simulated.
+    """A case of a body that is about to be simulated; of a specimen see `run`.
 
-    Parameters
-    ----------
-    case : Case
-        A body; of a specimen see `run`.
-    course : Course, optional
-    elements : str, optional
-        One of `ELEMENTS`; by default those that the model needs.
-    device : str, optional
-        ``"cpu"``, ``"cuda:0"``, ...; the GPU if there is one.
-    precision : str
-        ``"double"`` or ``"single"``.
-    needed_by : tuple of str
-        What else is to be done with the elements, see `choose_elements`.
-
-    Attributes
-    ----------
-    model : Model
-    chosen : str or None
-        As those of `Run`.
-    system : System
+    By default `elements` are those that the model needs, given what else is to be done with them, `needed_by` (see
+    `choose_elements`). `model` and `chosen` are as those of `Run`.
     """
 
     def __init__(
@@ -116,12 +96,8 @@ class Running:
         self.system = System(self.model, device, precision)
 
     def run(self, watching: Watching | None = None) -> Run:
-        """Simulate it, and compare it with what was recorded.
-
-        Raises
-        ------
-        SolveError
-            If there is no such state, or none was found.
+        """Simulate it, and compare it with what was recorded; `SolveError` if there is no such state, or none was
+        found.
         """
         followed = follow(self.case, self.system, self.course, watching or Watching())
         at = math.inf if followed.time is None else followed.time

@@ -7,8 +7,8 @@ ones are where `theta` prescribes them. Hence
     dR/dtheta = dr/dtheta |_u + K du/dtheta            on the constrained ones, of the reactions `R`
 
 The whole derivative is one five-point difference along the way `(theta + d h e_k, u + d h du_k)`
-(`warpbrain.simulation.beside`), and `du_k` is corrected with the tangent that is stored until nothing is left of it
-(`warpbrain.simulation.refinement`): once where the stored tangent is the true one.
+(`warpbrain.simulation.parameter_stencil`), and `du_k` is corrected with the tangent that is stored until nothing is
+left of it (`refine`): once where the stored tangent is the true one.
 
 A constraint that is met by augmentation (contact) is met beside `theta` too: the multipliers there are augmented along
 the same way, and all is balanced again, until nothing changes.
@@ -24,32 +24,94 @@ states, and so there is no derivative. The whole difference stands where a deriv
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
 from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
-from warpbrain.simulation.beside import Beside, ModelOf
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Model
-from warpbrain.simulation.refinement import lengths, refine
+from warpbrain.simulation.parameter_stencil import ModelOf, ParameterStencil
 from warpbrain.simulation.system import System
+
+#: Directions before it gives up.
+_MOST = 40
+
+
+def lengths(values: Floats, free: Bools) -> Floats:
+    """Norm (p,) of each of p fields (p, n, 3) on the free components (n, 3)."""
+    return np.asarray(np.linalg.norm(values[:, free], axis=1))
+
+
+def refine(
+    left_of: Callable[[int, Floats], Floats],
+    correct: Callable[[Floats], Floats],
+    solution: Floats,
+    left: Floats,
+    goals: Floats,
+    free: Bools,
+) -> tuple[Floats, Floats]:
+    """Solve for p right-hand sides at once, from a solution and what is left there, both (p, n, 3).
+
+    A tangent is stored symmetric: of forces without a potential (a pressure on an open surface, friction) a part of it
+    is missing. What is left of a right-hand side at a trial solution, a directional difference of forces, is known
+    exactly all the same. So this is GMRES with the stored matrix as preconditioner, in the form of Eisenstat, Elman and
+    Schultz (1983, GCR), which allows inexact solves.
+
+    `left_of` says what is left (n, 3) of a right-hand side, by its number, at a trial solution of that shape: an affine
+    function. `correct` solves with the known part of the matrix, for right-hand sides (p, n, 3). `goals` (p,) are norms
+    of what may be left on the `free` components (n, 3). Returns the solution, and what is left on every component;
+    `SolveError` if the known part of the matrix is too far from the whole.
+    """
+    solution, left = solution.copy(), left.copy()
+    tried: list[list[Floats]] = [[] for _ in goals]
+    gained: list[list[Floats]] = [[] for _ in goals]
+    for _ in range(_MOST):
+        open_ = np.flatnonzero(lengths(left, free) > goals)
+        if not len(open_):
+            return solution, left
+        wanted = np.zeros_like(left)
+        wanted[open_] = np.where(free, left[open_], 0.0)
+        steps = correct(wanted)
+        for k in open_:
+            now = left_of(int(k), solution[k] + steps[k])
+            tried[k].append(steps[k])
+            gained[k].append(left[k] - now)
+            solution[k], left[k] = solution[k] + steps[k], now
+            if np.linalg.norm(now[free]) > goals[k]:
+                solution[k], left[k] = _best(solution[k], now, tried[k], gained[k], free)
+    sizes = lengths(left, free)
+    worst = int(np.argmax(sizes / goals))
+    if sizes[worst] <= goals[worst]:
+        return solution, left
+    raise SolveError(
+        f"sensitivity to parameter {worst}: out of balance by {sizes[worst]:.1e} after {_MOST} corrections, goal "
+        f"{goals[worst]:.1e}: the tangent that is stored is far from the true one, or what acts is not smooth here"
+    )
+
+
+def _best(
+    solution: Floats, left: Floats, tried: list[Floats], gained: list[Floats], free: Bools
+) -> tuple[Floats, Floats]:
+    """Add the combination of all directions of a right-hand side after which least is left."""
+    columns = np.stack([gain[free] for gain in gained], axis=1)
+    sizes = np.linalg.norm(columns, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    shares = np.linalg.lstsq(columns / sizes, left[free], rcond=1e-12)[0] / sizes
+    return (
+        solution + np.tensordot(shares, np.array(tried), axes=1),
+        left - np.tensordot(shares, np.array(gained), axes=1),
+    )
 
 
 class InTurn:
-    """Solves the system's linear systems for several right-hand sides, one after the other.
-
-    Parameters
-    ----------
-    system : System
-    tolerance : float
-        Relative, of each.
-    max_iterations : int
+    """Solves the system's linear systems for several right-hand sides, one after the other; the tolerance is relative,
+    of each.
     """
 
     def __init__(self, system: System, tolerance: float, max_iterations: int) -> None:
@@ -63,14 +125,14 @@ class InTurn:
 
     def solve(self, right_hand_sides: Sequence[Floats], tolerance: float | None = None) -> Floats:
         """Solve from zero for right-hand sides (n, 3), which are zero on constrained components: (count, n, 3)."""
-        found, self._results = [], []
+        solutions, self._results = [], []
         for b in right_hand_sides:
             self._system.load.assign(b)
             self._system.solution.zero_()
             self._solver.solve(tolerance)
             self._results.append(self._solver.result())
-            found.append(self._system.solution.numpy().astype(np.float64))
-        return np.array(found)
+            solutions.append(self._system.solution.numpy().astype(np.float64))
+        return np.array(solutions)
 
     def results(self) -> list[LinearResult]:
         """How the last solve ended, for each right-hand side."""
@@ -92,32 +154,19 @@ _AUGMENTATIONS = 60
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Derivatives of an equilibrium by p parameters.
+    """Derivatives of an equilibrium by p parameters."""
 
-    Attributes
-    ----------
-    u : (p, n, 3) array
-        Of the displacement [m per unit of the parameter]; on constrained components, of what is prescribed.
-    reactions : (p, n, 3) array
-        Of what holds the constrained components [N per unit]; zero elsewhere.
-    cg_iterations : tuple of p ints
-    """
-
+    #: (p, n, 3), of the displacement [m per unit of the parameter]; on constrained components, of what is prescribed
     u: Floats
-    reactions: Floats
+    reactions: Floats  # (p, n, 3), of what holds the constrained components [N per unit]; zero elsewhere
     cg_iterations: tuple[int, ...]
 
 
 class SensitivitySolver:
     """Differentiates equilibria of one pre-processed model; what it needs is made once.
 
-    Parameters
-    ----------
-    system : System
-    tolerance : float
-        Relative: what may be left of the forces that a parameter puts out of balance. No smaller than rounding allows.
-    max_cg : int
-        Iterations of a linear solve.
+    The tolerance is relative: what may be left of the forces that a parameter puts out of balance, no less than
+    rounding allows.
     """
 
     def __init__(self, system: System, tolerance: float = 1e-10, max_cg: int = 10_000) -> None:
@@ -132,23 +181,13 @@ class SensitivitySolver:
         The system has the model of `theta` and the displacement `u` when this returns. What its terms remember is that
         of the equilibrium, which must be the last that was solved for in it if a term has augmented its constraints.
 
-        Parameters
-        ----------
-        u : (n, 3) array
-            Displacement [m], in equilibrium under the model of `theta` at full load.
-        models : callable
-            From parameters (p,) to a model that differs from the system's in numbers only; smooth, and defined a little
-            around `theta`.
-        theta : (p,) array
-        scales : (p,) array, optional
-            By how much each must change to change much, as `warpbrain.physics.continuous.scales_of` says; by default
-            its size, or 1 if that is less or nothing.
+        `u` (n, 3) [m] is in equilibrium under the model of `theta` (p,) at full load. `models`, from parameters (p,) to
+        a model that differs from the system's in numbers only, is smooth and defined a little around `theta`. `scales`
+        (p,) say by how much each must change to change much, as `warpbrain.physics.continuous.scales_of` does; by
+        default its size, or 1 if that is less or nothing.
 
-        Raises
-        ------
-        SolveError
-            If the equilibrium is unstable, so that it has no derivative, or a linear solve does not converge; or if it
-            is that of a step in which unknowns of a term's own follow the displacement.
+        `SolveError` if the equilibrium is unstable, so that it has no derivative, or a linear solve does not converge;
+        or if it is that of a step in which unknowns of a term's own follow the displacement.
         """
         system = self.system
         if system.coupled:
@@ -158,47 +197,47 @@ class SensitivitySolver:
             )
         system.set_load()
         state = np.array(u, dtype=np.float64)
-        beside = Beside(system, models, theta, scales)
+        stencil = ParameterStencil(system, models, theta, scales)
         system.u.assign(state)
         system.evaluate_tangents()
         system.assemble(k=1.0, m=0.0)
-        if not len(beside):
+        if not len(stencil):
             none = np.zeros((0, system.size, 3))
             return Sensitivities(none, none, ())
-        corrections = Corrections(self._solver(len(beside)), system, self._tolerance)
-        with beside.away():
-            moved, left = self._balance(beside, state, corrections)
+        corrections = Corrections(self._solver(len(stencil)), system, self._tolerance)
+        with stencil.away():
+            moved, left = self._balance(stencil, state, corrections)
         constrained = system.model.constrained
         return Sensitivities(moved, np.where(constrained, -left, 0.0), corrections.cg_iterations)
 
-    def _balance(self, beside: Beside, state: Floats, corrections: Corrections) -> tuple[Floats, Floats]:
+    def _balance(self, stencil: ParameterStencil, state: Floats, corrections: Corrections) -> tuple[Floats, Floats]:
         """Derivatives of the displacement, and what is out of balance then on every component."""
         system = self.system
         free = ~system.model.constrained
-        loaded = [beside.by_loads(k, math.inf) for k in range(len(beside))]
-        start = np.array([beside.by_prescribed(k) for k in range(len(beside))])
+        loaded = [stencil.by_loads(k, math.inf) for k in range(len(stencil))]
+        start = np.array([stencil.by_prescribed(k) for k in range(len(stencil))])
 
         def left_of(k: int, moved: Floats) -> Floats:
-            return loaded[k] - self._by_path(beside, k, state, moved)
+            return loaded[k] - self._by_path(stencil, k, state, moved)
 
         left = np.array([left_of(k, moved) for k, moved in enumerate(start)])
         # differences are exact to the rounding of forces over the step
-        noise = ROUNDINGS * system.precision.epsilon * system.size_of_forces() / beside.steps
+        noise = ROUNDINGS * system.precision.epsilon * system.size_of_forces() / stencil.steps
         goals = 2.0 * self._tolerance * lengths(left, free) + noise
         # a skull's distance has fewer digits than forces have
         met = 2.0 * goals + _MET * lengths(left, free)
         moved = start
         for _ in range(_AUGMENTATIONS):
             moved, left = refine(left_of, corrections.correct, moved, left, goals, free)
-            if not beside.remembers:
+            if not stencil.remembers:
                 return moved, left
-            self._meet_constraints(beside, state, moved)
+            self._meet_constraints(stencil, state, moved)
             left = np.array([left_of(k, along) for k, along in enumerate(moved)])
             if np.all(lengths(left, free) <= met):
                 return moved, left
         raise SolveError(f"sensitivities: contacts are not met after {_AUGMENTATIONS} augmentations")
 
-    def _meet_constraints(self, beside: Beside, state: Floats, moved: Floats) -> None:
+    def _meet_constraints(self, stencil: ParameterStencil, state: Floats, moved: Floats) -> None:
         """Augment beside `theta` along the way, by as much more than in the state itself as belongs to the way."""
         system = self.system
 
@@ -207,14 +246,14 @@ class SensitivitySolver:
             for term in system.terms:
                 term.augment(system.u)
 
-        beside.remember(lambda k, offset: augment(offset, moved[k]))
-        with beside.here():
+        stencil.remember(lambda k, offset: augment(offset, moved[k]))
+        with stencil.here():
             before = system.remembered()
             augment(0.0, moved[0])
             after = system.remembered()
-        beside.shift_memory(after, before)
+        stencil.shift_memory(after, before)
 
-    def _by_path(self, beside: Beside, k: int, state: Floats, moved: Floats) -> Floats:
+    def _by_path(self, stencil: ParameterStencil, k: int, state: Floats, moved: Floats) -> Floats:
         """Derivative of the internal forces (n, 3) by parameter k along the way that the state takes with it."""
         system = self.system
 
@@ -222,7 +261,7 @@ class SensitivitySolver:
             system.u.assign(state + offset * moved)
             return system.internal_forces()
 
-        return beside.derivative(k, internal)
+        return stencil.derivative(k, internal)
 
     def _solver(self, count: int) -> SeveralSolver:
         if count not in self._solvers:
@@ -231,14 +270,8 @@ class SensitivitySolver:
 
 
 class Corrections:
-    """Solves with the system's matrix as it is now, and counts what they take.
-
-    Parameters
-    ----------
-    solver : SeveralSolver
-    system : System
-    tolerance : float
-        Of the first solve; later ones are rough.
+    """Solves with the system's matrix as it is now, and counts what they take; the first to the tolerance, later ones
+    roughly.
     """
 
     def __init__(self, solver: SeveralSolver, system: System, tolerance: float) -> None:
@@ -284,21 +317,11 @@ def _require_solved(linear: LinearResult, parameter: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Secant:
-    """A difference of two equilibria.
+    """A difference of two equilibria."""
 
-    Attributes
-    ----------
-    nodes : (n,) int array
-        Ids, in the model without, of the nodes that both models have.
-    u : (n, 3) array
-        Displacement with less that without [m].
-    reactions : (n, 3) array
-        Of what holds them [N].
-    """
-
-    nodes: NDArray[np.int64]
-    u: Floats
-    reactions: Floats
+    nodes: NDArray[np.int64]  # (n,), ids, in the model without, of the nodes that both models have
+    u: Floats  # (n, 3), displacement with less that without [m]
+    reactions: Floats  # (n, 3), of what holds them [N]
 
 
 def secant(
@@ -308,26 +331,15 @@ def secant(
     options: EquilibriumOptions | None = None,
     device: str | None = None,
 ) -> Secant:
-    """The difference that a switch makes.
+    """The difference that a switch makes: between two models that are alike but for it.
 
-    Parameters
-    ----------
-    without, present : Model
-        Alike but for the switch.
-    nodes : (n,) int array, optional
-        For each node of `present` its id in `without`; the same ones by default. A resection leaves some.
-    options : EquilibriumOptions, optional
-    device : str, optional
-
-    Raises
-    ------
-    SolveError
-        If one of the two has no equilibrium.
+    `nodes` (n,) are, for each node of `present`, its id in `without`; the same ones by default. A resection leaves
+    some. `SolveError` if one of the two has no equilibrium.
     """
     shared = np.arange(len(present.mesh.points)) if nodes is None else np.asarray(nodes, dtype=np.int64)
-    found = []
+    states = []
     for model in (present, without):
         state = solve_equilibrium(System(model, device), options)
-        found.append((state.u, model.reactions(state.internal, model.external_forces())))
-    (u, reactions), (u_without, reactions_without) = found
+        states.append((state.u, model.reactions(state.internal, model.external_forces())))
+    (u, reactions), (u_without, reactions_without) = states
     return Secant(shared, u - u_without[shared], reactions - reactions_without[shared])

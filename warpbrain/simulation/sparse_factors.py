@@ -18,18 +18,9 @@ from warpbrain.threads import thread_count
 
 
 class SparseFactors:
-    """Factors `L D L^T` of a symmetric matrix, or `L U` of another.
+    """Factors `L D L^T` of a symmetric matrix, or `L U` of another, SciPy sparse (n, n).
 
-    Parameters
-    ----------
-    matrix : SciPy sparse matrix (n, n)
-    symmetric : bool
-        Whether it is; of a symmetric one the lower triangle is read.
-
-    Raises
-    ------
-    RuntimeError
-        If it is singular.
+    Of a symmetric one the lower triangle is read. `RuntimeError` if it is singular.
     """
 
     def __init__(self, matrix: Any, symmetric: bool = True) -> None:
@@ -81,9 +72,9 @@ def _analysed(lower: Any) -> Any:
     """The symbolic analysis of a lower triangle, SciPy CSC without duplicates; it does not depend on the values."""
     import rslab
 
-    for threads, known, analysis in _analyses:
-        same = threads == thread_count() and np.array_equal(known.indptr, lower.indptr)
-        if same and np.array_equal(known.indices, lower.indices):
+    for threads, pattern, analysis in _analyses:
+        same = threads == thread_count() and np.array_equal(pattern.indptr, lower.indptr)
+        if same and np.array_equal(pattern.indices, lower.indices):
             return analysis
     analysis = rslab.analyze(lower, path="ldlt", threads=thread_count())
     _analyses[:] = [(thread_count(), lower, analysis), *_analyses[: _KEPT - 1]]

@@ -12,7 +12,7 @@ What has a memory (viscoelasticity) or a ramp follows the times of the test inst
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import TestRecording
+from warpbrain.shown import Shown
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.history import History, history_of
 from warpbrain.simulation.locking import choose_elements
@@ -50,37 +51,22 @@ SHOWN = {
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TestResult:
-    """What was simulated of a test.
-
-    Attributes
-    ----------
-    imposed, response : (k,) array
-        The computed curve, `imposed` increasing and with the value at rest among it, or in the order of `time`, in the
-        units of the recording's quantities.
-    predicted : (n,) array
-        The response at the rows of the recording; of a force-controlled test the displacement (stretch, angle).
-    residuals : (n,) array
-        Recorded less predicted.
-    newton : (k,) int array
-        Newton iterations that each state took; 0 at rest.
-    min_J : (k,) array
-        Smallest volume ratio of an element in each state.
-    unstable_iterations : int
-        Newton iterations with an indefinite tangent, see `Equilibrium`: the specimen buckled, or its law softens.
-    time : (k,) array or None
-        Of each state [s]; None if a state depends on the imposed value alone.
-    """
+    """What was simulated of a test."""
 
     # not a test of pytest's
     __test__ = False
+    #: (k,), the computed curve, `imposed` increasing and with the value at rest among it, or in the order of `time`, in
+    #: the units of the recording's quantities
     imposed: Floats
     response: Floats
+    #: (n,), the response at the rows of the recording; of a force-controlled test the displacement (stretch, angle)
     predicted: Floats
-    residuals: Floats
-    newton: Ints
-    min_J: Floats
+    residuals: Floats  # (n,), recorded less predicted
+    newton: Ints  # (k,), Newton iterations that each state took; 0 at rest
+    min_J: Floats  # (k,), smallest volume ratio of an element in each state
+    #: Newton iterations with an indefinite tangent, see `Equilibrium`: the specimen buckled, or its law softens
     unstable_iterations: int
-    time: Floats | None = None
+    time: Floats | None = None  # (k,), of each state [s]; None if a state depends on the imposed value alone
 
     @property
     def r_squared(self) -> float:
@@ -111,32 +97,15 @@ class Rig:
     Between the lubricated walls of a confining chamber, and in a sheet that is stretched alike along two axes, the
     state is homogeneous too: all nodes of that element follow along the axes across z.
 
-    Mechanisms act in full before anything is imposed, between platens that stand as far apart as the specimen was
-    high: what swells then presses on them.
+    Mechanisms act in full before anything is imposed, between platens that stand as far apart as the specimen was high:
+    what swells then presses on them.
 
-    Parameters
-    ----------
-    case : Case
-        With a specimen.
-    device, precision
-        As of `System`.
-    options : EquilibriumOptions, optional
-    elements : str, optional
-        As of `Model`, of glued specimens; by default as `choose_elements` says.
-    mode : str, optional
-        One of `HOMOGENEOUS`, the only one of the rig's tests then.
+    `elements` are as of `Model`, of glued specimens; by default as `choose_elements` says. `mode` is one of
+    `HOMOGENEOUS`, the only one of the rig's tests then. The `system` is in the state that was computed last; the clock
+    of the `solver` has the wall times by phase.
 
-    Attributes
-    ----------
-    system : System
-        In the state that was computed last.
-    solver : EquilibriumSolver
-        Its clock has the wall times by phase.
-
-    Raises
-    ------
-    InputError
-        If the case has no specimen, assumes what means nothing in one, or leaves its law to the generative model.
+    `InputError` if the case has no specimen, assumes what means nothing in one, or leaves its law to the generative
+    model.
     """
 
     def __init__(
@@ -201,21 +170,12 @@ class Rig:
     ) -> TestResult:
         """Simulate a test at the values that were imposed in it.
 
-        Parameters
-        ----------
-        recording : TestRecording
-        steps : int
-            Imposed values from rest to the extreme that is farther from it; see `imposed_values` and, of a test that
-            depends on its history, `history_of`.
-        on_state : callable, optional
-            Called with the share of the states that are done, in (0, 1].
+        `steps` are imposed values from rest to the extreme that is farther from it; see `imposed_values` and, of a test
+        that depends on its history, `history_of`. `on_state` is called with the share of the states that are done, in
+        (0, 1].
 
-        Raises
-        ------
-        InputError
-            If the test is not possible, see `check`.
-        SolveError
-            If no equilibrium is found: in which test, at what imposed value, why.
+        `InputError` if the test is not possible, see `check`; `SolveError` if no equilibrium is found: in which test,
+        at what imposed value, why.
         """
         self.check(recording)
         return self._along(recording)._simulate(recording, steps, on_state)
@@ -245,14 +205,14 @@ class Rig:
         sides = imposed_values(recording.imposed, rest, steps)
         states, at_rest = [_State(rest)], None
         if self.system.model.mechanisms:
-            found = self._equilibrium(recording, rest, rest, None)
-            states, at_rest = [self._state(recording, rest, found)], found.u
+            equilibrium = self._equilibrium(recording, rest, rest, None)
+            states, at_rest = [self._state(recording, rest, equilibrium)], equilibrium.u
         for side in sides:
             u, previous = at_rest, rest
             for value in side.tolist():
-                found = self._equilibrium(recording, value, previous, u)
-                u, previous = found.u, value
-                states.append(self._state(recording, value, found))
+                equilibrium = self._equilibrium(recording, value, previous, u)
+                u, previous = equilibrium.u, value
+                states.append(self._state(recording, value, equilibrium))
                 if on_state is not None:
                     on_state((len(states) - 1) / sum(map(len, sides)))
         if recording.force_controlled:
@@ -261,7 +221,7 @@ class Rig:
 
     def _farther(self, recording: TestRecording, states: Sequence[_State], rest: float, steps: int) -> list[_State]:
         """States beyond what was read, until all forces that were imposed are answered."""
-        found: list[_State] = []
+        states_beyond: list[_State] = []
         reach = max(float(np.abs(recording.imposed - rest).max()), np.finfo(float).tiny)
         for sign, force in ((-1.0, float(recording.response.min())), (1.0, float(recording.response.max()))):
             last = max(states, key=lambda state: sign * state.imposed)
@@ -272,13 +232,13 @@ class Rig:
                 value = last.imposed + sign * reach / steps
                 state = self._equilibrium(recording, value, last.imposed, u)
                 u, last = state.u, self._state(recording, value, state)
-                found.append(last)
+                states_beyond.append(last)
             else:
                 raise SolveError(
                     f"test '{recording.name}' ({recording.mode}): no {recording.quantities[0]} within {_FARTHER} times "
                     f"what was read answers a {recording.quantities[1]} of {force:.4g}"
                 )
-        return found
+        return states_beyond
 
     def _through_time(
         self, recording: TestRecording, rest: float, steps: int, on_state: Callable[[float], None] | None
@@ -290,46 +250,45 @@ class Rig:
         history = history_of(recording.time, recording.imposed, reach, steps, self._shortest, ramps)
         start = float(history.time[0])
         self.system.forget()
-        found = self._step(recording, rest, np.zeros((len(self._top), 3)), math.inf, start)
+        equilibrium = self._step(recording, rest, np.zeros((len(self._top), 3)), math.inf, start)
         if history.imposed[0] != rest:
-            found = self._step(recording, float(history.imposed[0]), found.u, 0.0, start)
-        states = [self._state(recording, float(history.imposed[0]), found)]
+            equilibrium = self._step(recording, float(history.imposed[0]), equilibrium.u, 0.0, start)
+        states = [self._state(recording, float(history.imposed[0]), equilibrium)]
         for k in range(1, len(history.time)):
             before, time, value = (float(x) for x in (history.time[k - 1], history.time[k], history.imposed[k]))
-            found = self._step(recording, value, found.u, time - before, time)
-            states.append(self._state(recording, value, found))
+            equilibrium = self._step(recording, value, equilibrium.u, time - before, time)
+            states.append(self._state(recording, value, equilibrium))
             if on_state is not None:
                 on_state(len(states) / len(history.time))
         return _result(recording, states, history)
 
-    def _state(self, recording: TestRecording, value: float, found: Equilibrium) -> _State:
-        response = self._response(recording, found.u, found.internal)
-        min_J = found.history[-1].min_J if found.history else 1.0
-        return _State(value, response, len(found.history), min_J, found.unstable_iterations)
-
-    def _impose(self, recording: TestRecording, value: float) -> None:
-        prescribed = np.where(self._led[:, None], self._platen(recording, value), 0.0)
-        model = self.system.model
-        # what a system is made from does not hold the prescribed values: only its solver asks the model for them
-        self.system.model = replace(model, prescribed=prescribed * model.constrained)
+    def _state(self, recording: TestRecording, value: float, equilibrium: Equilibrium) -> _State:
+        response = self._response(recording, equilibrium.u, equilibrium.internal)
+        min_J = equilibrium.history[-1].min_J if equilibrium.history else 1.0
+        return _State(value, response, len(equilibrium.history), min_J, equilibrium.unstable_iterations)
 
     def _step(self, recording: TestRecording, value: float, start: Floats, h: float, time: float) -> Equilibrium:
         """The state a time step `h` after another, at a time."""
-        return self._solved(recording, value, lambda: self.solver.step(start, h, time), at=f" at {time:.4g} s")
+        return self._solved(recording, value, lambda u: self.solver.step(start, h, time, u), at=f" at {time:.4g} s")
 
     def _equilibrium(
         self, recording: TestRecording, value: float, previous: float, start: Floats | None
     ) -> Equilibrium:
         """Equilibrium at an imposed value, from the state `start` at the value before it."""
         came = f", coming from {SHOWN[recording.quantities[0]][0] * previous:.4g}"
-        return self._solved(recording, value, lambda: self.solver.solve(start=start), came=came)
+        return self._solved(recording, value, lambda u: self.solver.solve(start=start, prescribed=u), came=came)
 
     def _solved(
-        self, recording: TestRecording, value: float, solve: Callable[[], Equilibrium], at: str = "", came: str = ""
+        self,
+        recording: TestRecording,
+        value: float,
+        solve: Callable[[Floats], Equilibrium],
+        at: str = "",
+        came: str = "",
     ) -> Equilibrium:
-        self._impose(recording, value)
+        led = np.where(self._led[:, None], self._platen(recording, value), 0.0)
         try:
-            return solve()
+            return solve(led * self.system.model.constrained)
         except SolveError as error:
             factor, unit = SHOWN[recording.quantities[0]]
             raise SolveError(
@@ -458,7 +417,7 @@ def specimen_of(case: Case) -> Specimen:
     for mechanism in case.mechanisms:
         who = f"{case.path}: [[mechanism]] kind = '{mechanism.kind}'"
         if not mechanism.of_specimens:
-            can = ", ".join(kind for kind, known in mechanisms().items() if known.of_specimens)
+            can = ", ".join(kind for kind, mechanism_type in mechanisms().items() if mechanism_type.of_specimens)
             raise InputError(f"{who}: means nothing in a [specimen] between its grips; what can act there: {can}")
         if case.specimen.grips == "lubricated" and not mechanism.everywhere:
             raise InputError(
@@ -507,3 +466,72 @@ def _model(case: Case, glued: bool, mesh: TetMesh, mode: str) -> Model:
         return with_mechanisms(Model(mesh, {label: material}, case.density, constrained), case.mechanisms)
     except InputError as error:
         raise InputError(f"{case.path}: [tissue.{label}] {error}") from None
+
+
+@dataclass(frozen=True)
+class Tested:
+    """A test, its simulation and how far they are apart."""
+
+    recording: TestRecording
+    result: TestResult
+    comparison: Comparison
+
+
+@dataclass(frozen=True, eq=False)
+class SpecimenRun(Shown):
+    """The simulated tests of a specimen.
+
+    Attributes
+    ----------
+    case : Case
+    rig : Rig
+    tests : tuple of Tested
+    """
+
+    case: Case
+    rig: Rig
+    tests: tuple[Tested, ...]
+
+    @property
+    def errors(self) -> Mapping[str, tuple[float, float]]:
+        """Root mean square of each test's answer and of its error, in its unit (m, 1, rad, N, Pa, N m)."""
+        each = (test.comparison for test in self.tests)
+        return {c.name: (c.before.root_mean_square, c.after.root_mean_square) for c in each}
+
+
+class SpecimenRunning:
+    """A specimen that is about to be tested; parameters as of `Rig`.
+
+    `InputError` if nothing was tested, or a test is not possible.
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        tolerance: float = 1e-8,
+        elements: str | None = None,
+        device: str | None = None,
+        precision: str = "double",
+    ) -> None:
+        self.case = case
+        self.tests = tuple(recording for recording in case.recordings if isinstance(recording, TestRecording))
+        if not self.tests:
+            raise InputError(f"{case.path}: no [[recording]] of kind 'test': nothing is imposed on the [specimen]")
+        if elements in ("tet10", "tet10-mixed"):
+            raise InputError(
+                f"elements = {elements!r}: {case.path} has a [specimen], whose tests have linear elements only"
+            )
+        self.rig = Rig(case, device, precision, EquilibriumOptions(tolerance=tolerance), elements)
+        for recording in self.tests:
+            self.rig.check(recording)
+
+    def run(self, on_state: Callable[[float, str], None] = lambda _part, _name: None) -> SpecimenRun:
+        """Simulate them all; `on_state` is told the part of each test that is done, and its name.
+
+        `SolveError` if a state of a test is not found.
+        """
+        return SpecimenRun(self.case, self.rig, tuple(self._tested(recording, on_state) for recording in self.tests))
+
+    def _tested(self, recording: TestRecording, on_state: Callable[[float, str], None]) -> Tested:
+        result = self.rig.run(recording, on_state=lambda part: on_state(part, recording.name))
+        return Tested(recording, result, compare_test(recording, result))

@@ -14,7 +14,7 @@ import warp as wp
 from numpy.typing import NDArray
 from warp.sparse import BsrMatrix, bsr_zeros
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.linear import ConjugateGradient, solver_kernels
@@ -23,20 +23,19 @@ from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.ten_nodes import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
-from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import EDGES
 from warpbrain.physics.continuous import differ_in_numbers_only
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.device import grown
 from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import Term
-from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, averaged_terms, own_modulus
+from warpbrain.simulation.assembly import Assembly
+from warpbrain.simulation.averaged import PART, AveragedTerm, Patches, averaged_modulus, own_modulus, patches_of
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
 from warpbrain.simulation.factored import FactoredSolver, KeptFactors
 from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
-from warpbrain.simulation.placed import placed_mesh, placed_pattern
 
 
 def find_device(name: str | None) -> wp.Device:
@@ -108,6 +107,8 @@ class System:
         1 for free components, 0 for constrained ones.
     mass : wp.array, shape (n,)
         Lumped masses [kg] of the tissue that is there.
+    mesh, node_mesh : TetMesh
+        The reference shape, and linear tetrahedra with a corner at every node: it, or its elements cut into eight.
     terms : list of Term
         What else acts with forces that follow the deformation.
     stiffness_factors : (m,) array
@@ -125,12 +126,13 @@ class System:
     def __init__(self, model: Model, device: str | None = None, precision: str = "double") -> None:
         require_kind(model, Model, "model", "a Model, as warpbrain.model_of(case) gives")
         start = time.perf_counter()
-        self.model = model
+        self._model = model
         self.device = find_device(device)
         self.precision = find_precision(precision)
-        self.quadratic = model.quadratic
-        self.size = len(model.node_mesh.points)
-        self.elements = len(model.mesh.tetrahedra)
+        self.mesh, self.node_mesh, self.quadratic = model.mesh, model.node_mesh, model.quadratic
+        self.size, self.elements = len(self.node_mesh.points), len(self.mesh.tetrahedra)
+        self.constrained: Bools = model.constrained
+        self.movable: Bools = np.asarray(~model.constrained.all(axis=1))
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
         # of each element; terms ask for them
@@ -155,28 +157,33 @@ class System:
         self.set_load()
         self.seconds = time.perf_counter() - start
 
+    @property
+    def model(self) -> Model:
+        """What is assumed; other numbers of it are set by `set_model` alone."""
+        return self._model
+
     # -- pre-processing -------------------------------------------------------------------------------------------
 
     def _array(self, values: Any, dtype: Any) -> wp.array:
         return wp.array(values, dtype=dtype, device=self.device)
 
     def _place_mesh(self) -> None:
-        mesh, p = self.model.mesh, self.precision
-        placed = placed_mesh(mesh, self.device, p)
-        self.tetrahedra, self.shape_gradients = placed.tetrahedra, placed.shape_gradients
-        self.nodes, self.inverse_edges = placed.nodes, placed.inverse_edges
+        p = self.precision
+        self.assembly = a = Assembly.of(self.mesh, self.device, p)
+        self.tetrahedra, self.shape_gradients = a.tetrahedra, a.shape_gradients
+        self.nodes, self.inverse_edges = a.nodes, a.inverse_edges
         self.stencils, self.element_nodes = self.tetrahedra, self.nodes
         if self.quadratic is not None:
             self.stencils = self.quadratic.elements
             self.element_nodes = self._array(self.stencils, int)
-        self._volumes = mesh.volumes
+        self._volumes = self.mesh.volumes
         self.volume = self._array(self._volumes, p.scalar)
         self.mass = self._array(self.model.node_masses, p.scalar)
 
     def _place_pattern(self) -> None:
         p = self.precision
         stencils = [self.stencils, *(term.stencils for term in self.terms)]
-        pattern = placed_pattern(self.model.mesh, stencils, self.size, self.device)
+        pattern = self.assembly.pattern(stencils, self.size)
         self.pairs, self.pair_positions, self.pair_first = pattern.pairs, pattern.positions, pattern.first
         self.contributions, self.block_pairs = pattern.contributions, pattern.block_pairs
         self.corner_first, self.corners = pattern.corner_first, pattern.corners
@@ -189,17 +196,22 @@ class System:
     def _group_elements(self) -> list[ElementGroup]:
         groups = []
         for (law_type, formulation), materials in self._grouped(self.model).items():
-            members = np.flatnonzero(np.isin(self.model.mesh.tissue, list(materials)))
+            members = np.flatnonzero(np.isin(self.mesh.tissue, list(materials)))
             device_law = law_type.device_law(formulation)
             device_law = grown(device_law) if self.model.growing else device_law
             linear = self.quadratic is None
             kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
-            averaged = (
-                averaged_terms(self, list(materials), kernels, self.model.element_kinds) if self._averages else []
-            )
+            averaged = [AveragedTerm(self, patches, kernels) for patches in self._patches(list(materials))]
             parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
             groups.append(ElementGroup(kernels, self._array(members, int), parameters, averaged))
         return groups
+
+    def _patches(self, labels: list[int]) -> list[Patches]:
+        """Of tissues that share a law, where elements are averaged."""
+        if not self._averages:
+            return []
+        kinds = self.model.element_kinds
+        return self.assembly.once("patches", [np.array(labels), kinds], lambda: patches_of(self, labels, kinds))
 
     @property
     def _averages(self) -> bool:
@@ -242,7 +254,7 @@ class System:
         # the last column, where something grows, is the growth stretch
         parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self.model.growing)))
         for (label, material), row in zip(materials.items(), rows, strict=True):
-            members = np.flatnonzero(self.model.mesh.tissue == label)
+            members = np.flatnonzero(self.mesh.tissue == label)
             parameters[members, : 1 + len(row)] = (modulus(material), *row)
         if self.model.growing:
             parameters[:, -1] = self.growth_stretches
@@ -267,8 +279,8 @@ class System:
         """Other values of parameters in the same arrays: nothing is pre-processed again.
 
         A captured graph sees them. A mechanism's term is made anew from its mechanism and its arrays are copied into
-        those that are there; what it remembers stays. Of loads and prescribed displacements nothing is kept here: they
-        are asked of the model.
+        those that are there; what it remembers stays. Of loads and prescribed displacements nothing is kept here: the
+        model is asked for them.
 
         Parameters
         ----------
@@ -289,7 +301,7 @@ class System:
         before = self.model
         self._require_alike(model)
         # terms ask their body for its moduli
-        self.model = model
+        self._model = model
         others: dict[int, Term] = {}
         try:
             pairs = zip(before.mechanisms, model.mechanisms, strict=True)
@@ -306,7 +318,7 @@ class System:
                         f"mechanism {changed[place]}: acts on other nodes, or has more numbers, than before"
                     )
         except InputError:
-            self.model = before
+            self._model = before
             raise
         for place, term in enumerate(self._following):
             if place in others:
@@ -432,7 +444,7 @@ class System:
         """
         stiffest = float(np.max(self.shear_moduli + np.abs(self.volumetric_moduli)))
         summed = float(np.linalg.norm(self._flat_forces.numpy().astype(np.float64)))
-        return summed + stiffest * self.model.mesh.volume ** (2.0 / 3.0)
+        return summed + stiffest * self.mesh.volume ** (2.0 / 3.0)
 
     def assemble(self, k: float, m: float, coupling: float | None = None) -> None:
         """`matrix = k K + m M` from the element blocks, constrained rows and columns replaced by the identity.
@@ -675,8 +687,8 @@ class System:
 
     def recall(self, remembered: Sequence[tuple[wp.array, ...]]) -> None:
         """Let terms remember that instead."""
-        for term, own in zip(self.terms, remembered, strict=True):
-            term.recall(own)
+        for term, arrays in zip(self.terms, remembered, strict=True):
+            term.recall(arrays)
 
     def remember_as(self, other: System) -> None:
         """Let terms remember what those of another system of the same mechanisms do, in the same step."""
@@ -693,16 +705,6 @@ class System:
         return total
 
     @property
-    def constrained(self) -> NDArray[np.bool_]:
-        """Components (n, 3) of the displacement that are prescribed."""
-        return self.model.constrained
-
-    @property
-    def movable(self) -> NDArray[np.bool_]:
-        """Nodes (n,) of which some component is not prescribed."""
-        return np.asarray(~self.model.constrained.all(axis=1))
-
-    @property
     def shear_moduli(self) -> Floats:
         """Shear modulus at rest of each element [Pa], shape (m,)."""
         return self._by_element({label: m.law.shear_modulus for label, m in self.model.materials.items()})
@@ -713,21 +715,12 @@ class System:
         return self._by_element({label: m.volumetric_modulus for label, m in self.model.materials.items()})
 
     def _by_element(self, values: Mapping[int, float]) -> Floats:
-        return np.array([values[label] for label in self.model.mesh.tissue.tolist()])
-
-    @property
-    def mesh(self) -> TetMesh:
-        """The reference shape."""
-        return self.model.mesh
-
-    @property
-    def node_mesh(self) -> TetMesh:
-        """Linear tetrahedra with a corner at every node: the reference shape, or its elements cut into eight."""
-        return self.model.node_mesh
+        by_label = np.array([values[label] for label in self.mesh.labels])
+        return np.asarray(by_label[np.searchsorted(self.mesh.labels, self.mesh.tissue)])
 
     def most_compressed(self) -> str:
         """Which element had the smallest `J` when the energy was last evaluated, and where it is, for a message."""
-        mesh = self.model.mesh
+        mesh = self.mesh
         e = int(np.argmin(self.element_J.numpy()))
         x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
         return f"element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}"
@@ -761,22 +754,22 @@ class System:
         P = wp.zeros(self.elements, dtype=p.mat33, device=self.device)
         for g in self.groups:
             self._launch(g.kernels.stress, len(g.elements), g.elements, F, g.parameters, density, P)
-        found = P.numpy().astype(np.float64)
+        total = P.numpy().astype(np.float64)
         if self._averages:
-            found *= PART
+            total *= PART
             for term in (term for group in self.groups for term in group.averaged):
                 # each of the four patches of an element has a quarter of it
                 elements, patch, stress = term.stress(self.u)
-                np.add.at(found, elements, 0.25 * (1.0 - PART) * stress[patch])
-        found *= self.stiffness_factors[:, None, None]
+                np.add.at(total, elements, 0.25 * (1.0 - PART) * stress[patch])
+        total *= self.stiffness_factors[:, None, None]
         if self._volumes_at_nodes is not None:
             F = self.deformation_gradients()
             cofactors = np.linalg.det(F)[:, None, None] * np.linalg.inv(F).transpose(0, 2, 1)
-            found += self._volumes_at_nodes.pressures(self.u)[:, None, None] * cofactors
+            total += self._volumes_at_nodes.pressures(self.u)[:, None, None] * cofactors
         for added in self.terms:
             if added.elements is not None:
-                found[added.elements] += self._mean_stress(added, added.elements)
-        return found
+                total[added.elements] += self._mean_stress(added, added.elements)
+        return total
 
     def _mean_stress(self, term: Term, elements: NDArray[np.integer]) -> Floats:
         """Mean of what a term adds to the stress of its elements [Pa], (k, 3, 3): `sum_a f_a (x) X_a / V`."""

@@ -10,8 +10,8 @@ from shapes import cube, distorted, room, sphere
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.load import NodalForce
 from warpbrain.physics.mechanisms.contact import Contact
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import solve_equilibrium

@@ -9,8 +9,8 @@ from shapes import box, cube, distorted
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.load import NodalForce
 from warpbrain.physics.mechanism import Facts, ParameterError
 from warpbrain.physics.mechanisms.drainage import Drainage, DrainageTerm
 from warpbrain.physics.proposal import Situation

@@ -9,8 +9,8 @@ from shapes import box, cube
 from verification_rows import Row
 
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.force import NodalForce
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.physics.load import NodalForce
 from warpbrain.physics.mechanisms.falx import Falx
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium

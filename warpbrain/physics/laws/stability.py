@@ -64,21 +64,11 @@ def _slope_at_rest(law: Law) -> float:
 
 @dataclass(frozen=True)
 class Path:
-    """Principal stretches `(l^a, l^b, l^c)`, evenly spaced in `ln l` and the same distance to both sides of rest.
+    """Principal stretches `(l^a, l^b, l^c)`, evenly spaced in `ln l` and the same distance to both sides of rest."""
 
-    Parameters
-    ----------
-    exponents : tuple of float
-        `a`, `b` and `c`.
-    reach : float
-        Largest `l`; the smallest is its inverse.
-    steps : int
-        Number of steps from rest to each end.
-    """
-
-    exponents: tuple[float, float, float]
-    reach: float
-    steps: int
+    exponents: tuple[float, float, float]  # `a`, `b` and `c`
+    reach: float  # largest `l`; the smallest is its inverse
+    steps: int  # number of steps from rest to each end
 
     @property
     def step(self) -> float:

@@ -21,14 +21,14 @@ def mechanisms() -> dict[str, type[Mechanism]]:
     InputError
         If another package names what is no mechanism, cannot be loaded, or has a name that is taken.
     """
-    found: dict[str, type[Mechanism]] = {}
+    kinds: dict[str, type[Mechanism]] = {}
     for module in pkgutil.iter_modules(__path__, f"{__name__}."):
         for _, member in inspect.getmembers(importlib.import_module(module.name), inspect.isclass):
             if issubclass(member, Mechanism) and member.__module__ == module.name and not inspect.isabstract(member):
-                assert member.kind not in found, f"two mechanisms are called '{member.kind}'"
-                found[member.kind] = member
-    for name, added in added_by_packages("mechanisms", found).items():
+                assert member.kind not in kinds, f"two mechanisms are called '{member.kind}'"
+                kinds[member.kind] = member
+    for name, added in added_by_packages("mechanisms", kinds).items():
         if not (inspect.isclass(added) and issubclass(added, Mechanism) and added.kind == name):
             raise InputError(f"entry point '{name}' of warpbrain.mechanisms: expected a Mechanism of kind '{name}'")
-        found[name] = added
-    return dict(sorted(found.items()))
+        kinds[name] = added
+    return dict(sorted(kinds.items()))

@@ -356,9 +356,9 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
         t = wp.tid()
         k = w.numbers[0]
         friction = w.numbers[1]
-        one = wp.identity(n=3, dtype=scalar)
+        identity = wp.identity(n=3, dtype=scalar)
         if state == 0:
-            out[t, 0] = w.area[t] * k * one
+            out[t, 0] = w.area[t] * k * identity
             return
         d = u[w.nodes[t]]
         g, slope, H = distance(w.points[w.nodes[t]] + d, w.coefficients, w.origin, w.spacing)
@@ -371,7 +371,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
             n = w.directions[t]
             s = d - wp.dot(d, n) * n
             size = wp.sqrt(wp.dot(s, s) + slip * slip)
-            K += friction * w.pressing[t] / size * (one - wp.outer(n, n) - wp.outer(s, s) / (size * size))
+            K += friction * w.pressing[t] / size * (identity - wp.outer(n, n) - wp.outer(s, s) / (size * size))
         out[t, 0] = w.area[t] * K
 
     @wp.kernel(module=module)

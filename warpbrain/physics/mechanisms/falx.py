@@ -214,8 +214,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         t = wp.tid()
         F1, F2 = columns(points, u, nodes[t], data, t)
         C = metric(F1, F2)
-        one = scalar(1.0)
-        W = wp.trace(C) + one / wp.determinant(C) - scalar(3.0)
+        unit = scalar(1.0)
+        W = wp.trace(C) + unit / wp.determinant(C) - scalar(3.0)
         out[t] = scalar(0.5) * scale[0] * data[t, 0] * W
 
     return forces, tangents, energies

@@ -17,12 +17,11 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal, Uniform
-from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.regions import element_directions, elements_of, unit_vector
-from warpbrain.physics.term import Body
+from warpbrain.physics.term import Body, ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.words import Values, along, vector_in
 
 

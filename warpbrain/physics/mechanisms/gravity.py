@@ -136,10 +136,10 @@ class Gravity(BodyForce, Mechanism):
             raise ParameterError("gravity_axis", "missing, but [[mechanism]] gravity needs to know where 'down' is")
         if "csf_level" not in values and values.get("surroundings") != "air":
             raise ParameterError("csf_level", "missing: expected a finite number [mm], or surroundings = 'air'")
-        known: dict[str, Any] = {"direction": axis, "imaged_direction": axis, **values}
+        parameters: dict[str, Any] = {"direction": axis, "imaged_direction": axis, **values}
         # counted from the whole anatomy: a resection must not move the datum
-        lowest = float((-facts.mesh.points @ unit_vector("direction", known["direction"])).min())
-        return cls(**{"density": facts.density, "lowest": lowest, **known})
+        lowest = float((-facts.mesh.points @ unit_vector("direction", parameters["direction"])).min())
+        return cls(**{"density": facts.density, "lowest": lowest, **parameters})
 
     def in_case(self, facts: Facts) -> dict[str, Any]:
         """See `warpbrain.physics.mechanism.Mechanism`; a file counts levels from the whole anatomy's lowest point."""
@@ -282,8 +282,8 @@ def _down(values: Values, axis: tuple[float, float, float] | None) -> Floats:
     direction = vector_in(values, "direction")
     if axis is None:
         return direction
-    known = [f"direction_{letter}" in values for letter in "xyz"]
-    return np.where(known, direction, unit_vector("gravity_axis", axis))
+    is_given = [f"direction_{letter}" in values for letter in "xyz"]
+    return np.where(is_given, direction, unit_vector("gravity_axis", axis))
 
 
 def _tilt(values: Values, axis: tuple[float, float, float] | None, direction: Floats) -> list[str]:
@@ -293,6 +293,6 @@ def _tilt(values: Values, axis: tuple[float, float, float] | None, direction: Fl
     down = unit_vector("gravity_axis", axis)
     across = direction - (direction @ down) * down
     degrees = math.degrees(math.atan2(float(np.linalg.norm(across)), float(direction @ down)))
-    spread = math.degrees(math.hypot(*(one.sd for one in components)))
+    spread = math.degrees(math.hypot(*(component.sd for component in components)))
     where = f" {towards(across)}" if degrees > spread else ""
     return [f"'down' is tilted by {measured(degrees, spread)} degrees{where} from what was declared"]

@@ -49,8 +49,8 @@ class Resection(Mechanism):
         """See `Removing`; `InputError` if the mesh has no such set, or the set is empty or everything."""
         members = mesh.element_sets.get(self.elements)
         if members is None:
-            known = ", ".join(sorted(mesh.element_sets)) or "none"
-            raise InputError(f"resection: the mesh has no element set '{self.elements}' (it has {known})")
+            present = ", ".join(sorted(mesh.element_sets)) or "none"
+            raise InputError(f"resection: the mesh has no element set '{self.elements}' (it has {present})")
         if not members.any() or members.all():
             count = int(members.sum())
             raise InputError(f"resection: element set '{self.elements}' holds {count} of {len(members)} tetrahedra")

@@ -16,12 +16,11 @@ import warp as wp
 
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Normal
-from warpbrain.physics.extra_energy import ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import element_directions, elements_of, unit_vector
-from warpbrain.physics.term import Body
+from warpbrain.physics.term import Body, ExtraEnergy, ExtraEnergyTerm
 from warpbrain.physics.words import HARDLY, Values, along, measured, unsure, vector_in
 
 

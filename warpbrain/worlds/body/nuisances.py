@@ -23,8 +23,6 @@ from warpbrain.physics.laws.ogden import NEO_HOOKEAN, Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import Proposal
-from warpbrain.simulation.model import Material, all_substituted
-from warpbrain.simulation.system import System
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
@@ -156,15 +154,10 @@ def _tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gau
         for sign in (-1.0, 1.0):
             shifted = theta.copy()
             shifted[k] += sign * _STEP
-            system.set_materials(_materials(system, states, shifted))
+            system.set_model(system.model.with_materials(states.parameters.materials(shifted)))
             forces[k] -= sign * at.internal_forces() / (2.0 * _STEP)
-    system.set_materials(_materials(system, states, theta))
+    system.set_model(system.model.with_materials(states.parameters.materials(theta)))
     return at.answers(forces) @ prior.factor
-
-
-def _materials(system: System, states: States, theta: Floats) -> Mapping[int, Material]:
-    """Those of `theta`, as the mechanisms that act have them."""
-    return all_substituted(states.parameters.materials(theta), system.model.mechanisms)
 
 
 def field_columns(at: Linearisation, states: States) -> Floats:

@@ -38,24 +38,12 @@ Looked = Callable[[float, Model], Floats]
 _STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
 
 
-class Beside:
+class ParameterStencil:
     """Places beside each of p parameters.
 
-    Parameters
-    ----------
-    system : System
-    models : callable
-        From parameters (p,) to models; smooth, and defined a little around `theta`.
-    theta : (p,) array
-    scales : (p,) array, optional
-        By how much each must change to change much; by default its size, or 1 if that is less or nothing.
-
-    Attributes
-    ----------
-    model : Model
-        At `theta`.
-    steps : (p,) array
-        `h` of each parameter.
+    `models`, from parameters (p,) to models, is smooth and defined a little around `theta` (p,), where the `model` is.
+    `scales` (p,) say by how much each must change to change much; by default its size, or 1 if that is less or nothing.
+    `steps` (p,) are the `h` of each.
     """
 
     def __init__(self, system: System, models: ModelOf, theta: ArrayLike, scales: ArrayLike | None = None) -> None:
@@ -78,9 +66,9 @@ class Beside:
         self._here = remembered
 
     def _place(self, models: ModelOf, point: Floats, k: int, distance: int) -> Model:
-        beside = point.copy()
-        beside[k] += distance * self.steps[k]
-        return models(beside)
+        shifted = point.copy()
+        shifted[k] += distance * self.steps[k]
+        return models(shifted)
 
     def __len__(self) -> int:
         return len(self._places)
@@ -112,8 +100,8 @@ class Beside:
     def shift_memory(self, before: Remembered, after: Remembered) -> None:
         """Add the same to what is remembered at every place: `after - before`."""
         for remembered in self._remembered:
-            for own in remembered.values():
-                for arrays, left, right in zip(own, before, after, strict=True):
+            for place in remembered.values():
+                for arrays, left, right in zip(place, before, after, strict=True):
                     for array, a, b in zip(arrays, left, right, strict=True):
                         array.assign(array.numpy() + (b.numpy() - a.numpy()))
 
