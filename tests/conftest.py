@@ -41,6 +41,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "verify" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.verification)
+    # the longest first, so that no process of pytest-xdist is left with one of them at the end
+    items.sort(key=_slowness, reverse=True)
+
+
+def _slowness(item: pytest.Item) -> float:
+    """Processor seconds [s] that the marker `slow` gives, roughly; 0 without."""
+    marker = item.get_closest_marker("slow")
+    return float(marker.args[0]) if marker and marker.args else 0.0
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -14,7 +14,7 @@ MAPS = Path(__file__).parent / "icbm152"
 RAS_TO_LPS = np.array([-1.0, -1.0, 1.0])
 
 
-@pytest.mark.slow
+@pytest.mark.slow(60)
 def test_there_and_back(tmp_path, verify):
     for package in ("mmgpy", "nibabel"):
         pytest.importorskip(package)

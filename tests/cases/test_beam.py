@@ -15,7 +15,7 @@ from warpbrain.simulation.system import System
 TOLERANCE = dict(zip(BEAM, (0.35, 0.6), strict=True))
 
 
-@pytest.mark.slow
+@pytest.mark.slow(40)
 @pytest.mark.parametrize("name", BEAM)
 def test_it_bends_as_was_recorded_with_a_modulus_of_its_weight_alone(name, verify):
     case = find_case(name)

@@ -157,7 +157,7 @@ def test_fine_meshes_are_kept_outside_the_repository():
     assert not list((ROOT / "concealed").rglob("*.vtu"))
 
 
-@pytest.mark.slow
+@pytest.mark.slow(80)
 def test_recordings_can_be_made_again_from_a_truth(tmp_path):
     for package in ("mmgpy", "nilearn", "nibabel"):
         pytest.importorskip(package)

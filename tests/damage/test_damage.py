@@ -26,7 +26,7 @@ def test_what_was_wrong_before(whole, seed):
     assert one_try(whole, seed).defect == ""
 
 
-@pytest.mark.slow
+@pytest.mark.slow(25)
 def test_three_hundred_tries(whole):
     outcomes = [one_try(whole, seed) for seed in range(20_000, 20_300)]
     assert [outcome for outcome in outcomes if outcome.defect] == []

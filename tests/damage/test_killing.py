@@ -32,7 +32,7 @@ def test_builds_killed_and_repeated(killing_builds):
     assert [killed for killed in map(killing_builds, range(6)) if killed.defect] == []
 
 
-@pytest.mark.slow
+@pytest.mark.slow(85)
 def test_all_commands(tmp_path):
     from damage.killing import killers
 

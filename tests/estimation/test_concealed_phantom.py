@@ -25,7 +25,7 @@ def concealed(monkeypatch: pytest.MonkeyPatch):
         sys.modules.pop(name, None)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(25)
 def test_tissue_is_found_from_another_mesh_and_another_code(concealed) -> None:
     """Of one truth and one error of the mesh: noise and points differ, so more than 95 of 100 may cover."""
     found = concealed.experiment("single", REPETITIONS, EstimationOptions(registration=False, samples=25))

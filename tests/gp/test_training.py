@@ -74,7 +74,7 @@ def test_the_shipped_process_is_at_least_as_likely_as_the_published_one():
     assert 1e14 < factored.condition < 1e16
 
 
-@pytest.mark.slow
+@pytest.mark.slow(25)
 def test_training_from_scratch_reaches_the_published_likelihood():
     data, _ = trained("coregionalised", "as_published")._seen
     assert train(data).best.value < OBJECTIVE

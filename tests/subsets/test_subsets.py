@@ -21,7 +21,7 @@ def test_without_recordings_it_is_a_sentence():
     assert "recording" in ended.refused and not ended.defect
 
 
-@pytest.mark.slow
+@pytest.mark.slow(30)
 def test_every_case_without_recordings_is_a_sentence(tmp_path):
     every = every_subset()
     assert len(every) == KINDS["subsets"].promised
@@ -47,7 +47,7 @@ _TRIED = (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.slow(100)
 @pytest.mark.parametrize(("name", "tissue", "names"), _TRIED)
 def test_a_verdict_or_a_sentence(name, tissue, names):
     every = find_case(name, tissue).recordings

@@ -33,7 +33,7 @@ with nothing_drawn():
 """
 
 
-@pytest.mark.slow
+@pytest.mark.slow(30)
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_killed_while_kernels_are_compiled(tmp_path):
     write_folder(tmp_path / "case")

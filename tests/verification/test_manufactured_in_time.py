@@ -162,7 +162,7 @@ def test_order_in_time_of_tissue_that_relaxes(elements: str, verify: Row) -> Non
 @pytest.mark.parametrize(
     ("elements", "halvings"),
     # a second halving of averaged elements takes minutes of one core
-    [*((elements, 1) for elements in LINEAR), pytest.param("tet4", 2, marks=pytest.mark.slow)],
+    [*((elements, 1) for elements in LINEAR), pytest.param("tet4", 2, marks=pytest.mark.slow(65))],
 )
 def test_orders_in_space_and_time_of_tissue_that_relaxes(elements: str, halvings: int, verify: Row) -> None:
     found = [relaxed(WAVY, level, 4 * 2**level, elements) for level in range(halvings + 1)]
@@ -236,7 +236,7 @@ def flown(level: int, steps: int, elements: str) -> Floats:
     return np.array([norm(mesh, weights, moved), norm(mesh, weights, off)])
 
 
-@pytest.mark.slow
+@pytest.mark.slow(20)
 @pytest.mark.parametrize("elements", LINEAR)
 def test_orders_in_space_and_time_of_tissue_whose_fluid_flows(elements: str, verify: Row) -> None:
     """Backward Euler: steps are quartered where elements are halved.

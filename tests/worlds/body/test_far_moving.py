@@ -24,7 +24,7 @@ from warpbrain.worlds.options import DiagnosisOptions
 LENGTH, HEIGHT, NOISE, POINTS = 0.1, 0.03, 2e-4, 45
 
 
-@pytest.mark.slow
+@pytest.mark.slow(15)
 def test_its_weight_is_found_where_the_mesh_is_taken_for_exact() -> None:
     points = box((10, 3, 3), (LENGTH, HEIGHT, HEIGHT))
     mesh = TetMesh(points.points, points.tetrahedra, node_sets={"clamp": points.points[:, 0] < 1e-9})
