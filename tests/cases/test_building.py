@@ -124,8 +124,9 @@ def test_every_clinical_case_can_be_built():
 
 
 # the others take minutes each and differ by side and seed alone; one of the other side is made again, to the bit and
-# finer, by tests/concealed/test_stand_ins.py
+# finer, by tests/concealed/test_stand_ins.py: by the same process, which has smoothed the template then
 @pytest.mark.slow(90)
+@pytest.mark.xdist_group("building")
 @pytest.mark.parametrize("name", ["phantom", "0529"])
 def test_building_again_gives_the_shipped_meshes(name, tmp_path):
     for package in ("mmgpy", "nilearn", "nibabel"):

@@ -158,6 +158,7 @@ def test_fine_meshes_are_kept_outside_the_repository():
 
 
 @pytest.mark.slow(80)
+@pytest.mark.xdist_group("building")
 def test_recordings_can_be_made_again_from_a_truth(tmp_path):
     for package in ("mmgpy", "nilearn", "nibabel"):
         pytest.importorskip(package)

@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -19,6 +20,8 @@ from warpbrain.cases.writing import write_case
 from warpbrain.recordings.recording import Recording
 
 TISSUES = ("single", "multi")
+#: Each is read once, for all of its subsets.
+case_of = cache(find_case)
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ def every_subset() -> list[tuple[str, str, tuple[Recording, ...]]]:
         (name, tissue, some)
         for name in SHIPPED
         for tissue in TISSUES
-        for some in subsets(find_case(name, tissue).recordings)
+        for some in subsets(case_of(name, tissue).recordings)
     ]
     return sorted(found, key=lambda entry: -len(entry[2]))
 
@@ -75,7 +78,7 @@ def one_try(name: str, tissue: str, recordings: tuple[Recording, ...], options: 
 
     Without PyVista, as on compute servers, pictures are stood in for.
     """
-    case = replace(find_case(name, tissue), recordings=recordings)
+    case = replace(case_of(name, tissue), recordings=recordings)
     with tempfile.TemporaryDirectory() as place:
         write_case(Path(place) / "case", case)
         out = Path(place) / "out"
