@@ -34,8 +34,8 @@ def test_every_case_without_recordings_is_a_sentence(tmp_path):
 
 
 #: Walls of a brain, landmarks of another, markers of a beam, which has one tissue only: subsets of each that are not
-#: empty, some with one tissue and some with two. Landmarks with two tissues: tests/cases/test_resect.py. The beam without
-#: its second recording, which is a check, is as the others, that have none.
+#: empty, some with one tissue and some with two. Landmarks with two tissues: tests/cases/test_resect.py. The beam
+#: without its second recording, which is a check, is as the others, that have none.
 _TRIED = (
     ("0684", "multi", ("ventricles", "cavity")),
     ("0684", "single", ("ventricles",)),
