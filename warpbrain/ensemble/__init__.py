@@ -12,9 +12,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from warpbrain.ensemble.results import EnsembleResult
 
-#: Samples of the paper's sweep: as many are drawn if nobody says how many.
-SAMPLES = 289
-
 
 class _Callable(ModuleType):
     """This package, which is a public name of `warpbrain` as well."""

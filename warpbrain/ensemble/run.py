@@ -8,8 +8,8 @@ from pathlib import Path
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
-from warpbrain.ensemble import SAMPLES
 from warpbrain.ensemble.choosing import drawn_samples, swept_samples
+from warpbrain.ensemble.defaults import SAMPLES
 from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.results import EnsembleResult, results_of
 from warpbrain.ensemble.sample import Sample
