@@ -12,12 +12,14 @@ constexpr unsigned ALL = 0xffffffffu;
 constexpr int SUMS = 4;
 constexpr int MOST_BLOCKS = 256;
 #if BATCHED
-constexpr int SCALARS = 7;
+constexpr int SCALARS = 8;
 #endif
 // iterations after which the recurrences start again from the residual itself
 constexpr int RENEWED_EVERY = 50;
 // and after which rounding begins to cost more iterations than meetings cost time
 constexpr int PIPELINED = 200;
+// part of the residual [squared] below which recurrences that began at it are its rounding
+constexpr double CARRIED = 1e-20;
 // [ns]; blocks that do not hear from each other for so long give up
 constexpr unsigned long long PATIENCE = 2000000000ull;
 
@@ -262,7 +264,7 @@ for (int system = group; system < systems; system += groups) {
     int iteration = 0, since = 0;
     double gamma_before = 1.0, alpha = 1.0, beta = 0.0, least = infinity, before = infinity;
     double rr = 0.0, goal = 0.0, updated = infinity;
-    bool ended = false, left_off = false, textbook = false;
+    bool ended = false, left_off = false, textbook = false, afresh = false;
     Phase phase = RESIDUAL;
     of_guess = measured = true;
 #if BATCHED
@@ -274,7 +276,7 @@ for (int system = group; system < systems; system += groups) {
         phase = RESUME;
         of_guess = measured = false;
         iteration = (int)saved[0], since = (int)saved[1];
-        gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5], textbook = saved[6] > 0.0;
+        gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5], textbook = saved[6] > 0.0, rr = saved[7];
     }
     // the last system's numbers are no longer needed
     __syncthreads();
@@ -467,12 +469,16 @@ for (int system = group; system < systems; system += groups) {
             left_off = BATCHED && sums[3] > 0.0 && !ended && updated > goal;
             if (left_off)
                 break;
-            if (ended || !(updated > goal) || (since == RENEWED_EVERY && !textbook)) {
+            const bool rounded = !textbook && updated > goal && updated < CARRIED * rr;
+            textbook = textbook || rounded;
+            afresh = afresh || rounded;
+            if (ended || !(updated > goal) || rounded || (since == RENEWED_EVERY && !textbook)) {
                 phase = RESIDUAL;
                 measured = true;
                 continue;
             }
-            beta = iteration > 0 ? gamma / gamma_before : 0.0;
+            beta = iteration > 0 && !afresh ? gamma / gamma_before : 0.0;
+            afresh = false;
             if (textbook) {
                 phase = DIRECTION;
             } else {
@@ -492,6 +498,7 @@ for (int system = group; system < systems; system += groups) {
         if (me == 0 && tid == 0) {
             saved[0] = double(iteration), saved[1] = double(since);
             saved[2] = gamma_before, saved[3] = alpha, saved[4] = before, saved[5] = goal, saved[6] = double(textbook);
+            saved[7] = rr;
         }
         continue;
     }

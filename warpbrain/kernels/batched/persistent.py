@@ -17,7 +17,7 @@ from warpbrain.kernels.persistent import MOST_BLOCKS, NUMBERS, THREADS, Meetings
 from warpbrain.kernels.precision import Precision
 
 #: What a system that is left off keeps: scalars, and nine vectors of three components a row.
-_SCALARS, _VECTORS = 7, 27
+_SCALARS, _VECTORS = 8, 27
 
 
 @cache
