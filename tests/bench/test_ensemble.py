@@ -11,6 +11,7 @@ from shapes import cube
 
 from warpbrain.bench.batches import STEPS, count_bytes
 from warpbrain.ensemble.workers import bytes_per_slot
+from warpbrain.kernels.batched.persistent import kept_bytes
 from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
@@ -48,7 +49,9 @@ def test_counts_of_bytes(device: str) -> None:
         for cells, precision in ((2, "double"), (2, "single"), (4, "double"))
     )
     assert count_bytes(small, 0) == 2 * count_bytes(single, 0)
-    assert bytes_per_slot(small) == 2 * bytes_per_slot(single)
+    # what a solve keeps on a GPU between launches is in double whatever the precision
+    kept = kept_bytes(small.size) if blocks_stay(small.device) else 0
+    assert bytes_per_slot(small) - kept == 2 * (bytes_per_slot(single) - kept)
     iteration = count_bytes(small, 11) - count_bytes(small, 10)
     if blocks_stay(small.device):
         # the matrix is on the chip: four numbers a node are written and read, in double whatever the precision
