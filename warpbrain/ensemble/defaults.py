@@ -1,6 +1,6 @@
-"""What an ensemble is if nobody says otherwise; apart, since ``--help`` prints it and must not load NumPy."""
+"""Default options of an ensemble; in a module without NumPy, which ``warpbrain ensemble --help`` must not load."""
 
 from __future__ import annotations
 
-#: Samples of the paper's sweep: as many are drawn if nobody says how many.
+#: Number of samples: that of the paper's sweep.
 SAMPLES = 289

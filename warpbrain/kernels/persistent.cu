@@ -18,7 +18,7 @@ constexpr int SCALARS = 8;
 constexpr int RENEWED_EVERY = 50;
 // and after which rounding begins to cost more iterations than meetings cost time
 constexpr int PIPELINED = 200;
-// part of the residual [squared] below which recurrences that began at it are its rounding
+// ratio of squared residual norms, now to when it was last measured, below which recurrences hold only rounding errors
 constexpr double CARRIED = 1e-20;
 // [ns]; blocks that do not hear from each other for so long give up
 constexpr unsigned long long PATIENCE = 2000000000ull;
@@ -276,7 +276,8 @@ for (int system = group; system < systems; system += groups) {
         phase = RESUME;
         of_guess = measured = false;
         iteration = (int)saved[0], since = (int)saved[1];
-        gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5], textbook = saved[6] > 0.0, rr = saved[7];
+        gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5];
+        textbook = saved[6] > 0.0, rr = saved[7];
     }
     // the last system's numbers are no longer needed
     __syncthreads();

@@ -11,7 +11,7 @@ from __future__ import annotations
 import abc
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 import warp as wp
@@ -26,6 +26,7 @@ from warpbrain.kernels.tetrahedron import FOUR_NODES
 from warpbrain.mesh import QuadraticMesh, TetMesh
 
 Ints = NDArray[np.int32]
+T = TypeVar("T")
 
 
 class Body(Protocol):
@@ -48,6 +49,9 @@ class Body(Protocol):
     stiffness_factors: Floats
     remaining_parts: Floats
     growth_stretches: Floats
+
+    def once(self, kind: str, arrays: Sequence[NDArray[Any]], make: Callable[[], T]) -> T:
+        """What was made of the same arrays for this mesh, device and precision before, or is made now."""
 
     @property
     def volumetric_moduli(self) -> Floats:

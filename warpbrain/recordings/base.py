@@ -121,8 +121,8 @@ class Recording:
         """Values of the keys of `case.toml`, in SI units and RAS axes."""
         return vars(self)
 
-    def without_meaning(self) -> Mapping[str, str]:
-        """Keys that mean nothing for what the file holds, and why."""
+    def without_meaning(self) -> Mapping[str, tuple[str, str]]:
+        """Keys that mean nothing for what the file holds, why, and what they would say of other files."""
         return {}
 
     def check(self, mesh: TetMesh, path: Path, problems: Problems) -> None:

@@ -174,10 +174,11 @@ class TestRecording(Recording):
         absent = {"specimen": "", "control": "displacement", "axis": Z}
         return {key: value for key, value in vars(self).items() if key not in absent or value != absent[key]}
 
-    def without_meaning(self) -> Mapping[str, str]:
+    def without_meaning(self) -> Mapping[str, tuple[str, str]]:
         if self.quantities[1] == "stress":
             return {}
-        return dict.fromkeys(("stress", "unit"), f"means nothing of {' and '.join(self.quantities)}")
+        why = f"means nothing of {' and '.join(self.quantities)}"
+        return dict.fromkeys(("stress", "unit"), (why, "it says what a column stress is"))
 
     def columns(self, frame: Frame) -> Columns:
         imposed, response = self.quantities

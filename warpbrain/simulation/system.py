@@ -28,7 +28,7 @@ from warpbrain.physics.continuous import differ_in_numbers_only
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.device import grown
 from warpbrain.physics.mechanism import Following
-from warpbrain.physics.term import Term
+from warpbrain.physics.term import T, Term
 from warpbrain.simulation.assembly import Assembly
 from warpbrain.simulation.averaged import PART, AveragedTerm, Patches, averaged_modulus, own_modulus, patches_of
 from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
@@ -211,7 +211,11 @@ class System:
         if not self._averages:
             return []
         kinds = self.model.element_kinds
-        return self.assembly.once("patches", [np.array(labels), kinds], lambda: patches_of(self, labels, kinds))
+        return self.once("patches", [np.array(labels), kinds], lambda: patches_of(self, labels, kinds))
+
+    def once(self, kind: str, arrays: Sequence[NDArray[Any]], make: Callable[[], T]) -> T:
+        """See `Assembly.once`."""
+        return self.assembly.once(kind, arrays, make)
 
     @property
     def _averages(self) -> bool:

@@ -71,7 +71,7 @@ def _read(table: Reading, kind: type[Recording], given: dict[str, Any] | None) -
         table.problem(*fault)
         return None
     recording = kind.read(frame=table.context.frame, problems=table.problems, **given)
-    for key, why in recording.without_meaning().items() if recording is not None else ():
+    for key, fault in recording.without_meaning().items() if recording is not None else ():
         if table.named(key):
-            table.problem(key, why, "it says what a column stress is")
+            table.problem(key, *fault)
     return recording

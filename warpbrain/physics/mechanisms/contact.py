@@ -24,7 +24,6 @@ repeated until they are those of the state to 0.1 %, or of the last time step: s
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from hashlib import sha256
 from typing import Any, ClassVar
 
 import numpy as np
@@ -50,8 +49,6 @@ STATES = ("fixed", "sliding", "lifting")
 _SLIP = 1e-4
 #: Distance that is left [m] at which augmentation ends, and displacement of what is stuck.
 _NEAR, _STUCK = 1e-5, 5e-8
-#: Distance fields of a mesh that are kept.
-_KEPT_FIELDS = 4
 #: Part of the largest pressure by which those of friction may differ from those of the state.
 _SETTLED = 1e-3
 
@@ -291,19 +288,15 @@ class ContactTerm(KernelTerm):
 def _distance_field(
     body: Body, points: Floats, faces: NDArray[np.int32], members: Ints, touching: NDArray[np.int32], in_place: bool
 ) -> DistanceField:
-    """The distance from a surface near what touches it; the last ones of a mesh are kept."""
-    known = body.mesh.shared.setdefault("distance fields", {})
-    parts = (points, faces, members, touching)
-    digest = sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).digest()
-    key = (body.device.alias, body.precision.name, in_place, digest)
-    if key not in known:
-        for oldest in list(known)[: max(len(known) + 1 - _KEPT_FIELDS, 0)]:
-            known.pop(oldest, None)
+    """The smoothed signed distance [m] from a surface about the nodes that touch it, made once for a mesh."""
+
+    def make() -> DistanceField:
         # what the body's own triangles cannot follow need not be resolved
         spacing = min(_edge(points, faces), _edge(body.mesh.points, touching))
         near = body.mesh.points[members]
-        known[key] = DistanceField(points, faces, spacing, near, in_place, body.device, body.precision)
-    return known[key]
+        return DistanceField(points, faces, spacing, near, in_place, body.device, body.precision)
+
+    return body.once("distance field", [points, faces, members, touching, np.array(in_place)], make)
 
 
 def _edge(points: Floats, faces: NDArray[np.int32]) -> float:
