@@ -53,15 +53,17 @@ def _parser() -> argparse.ArgumentParser:
     )
     calibrate = commands.add_parser("calibrate", help="fit the numbers of the tool's calibration.json")
     calibrate.add_argument("--write", type=Path, help="that of the package if absent")
-    for parser_of in (score, calibrate):
-        parser_of.add_argument("--cases", type=Path, required=True)
-    for parser_of in (see, score, calibrate, analyse):
+    calibrate.add_argument("--cases", type=Path, required=True)
+    published = "the published hashes; commitments.txt beside the labels if absent"
+    for parser_of in (see, calibrate, analyse):
         parser_of.add_argument("--labels", type=Path, required=True)
-        parser_of.add_argument(
-            "--commitments", type=Path, help="the published hashes; commitments.txt beside the labels if absent"
-        )
-    for parser_of in (see, score, calibrate):
+        parser_of.add_argument("--commitments", type=Path, help=published)
+    for parser_of in (see, calibrate):
         parser_of.add_argument("--diagnoses", type=Path, required=True, help="where run wrote")
+    score.add_argument("--cases", type=Path, nargs="+", required=True, help="of each of the sets that are one score")
+    score.add_argument("--labels", type=Path, nargs="+", required=True)
+    score.add_argument("--commitments", type=Path, nargs="+", help=published)
+    score.add_argument("--diagnoses", type=Path, nargs="+", required=True, help="where run wrote")
     add_challenge(commands)
     commands.add_parser("mesh", help="make the meshes of truths anew, with MMG")
     return parser
@@ -149,26 +151,20 @@ def _see(given: argparse.Namespace) -> int:
 
 
 def _score(given: argparse.Namespace) -> int:
-    from referee.score import score_all
+    from referee.score import ScoredSet, score_all
 
+    commitments = given.commitments or [labels / "commitments.txt" for labels in given.labels]
+    folders = (given.cases, given.labels, commitments, given.diagnoses)
+    if len({len(each) for each in folders}) > 1 or (given.beside and len(given.cases) > 1):
+        raise InputError("score: expected as many --cases as --labels and --diagnoses, and one with --beside")
     beside = {}
     for text in given.beside:
         name, equals, folder = text.partition("=")
         if not (name and equals and Path(folder).is_dir()):
             raise InputError(f"--beside {text}: expected NAME=DIR with a folder that is there")
         beside[name] = Path(folder)
-    print(
-        score_all(
-            given.cases,
-            given.labels,
-            _commitments(given),
-            given.diagnoses,
-            given.out,
-            not given.no_baselines,
-            beside,
-            given.analysed,
-        )
-    )
+    sets = [ScoredSet(*each) for each in zip(*folders, strict=True)]
+    print(score_all(sets, given.out, not given.no_baselines, beside, given.analysed))
     return 0
 
 

@@ -28,11 +28,11 @@ COMPARED = (
 )
 
 
-def compare(cases: Path, outcomes: Sequence[Outcome]) -> dict[str, dict[str, Share]]:
-    """Shares of each method, under the names of the tool's."""
+def compare(folders: Sequence[Path], outcomes: Sequence[Outcome]) -> dict[str, dict[str, Share]]:
+    """Shares of each method, under the names of the tool's; `folders`: of the case of each outcome."""
     # a fresh process knows nothing of the threads of this one
     with ProcessPoolExecutor(max_workers=os.cpu_count(), mp_context=get_context("spawn"), initializer=single) as pool:
-        said = list(pool.map(_answers, [cases / outcome.name for outcome in outcomes]))
+        said = list(pool.map(_answers, folders))
     found = {}
     for method in METHODS:
         given = [outcome_of(o.label, answers[method]) for o, answers in zip(outcomes, said, strict=True)]

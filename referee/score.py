@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from referee.analysed import NOT_ASKED, analysts, read_analyses, rightness, with_conditionals
+from referee.analysed import NOT_ASKED, Analysis, analysts, read_analyses, rightness, with_conditionals
 from referee.errors import InputError
 from referee.figures import draw_figures
 from referee.intervals import Share
@@ -17,31 +18,40 @@ from referee.sealed import open_labels
 from referee.tables import score_text
 
 
-def score_all(
-    cases: Path,
-    labels: Path,
-    commitments: Path,
-    diagnoses: Path,
-    out: Path,
-    compared: bool,
-    beside: Mapping[str, Path],
-    analysed: Path | None = None,
-) -> str:
-    """Write `score.json`, `score.md` and figures.
+@dataclass(frozen=True)
+class ScoredSet:
+    """A set of cases that was diagnosed.
 
-    Parameters
+    Attributes
     ----------
     cases, labels, diagnoses : Path
         Folders of case folders, of sealed labels and of what `run` wrote.
     commitments : Path
         Published hashes of the labels.
+    """
+
+    cases: Path
+    labels: Path
+    commitments: Path
+    diagnoses: Path
+
+
+def score_all(
+    sets: Sequence[ScoredSet], out: Path, compared: bool, beside: Mapping[str, Path], analysed: Path | None = None
+) -> str:
+    """Write `score.json`, `score.md` and figures.
+
+    Parameters
+    ----------
+    sets : sequence of ScoredSet
+        Scored as one. If there are several, names of cases begin with the number of theirs, and nothing stands beside.
     out : Path
     compared : bool
         Whether the baselines diagnose the cases too.
     beside : mapping of str to Path
         Other runs of the same cases by name, such as an ablation, to be compared with.
     analysed : Path, optional
-        What `analyse` wrote: the optimal analyst's shares stand beside all others.
+        What `analyse` wrote: the optimal analyst's shares stand beside all others; of several sets in folders 1, 2 ...
 
     Returns
     -------
@@ -53,19 +63,31 @@ def score_all(
     InputError
         If a label is not the one that was committed to, a diagnosis is not one, or another run has no case in common.
     """
-    opened = dict(open_labels(labels, commitments))
-    analyses = read_analyses(analysed, opened) if analysed else {}
-    opened = {name: with_conditionals(label, analyses.get(name)) for name, label in opened.items()}
-    outcomes, missing = read_outcomes(opened, diagnoses)
-    if not outcomes:
-        raise InputError(f"{diagnoses}: no diagnosis of any case")
+    opened: dict[str, Mapping[str, Any]] = {}
+    outcomes: list[Outcome] = []
+    missing: list[str] = []
+    folders: dict[str, Path] = {}
+    analyses: dict[str, Analysis] = {}
+    for number, each in enumerate(sets, 1):
+        before = f"{number}/" if len(sets) > 1 else ""
+        of_set: Mapping[str, Mapping[str, Any]] = open_labels(each.labels, each.commitments)
+        known = read_analyses(analysed / before, of_set) if analysed else {}
+        of_set = {name: with_conditionals(label, known.get(name)) for name, label in of_set.items()}
+        diagnosed, silent = read_outcomes(of_set, each.diagnoses)
+        if not diagnosed:
+            raise InputError(f"{each.diagnoses}: no diagnosis of any case")
+        opened |= {before + name: label for name, label in of_set.items()}
+        analyses |= {before + name: analysis for name, analysis in known.items()}
+        folders |= {before + o.name: each.cases / o.name for o in diagnosed}
+        outcomes += [replace(o, name=before + o.name) for o in diagnosed]
+        missing += [before + name for name in silent]
     found, calibrated, measured = shares(outcomes), calibration(outcomes), amounts(outcomes)
     confused = confusion(outcomes)
     baselines = {}
     if compared:
         from referee.compared import compare
 
-        baselines = compare(cases, outcomes)
+        baselines = compare([folders[o.name] for o in outcomes], outcomes)
     others = _beside(opened, outcomes, beside) if beside else {}
     of_analyst = [o for outcome in outcomes for o in analysts(outcome, analyses)]
     optimal = {name: value for name, value in shares(of_analyst).items() if not name.startswith(NOT_ASKED)}

@@ -97,6 +97,7 @@ def test_every_verdict_is_said(verdict, data):
         group=() if several else kinds,
         ranking=ranking,
         p_value=0.02,
+        combinations=[SimpleNamespace(causes=(), probability=data.draw(chances))],
         smallest=seen,
         fit=fit,
         unknown=None,

@@ -23,7 +23,7 @@ from warpbrain.errors import require_kind
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.confirm import Confirmation, after_checks
+from warpbrain.inference.confirm import Confirmation, after_checks, if_significant
 from warpbrain.inference.decide import (
     CANNOT_SAY,
     NAMED,
@@ -115,14 +115,15 @@ class Diagnosing:
             p_value = confirming.p_of_nothing(nothing)
         with self.seconds.of("fits"):
             # gross errors hide in the linear model what a fit at a better place lets through
-            search.fit(alone=p_value > max(options.alpha, belief("fits.significance")))
+            significant = p_value <= max(options.alpha, belief("fits.significance"))
+            search.fit(alone=not significant and _decided(search).verdict == NOTHING)
         nothing = search.nothing
         with self.seconds.of("significance"):
             p_value = confirming.p_of_nothing(nothing)
-        by_posterior = self._decided(search, p_value)
+        by_posterior = _decided(search)
         self.listener.stage("checks")
         with self.seconds.of("checks"):
-            checked = self._checked(search, confirming, by_posterior)
+            checked = self._checked(search, confirming, if_significant(by_posterior, p_value, options.alpha))
             best, named = checked.best, checked.named
             weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
             blocks = confirming.held_out_for(best)
@@ -167,30 +168,23 @@ class Diagnosing:
             unknown=unknown,
         )
 
-    def _decided(self, search: HypothesisSearch, p_value: float) -> Decision:
-        """The verdict of least expected loss; that nothing is missing if `p_value` is above `alpha`."""
-        if p_value > self.options.alpha:
-            return Decision(NOTHING)
-        hypotheses = [weighted_set.hypothesis for weighted_set in search.weighted_sets]
-        return decide(hypotheses, search.probabilities, calibration().losses)[0]
-
-    def _checked(self, search: HypothesisSearch, confirming: Confirming, by_posterior: Decision) -> _Checked:
-        """The verdict after its checks, and the set that it is about."""
+    def _checked(self, search: HypothesisSearch, confirming: Confirming, significant: Decision) -> _Checked:
+        """The verdict after its further checks, and the set that it is about."""
         nothing, alpha = search.nothing, self.options.alpha
-        if by_posterior.verdict not in (NAMED, NAMED_AND_REST):
-            return _Checked(by_posterior, (), nothing, (), None)
-        best = search.fitted_with(frozenset(by_posterior.causes))
+        if significant.verdict not in (NAMED, NAMED_AND_REST):
+            return _Checked(significant, (), nothing, (), None)
+        best = search.fitted_with(frozenset(significant.causes))
         if best is None:
-            return _not_fitted(search, by_posterior.causes)
+            return _not_fitted(search, significant.causes)
         confirmations, p_left = confirming.confirmations(best), confirming.p_left(best)
-        decision, doubts = after_checks(by_posterior, confirmations, p_left, alpha)
+        decision, doubts = after_checks(significant, confirmations, p_left, alpha)
         if decision.verdict not in (NAMED, NAMED_AND_REST):
             return _Checked(decision, doubts, nothing, confirmations, p_left)
-        if set(decision.causes) != set(by_posterior.causes):
+        if set(decision.causes) != set(significant.causes):
             best = search.fitted_with(frozenset(decision.causes), best)
             if best is None:
                 # what the checks leave has no equilibrium
-                return _Checked(Decision(CANNOT_SAY, by_posterior.causes), doubts, nothing, confirmations, p_left)
+                return _Checked(Decision(CANNOT_SAY, significant.causes), doubts, nothing, confirmations, p_left)
             p_left = confirming.p_left(best)
         return _Checked(decision, doubts, best, confirmations, p_left)
 
@@ -273,6 +267,12 @@ def diagnose(
     if case.specimen is None:
         return Diagnosing(case, options, device, listener).run()
     return DiagnosingSpecimen(case, options, device, listener).run()
+
+
+def _decided(search: HypothesisSearch) -> Decision:
+    """The verdict of least expected loss."""
+    hypotheses = [weighted_set.hypothesis for weighted_set in search.weighted_sets]
+    return decide(hypotheses, search.probabilities, calibration().losses)[0]
 
 
 def _not_fitted(search: HypothesisSearch, causes: tuple[str, ...]) -> _Checked:

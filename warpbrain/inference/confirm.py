@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
+from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, NOTHING, Decision
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,16 @@ class Confirmation:
         return " and ".join(reasons)
 
 
+def if_significant(decision: Decision, p_value: float, alpha: float) -> Decision:
+    """A verdict, or that nothing can be said where it claims something of rows that look like draws without any cause.
+
+    `p_value`: of the hypothesis that no cause acts.
+    """
+    if p_value <= alpha or decision.verdict == NOTHING:
+        return decision
+    return Decision(CANNOT_SAY, decision.causes)
+
+
 def after_checks(
     decision: Decision,
     confirmations: Sequence[Confirmation],
@@ -50,7 +60,7 @@ def after_checks(
     if decision.verdict not in (NAMED, NAMED_AND_REST):
         return decision, (*grown, *remarks)
     if p_left is not None and p_left <= alpha:
-        remarks.append(f"Other causes would explain what is left (p = {p_left:.2g} that nothing is).")
+        remarks.append(f"Other causes would explain what is left (p = {p_left:.2g} if nothing were).")
     failed = {checked.name: why for checked in confirmations if (why := checked.why_not(alpha))}
     remarks += [f"{name} is not named: {why}." for name, why in failed.items() if name in decision.causes]
     kept = tuple(name for name in decision.causes if name not in failed)

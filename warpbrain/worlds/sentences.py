@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from warpbrain.inference.beliefs import belief
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN, Decision
 from warpbrain.inference.probability import percent
 from warpbrain.physics.sizes import smallest_in_words
@@ -22,7 +23,7 @@ class Words:
     grounds: str  # a sentence: why
     members: Sequence[tuple[str, float]]  # sentence and probability of each cause of the verdict that has a name
     perhaps: Sequence[str]  # clauses of what may act, where nothing can be said
-    missing: str = "Something is missing"
+    missing: str  # `missing_in_words`
     rest: str = ""  # what is known of what has no name: a sentence after a space
 
 
@@ -51,6 +52,15 @@ def verdict_in_words(decision: Decision, p_value: float, smallest: Mapping[str, 
     which = "; or ".join(f"{clause(sentence)} ({percent(probability)})" for sentence, probability in words.members)
     other = "; or something without a name" if UNKNOWN in decision.causes else ""
     return f"Something is missing ({p}), and {data} do not tell which of these it is: {which}{other}."
+
+
+def missing_in_words(nothing: float, only_physics: bool = True) -> str:
+    """What can be said where nothing can be named: whether something is missing, by the probability that nothing is.
+
+    `only_physics`: whether nothing that is no physics is likely.
+    """
+    surely = "may be" if nothing > belief("checks.perhaps") else "is"
+    return f"Something {surely} {'' if only_physics else 'wrong or '}missing"
 
 
 def grounds(probabilities: Sequence[float], held_out: str, errors: tuple[str, str] | None) -> str:

@@ -148,20 +148,21 @@ class HypothesisSearch:
                 self._unstable.add(chosen.names)
 
     def fitted_with(self, mechanisms: frozenset[str], superset: WeightedSet | None = None) -> WeightedSet | None:
-        """The most probable fitted set with exactly these mechanisms, fitted if none was; None if none can be.
+        """The most probable set with exactly these mechanisms, fitted; None if it cannot be.
 
         `superset`: a fitted set that has these and others, from whose optimum they are fitted if they were not weighed.
         """
-        sets = self._with_mechanisms(mechanisms)
-        fitted = next((candidate for candidate in sets if candidate.refit is not None), None)
-        for candidate in sets if fitted is None else []:
-            self._fit(candidate.names)
-            if self._sets[candidate.names].refit is not None:
-                return self._sets[candidate.names]
-        if fitted is None and superset is not None:
-            fitted = self._fitted_less(superset, [name for name in superset.mechanisms if name not in mechanisms])
-            if fitted is not None:
-                self._sets[fitted.names] = fitted
+        likely = next(iter(self._with_mechanisms(mechanisms)), None)
+        if likely is not None and likely.refit is None:
+            self._fit(likely.names)
+            likely = self._sets[likely.names]
+        if likely is not None and likely.refit is not None:
+            return likely
+        if superset is None:
+            return None
+        fitted = self._fitted_less(superset, [name for name in superset.mechanisms if name not in mechanisms])
+        if fitted is not None:
+            self._sets[fitted.names] = fitted
         return fitted
 
     def failure_with(self, mechanisms: frozenset[str]) -> str:

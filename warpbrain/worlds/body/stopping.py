@@ -34,7 +34,7 @@ def next_to_fit(
     decision, _ = _decide(sets)
     named = [candidate for candidate in sets if frozenset(candidate.mechanisms) == frozenset(decision.causes)]
     if named and named[0].mechanisms and not _is_settled(named, expanded):
-        chosen = next((candidate for candidate in named if candidate.refit is not None), named[0])
+        chosen = named[0]
     elif part := _part_not_fitted(decision, sets):
         return part
     else:
@@ -85,10 +85,13 @@ def _decide(
 
 
 def _is_settled(named: Sequence[WeightedSet], expanded: Collection[frozenset[str]]) -> bool:
-    """Whether nothing is left to do about sets of the mechanisms that are named: one is fitted and expanded."""
-    fitted = [candidate for candidate in named if candidate.refit is not None]
-    if not fitted:
-        return all(candidate.failure for candidate in named)
+    """Whether nothing is left to do about sets of the mechanisms that are named, the most probable first.
+
+    That one is fitted, since it is what the verdict rests on, and one that is fitted is expanded.
+    """
+    if named[0].refit is None:
+        return bool(named[0].failure)
+    fitted = (candidate for candidate in named if candidate.refit is not None)
     return any(candidate.names in expanded or len(candidate.names) > 2 for candidate in fitted)
 
 

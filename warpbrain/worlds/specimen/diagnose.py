@@ -11,7 +11,7 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.confirm import after_checks
+from warpbrain.inference.confirm import after_checks, if_significant
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
 from warpbrain.physics.words import Measurement
 from warpbrain.recordings.recording import TestRecording
@@ -84,12 +84,11 @@ class DiagnosingSpecimen:
             p_value = checker.p_left(base)
             chances = np.array([p for _, p in ordered])
             by_posterior, _ = decide([candidate.hypothesis for candidate, _ in ordered], chances, calibration().losses)
-            if p_value > options.alpha:
-                by_posterior = Decision(NOTHING)
-            best = base if by_posterior.verdict == NOTHING else _explaining(ordered, by_posterior)
+            significant = if_significant(by_posterior, p_value, options.alpha)
+            best = base if significant.verdict == NOTHING else _explaining(ordered, significant)
             checked = checker.of(best)
             decision, doubts = after_checks(
-                by_posterior, checked.confirmations, checked.p_left, options.alpha, *grown_errors(checked)
+                significant, checked.confirmations, checked.p_left, options.alpha, *grown_errors(checked)
             )
         names = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
         with self.seconds.of("next measurement"):

@@ -12,7 +12,7 @@ from warpbrain.inference.probability import percent
 from warpbrain.physics.sizes import size_in_words
 from warpbrain.physics.words import pascals
 from warpbrain.simulation.specimen import specimen_of
-from warpbrain.worlds.sentences import Words, clause, grounds, verdict_in_words
+from warpbrain.worlds.sentences import Words, clause, grounds, missing_in_words, verdict_in_words
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.glued_ends import ELEMENTS
 from warpbrain.worlds.specimen.protocol import Protocol
@@ -37,6 +37,7 @@ def sentence_of(diagnosis: SpecimenDiagnosis) -> str:
         grounds=grounds([cause.probability for cause in named], "tests", (errors[0], errors[-1])),
         members=[(cause.sentence, cause.probability) for cause in members],
         perhaps=[f"{clause(cause.sentence)} ({percent(cause.probability)})" for cause in members],
+        missing=missing_in_words(sum(each.probability for each in diagnosis.combinations if not each.causes)),
     )
     sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.smallest, words)
     return " ".join([sentence, *diagnosis.doubts])

@@ -1,0 +1,48 @@
+"""Which set is fitted next."""
+
+import numpy as np
+
+from warpbrain.inference.calibration import calibration
+from warpbrain.inference.causes import Hypothesis, Kind
+from warpbrain.worlds.body.stopping import next_to_fit
+from warpbrain.worlds.body.weighted_set import WeightedSet
+
+KINDS = {"registration": Kind.NOT_PHYSICS, "unknown": Kind.UNKNOWN}
+
+
+def weighted(log_evidence, *names, fitted=False, failure=""):
+    kinds = tuple(KINDS.get(name, Kind.PHYSICS) for name in names)
+    hypothesis = Hypothesis(names, kinds, log_evidence, -3.0 * len(names), None)
+    nothing = np.zeros(0)
+    return WeightedSet(hypothesis, (), nothing, np.zeros((0, 0)), None, object() if fitted else None, failure)
+
+
+def following(*sets, expanded=()):
+    probabilities = calibration().probabilities([candidate.hypothesis for candidate in sets])
+    ordered = [sets[k] for k in np.argsort(-probabilities)]
+    chosen = next_to_fit(ordered, np.sort(probabilities)[::-1], {frozenset(names) for names in expanded})
+    return chosen and sorted(chosen.names)
+
+
+def test_the_set_that_a_name_rests_on_is_fitted_though_the_name_alone_was():
+    # a fit of the mechanism alone says nothing of its set with a registration that is off
+    sets = [
+        weighted(0.0, fitted=True),
+        weighted(10.0, "pressure", fitted=True),
+        weighted(40.0, "registration", fitted=True),
+    ]
+    both = "pressure", "registration"
+    assert following(*sets, weighted(60.0, *both), expanded=[("pressure",), ("registration",)]) == sorted(both)
+    settled = weighted(60.0, *both, failure="no equilibrium")
+    assert following(*sets, settled, expanded=[("pressure",), ("registration",)]) is None
+
+
+def test_a_named_mechanism_is_fitted_then_expanded_then_left():
+    nothing = weighted(0.0, fitted=True)
+    assert following(nothing, weighted(30.0, "pressure")) == ["pressure"]
+    assert following(nothing, weighted(30.0, "pressure", fitted=True)) == ["pressure"]
+    assert following(nothing, weighted(30.0, "pressure", fitted=True), expanded=[("pressure",)]) is None
+
+
+def test_nothing_is_fitted_where_no_fit_can_change_the_verdict():
+    assert following(weighted(0.0, fitted=True), weighted(-8.0, "pressure")) is None
