@@ -6,9 +6,13 @@ import argparse
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from referee.challenge.commands import add_challenge, challenge
 from referee.errors import InputError
+
+if TYPE_CHECKING:
+    from referee.outcomes import ScoredSet
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -53,17 +57,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     calibrate = commands.add_parser("calibrate", help="fit the numbers of the tool's calibration.json")
     calibrate.add_argument("--write", type=Path, help="that of the package if absent")
-    calibrate.add_argument("--cases", type=Path, required=True)
     published = "the published hashes; commitments.txt beside the labels if absent"
-    for parser_of in (see, calibrate, analyse):
+    for parser_of in (see, analyse):
         parser_of.add_argument("--labels", type=Path, required=True)
         parser_of.add_argument("--commitments", type=Path, help=published)
-    for parser_of in (see, calibrate):
-        parser_of.add_argument("--diagnoses", type=Path, required=True, help="where run wrote")
-    score.add_argument("--cases", type=Path, nargs="+", required=True, help="of each of the sets that are one score")
-    score.add_argument("--labels", type=Path, nargs="+", required=True)
-    score.add_argument("--commitments", type=Path, nargs="+", help=published)
-    score.add_argument("--diagnoses", type=Path, nargs="+", required=True, help="where run wrote")
+    see.add_argument("--diagnoses", type=Path, required=True, help="where run wrote")
+    for parser_of in (score, calibrate):
+        parser_of.add_argument("--cases", type=Path, nargs="+", required=True, help="of each of several sets")
+        parser_of.add_argument("--labels", type=Path, nargs="+", required=True)
+        parser_of.add_argument("--commitments", type=Path, nargs="+", help=published)
+        parser_of.add_argument("--diagnoses", type=Path, nargs="+", required=True, help="where run wrote")
     add_challenge(commands)
     commands.add_parser("mesh", help="make the meshes of truths anew, with MMG")
     return parser
@@ -151,28 +154,35 @@ def _see(given: argparse.Namespace) -> int:
 
 
 def _score(given: argparse.Namespace) -> int:
-    from referee.score import ScoredSet, score_all
+    from referee.score import score_all
 
-    commitments = given.commitments or [labels / "commitments.txt" for labels in given.labels]
-    folders = (given.cases, given.labels, commitments, given.diagnoses)
-    if len({len(each) for each in folders}) > 1 or (given.beside and len(given.cases) > 1):
-        raise InputError("score: expected as many --cases as --labels and --diagnoses, and one with --beside")
+    if given.beside and len(given.cases) > 1:
+        raise InputError("--beside: expected one set")
     beside = {}
     for text in given.beside:
         name, equals, folder = text.partition("=")
         if not (name and equals and Path(folder).is_dir()):
             raise InputError(f"--beside {text}: expected NAME=DIR with a folder that is there")
         beside[name] = Path(folder)
-    sets = [ScoredSet(*each) for each in zip(*folders, strict=True)]
-    print(score_all(sets, given.out, not given.no_baselines, beside, given.analysed))
+    print(score_all(_sets(given), given.out, not given.no_baselines, beside, given.analysed))
     return 0
 
 
 def _calibrate(given: argparse.Namespace) -> int:
     from referee.calibrate import FILE, calibrate
 
-    print(calibrate(given.cases, given.labels, _commitments(given), given.diagnoses, given.write or FILE))
+    print(calibrate(_sets(given), given.write or FILE))
     return 0
+
+
+def _sets(given: argparse.Namespace) -> list[ScoredSet]:
+    from referee.outcomes import ScoredSet
+
+    commitments = given.commitments or [labels / "commitments.txt" for labels in given.labels]
+    folders = (given.cases, given.labels, commitments, given.diagnoses)
+    if len({len(each) for each in folders}) > 1:
+        raise InputError("expected as many --cases as --labels, --commitments and --diagnoses")
+    return [ScoredSet(*each) for each in zip(*folders, strict=True)]
 
 
 def _commitments(given: argparse.Namespace) -> Path:

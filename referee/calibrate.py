@@ -16,8 +16,9 @@ from referee.decision import decide
 from referee.diagnoses import NOT_PHYSICS, UNKNOWN, Tried
 from referee.errors import InputError
 from referee.intervals import Share, share
-from referee.outcomes import Outcome, read_outcomes
+from referee.outcomes import Outcome, ScoredSet, read_outcomes
 from referee.reliability import reliability
+from referee.scores import ALPHA
 from referee.sealed import open_labels
 from referee.temperature import TRAITS, Ballot, Floats, Scale, fit, held_out, interval, log_loss
 
@@ -29,15 +30,13 @@ FEWEST = 10
 PRICES, WRONG = (5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 80.0), 0.03
 
 
-def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, write: Path = FILE) -> str:
+def calibrate(sets: Sequence[ScoredSet], write: Path = FILE) -> str:
     """Fit the temperature and the price of a false name, count right names, and write all of it; weights of sets stay.
 
     Parameters
     ----------
-    cases, labels, diagnoses : Path
-        Folders of case folders, of sealed labels and of what `run` wrote; cases that are not in `cases` are left out.
-    commitments : Path
-        Published hashes of the labels.
+    sets : sequence of ScoredSet
+        Cases without a case folder are left out.
     write : Path
         File that is written.
 
@@ -51,22 +50,33 @@ def calibrate(cases: Path, labels: Path, commitments: Path, diagnoses: Path, wri
     InputError
         If a label or a diagnosis is not one, or there are too few cases whose truth was tried.
     """
-    opened = {name: label for name, label in open_labels(labels, commitments).items() if (cases / name).is_dir()}
-    outcomes, missing = read_outcomes(opened, diagnoses)
+    outcomes: list[Outcome] = []
+    missing: list[str] = []
+    for each in sets:
+        opened = open_labels(each.labels, each.commitments)
+        diagnosed, silent = read_outcomes(
+            {name: opened[name] for name in opened if (each.cases / name).is_dir()}, each.diagnoses
+        )
+        outcomes, missing = outcomes + diagnosed, missing + silent
     ballots = [Ballot(o.said.hypotheses, np.array([true_of(o, h) for h in o.said.hypotheses])) for o in outcomes]
     useful = [(o, b) for o, b in zip(outcomes, ballots, strict=True) if b.right.any()]
     if len(useful) < FEWEST:
         raise InputError(
-            f"{diagnoses}: the truth was among the hypotheses in {len(useful)} of {len(outcomes)} cases; expected "
-            f"{FEWEST} or more"
+            f"{sets[0].diagnoses}: the truth was among the hypotheses in {len(useful)} of {len(outcomes)} cases; "
+            f"expected {FEWEST} or more"
         )
     chosen = [b for _, b in useful]
     known = known_of(write)
     weights = [known["log_weights"][trait] for trait in TRAITS]
     scale, ends, apart = fit(chosen, weights), interval(chosen, weights), held_out(chosen, weights)
-    losses, spoken = priced([o for o, _ in useful], chosen, apart, known["losses"])
+    # names of cases whose truth was not tried are spoken and false, too
+    others = [(o, b) for o, b in zip(outcomes, ballots, strict=True) if not b.right.any()]
+    everyone = [*useful, *others]
+    probabilities = [*apart, *(scale.probabilities(b.hypotheses) for _, b in others)]
+    losses, spoken = priced([o for o, _ in everyone], [b for _, b in everyone], probabilities, known["losses"])
+    names = " and ".join(each.cases.resolve().parent.name for each in sets)
     told = {
-        "source": f"`python -m referee calibrate`, {len(useful)} cases of the set {cases.resolve().parent.name}",
+        "source": f"`python -m referee calibrate`, {len(useful)} cases of {names}",
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "temperature": round(scale.temperature, 3),
         # by the rule of succession: that all were right does not make the next one certain; in whole percent
@@ -146,6 +156,8 @@ def _spoken(
 ) -> list[bool]:
     right = []
     for outcome, ballot, p in zip(outcomes, ballots, probabilities, strict=True):
+        if outcome.said.p_value > ALPHA:
+            continue
         posterior: dict[frozenset[str], float] = {}
         for one, value in zip(ballot.hypotheses, p.tolist(), strict=True):
             # what is no physics beside what is changes no verdict

@@ -28,7 +28,7 @@ from warpbrain.terminal.quiet import start_warp_quietly
 #: Rooms of a set.
 CASES, LABELS = "cases", "labels"
 #: Draws of a case at most.
-ATTEMPTS = 12
+ATTEMPTS = 30
 #: Draws of which each effect must stand out by as much as is wanted at least.
 STRICT = 4
 #: Processor time for one draw at most [s], after which it is given up.
@@ -57,7 +57,7 @@ def make_set(which: str, count: int, out: Path, geometries: Sequence[str], worke
     Returns
     -------
     list of str
-        One line for each case that was made.
+        One line for each case, also for those of which no truth was found.
     """
     number = seed_of(f"{which} {seed}")
     plans = planned(which, count, geometries, number)
@@ -69,7 +69,11 @@ def make_set(which: str, count: int, out: Path, geometries: Sequence[str], worke
     with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"), initializer=single) as pool:
         jobs = [pool.submit(make_case, out, names[k], plans[k], [number, k]) for k in missing]
         for job in as_completed(jobs):
-            lines.append(job.result())
+            try:
+                lines.append(job.result())
+            except NoTruth as reason:
+                # one case without a truth must not cost those that are still being made
+                lines.append(f"NOT MADE: {reason}")
             print(f"{len(lines)} of {len(missing)}: {lines[-1]}", flush=True)
     write_commitments(out / LABELS)
     shutil.copy(out / LABELS / "commitments.txt", out / "commitments.txt")

@@ -14,6 +14,24 @@ from referee.runs import DIAGNOSIS, read_runs, read_seen
 
 
 @dataclass(frozen=True)
+class ScoredSet:
+    """A set of cases that was diagnosed.
+
+    Attributes
+    ----------
+    cases, labels, diagnoses : Path
+        Folders of case folders, of sealed labels and of what `run` wrote.
+    commitments : Path
+        Published hashes of the labels.
+    """
+
+    cases: Path
+    labels: Path
+    commitments: Path
+    diagnoses: Path
+
+
+@dataclass(frozen=True)
 class Outcome:
     """One case.
 

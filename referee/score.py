@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,28 +12,10 @@ from referee.analysed import NOT_ASKED, Analysis, analysts, read_analyses, right
 from referee.errors import InputError
 from referee.figures import draw_figures
 from referee.intervals import Share
-from referee.outcomes import Outcome, read_outcomes
+from referee.outcomes import Outcome, ScoredSet, read_outcomes
 from referee.scores import amounts, calibration, confusion, shares
 from referee.sealed import open_labels
 from referee.tables import score_text
-
-
-@dataclass(frozen=True)
-class ScoredSet:
-    """A set of cases that was diagnosed.
-
-    Attributes
-    ----------
-    cases, labels, diagnoses : Path
-        Folders of case folders, of sealed labels and of what `run` wrote.
-    commitments : Path
-        Published hashes of the labels.
-    """
-
-    cases: Path
-    labels: Path
-    commitments: Path
-    diagnoses: Path
 
 
 def score_all(

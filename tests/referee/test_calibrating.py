@@ -116,8 +116,8 @@ def test_a_false_name_costs_more_where_names_are_often_false(tmp_path):
     tried = (Tried(frozenset({"gravity"}), 0.0), Tried(frozenset({"pressure"}), 0.0))
     given = [Ballot(tried, np.array([True, False]))] * 40
     stated = [np.array([0.95, 0.05])] * 40
-    right = [outcome(tmp_path, label(f"r{k}", "effect", ("gravity",), 9.0), diagnosis()) for k in range(40)]
-    wrong = [outcome(tmp_path, label(f"w{k}", "effect", ("pressure",), 9.0), diagnosis()) for k in range(8)]
+    right = [outcome(tmp_path, label(f"r{k}", "effect", ("gravity",), 9.0), diagnosis(p_value=0.01)) for k in range(40)]
+    wrong = [outcome(tmp_path, label(f"w{k}", "effect", ("pressure",), 9.0), diagnosis(p_value=0.01)) for k in range(8)]
     cheap, _ = priced(right, given, stated, losses)
     dear, spoken = priced([*right[8:], *wrong], given, stated, losses)
     assert dear["false name"] > cheap["false name"] and spoken.of == 0
