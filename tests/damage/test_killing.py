@@ -16,8 +16,6 @@ def killing(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def killing_builds(tmp_path_factory):
-    for package in ("mmgpy", "nilearn", "nibabel"):
-        pytest.importorskip(package)
     from damage.killing import killers
 
     return killers(tmp_path_factory.mktemp("killed"), ("cases build",))["cases build"]
@@ -36,8 +34,6 @@ def test_builds_killed_and_repeated(killing_builds):
 def test_all_commands(tmp_path):
     from damage.killing import killers
 
-    for package in ("mmgpy", "nilearn", "nibabel"):
-        pytest.importorskip(package)
     for kill in killers(tmp_path).values():
         assert [killed for killed in map(kill, range(100, 106)) if killed.defect] == []
 

@@ -50,12 +50,16 @@ class Kind:
         How many tries are wanted.
     prepared : callable
         Loads and writes what its tries share, in a folder; returns what makes one of a seed.
+    lasts : float
+        Processor seconds [s] of the longest tries: they are begun where so much time is left, and what computes for
+        ten times as long and 30 s more is wrong.
     packages : tuple of str
         What it imports beside NumPy, SciPy, Warp, meshio, tomli-w and threadpoolctl.
     """
 
     promised: int
     prepared: Callable[[Path], Trying]
+    lasts: float = 1.0
     packages: tuple[str, ...] = ()
 
 
@@ -104,15 +108,16 @@ _TOLERANCE = metamorphic.tries.TOLERANCE
 _FIGURES = ("matplotlib",)
 
 KINDS = {
-    "subsets": Kind(142, _subset, _FIGURES),
+    "subsets": Kind(142, _subset, 150.0, _FIGURES),
     "same-run": Kind(1000, partial(_same, "run", _TOLERANCE)),
     "same-run-at-1e-8": Kind(1000, partial(_same, "run", 1e-8)),
-    "same-estimate": Kind(1000, partial(_same, "estimate", _TOLERANCE)),
-    "same-diagnose": Kind(1000, partial(_same, "diagnose", _TOLERANCE)),
+    "same-estimate": Kind(1000, partial(_same, "estimate", _TOLERANCE), 20.0),
+    "same-diagnose": Kind(1000, partial(_same, "diagnose", _TOLERANCE), 10.0),
+    # of these a quarter finds the disk full, the others are killed
     **{
-        f"kill-{name}": Kind(200, partial(_killed, name), _FIGURES)
-        for name in ("run", "ensemble", "estimate", "sweep", "diagnose")
+        f"kill-{name}": Kind(280, partial(_killed, name), lasts, _FIGURES)
+        for name, lasts in (("run", 1.0), ("ensemble", 1.0), ("estimate", 5.0), ("sweep", 1.0), ("diagnose", 10.0))
     },
-    "kill-cases-build": Kind(200, partial(_killed, "cases build"), ("mmgpy", "nilearn", "nibabel")),
-    "damage": Kind(10_000, _damaged, ("h5py", "nibabel")),
+    "kill-cases-build": Kind(280, partial(_killed, "cases build")),
+    "damage": Kind(10_000, _damaged, packages=("h5py", "nibabel")),
 }

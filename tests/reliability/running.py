@@ -51,7 +51,9 @@ def try_all(
         queue.sort(reverse=True)
         running: dict[int, tuple[BaseProcess, str, int]] = {}
         try:
-            while (queue or running) and time.monotonic() < end:
+            while (queue or running) and (left := end - time.monotonic()) > 0.0:
+                if any(KINDS[name].lasts > left for name in trying):
+                    queue = [entry for entry in queue if KINDS[entry[1]].lasts <= left]
                 while queue and len(running) < processes:
                     _, name, seed = queue.pop()
                     process = multiprocessing.get_context("fork").Process(
@@ -69,7 +71,8 @@ def try_all(
                         _write(out, name, seed, 0.0, Tried("", "", None, f"its process ended: {process.exitcode}"))
                     wrong = wrong or process.exitcode != 0
         finally:
-            for process, _, _ in running.values():
+            for process, name, seed in running.values():
+                print(f"{name} --seed {seed} --tries 1: given up at the end", flush=True)
                 # with what it started itself
                 with contextlib.suppress(ProcessLookupError, PermissionError):
                     os.killpg(process.pid or 0, signal.SIGKILL)
@@ -87,6 +90,9 @@ def _scratch_in(place: str) -> Iterator[None]:
 def _one(trying: Trying, name: str, seed: int, out: Path) -> None:
     """In a process of its own: try, write the line, end with status 1 if anything was wrong."""
     os.setpgid(0, 0)
+    allowed = int(10 * KINDS[name].lasts) + 30
+    # of computing, so that a busy machine ends none; what it starts inherits it
+    resource.setrlimit(resource.RLIMIT_CPU, (allowed, allowed + 5))
     try:
         tried = trying(seed)
     except BaseException:

@@ -1,6 +1,7 @@
 """The tool that counts tries (`python -m reliability`): nothing is lost, done twice, or taken for right."""
 
 import os
+import signal
 import time
 
 import pytest
@@ -54,3 +55,23 @@ def test_what_takes_too_long_is_given_up(tmp_path, monkeypatch):
     assert not try_all(["slow"], None, 0, 4, 2.0, out)
     assert time.monotonic() - began < 20.0
     assert [one["seed"] for one in tries_in([out])] == [3]
+
+
+def test_what_computes_without_end_is_wrong(tmp_path, monkeypatch):
+    def trying(seed):
+        while True:
+            pass
+
+    monkeypatch.setitem(KINDS, "endless", Kind(1, lambda _place: trying, lasts=-2.9))
+    out = tmp_path / "tries.jsonl"
+    assert try_all(["endless"], None, 0, 1, 60.0, out)
+    assert tries_in([out])[0]["defect"] == f"its process ended: {-signal.SIGXCPU}"
+
+
+def test_what_does_not_fit_in_the_time_left_is_not_begun(tmp_path, monkeypatch, capfd):
+    monkeypatch.setitem(KINDS, "long", Kind(4, lambda _place: time.sleep, lasts=60.0))
+    monkeypatch.setitem(KINDS, "short", kind(lambda _seed: Tried("", "read")))
+    out = tmp_path / "tries.jsonl"
+    assert not try_all(["long", "short"], None, 0, 2, 20.0, out)
+    assert [one["kind"] for one in tries_in([out])] == ["short"] * 4
+    assert "given up" not in capfd.readouterr().out
