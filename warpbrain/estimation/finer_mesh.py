@@ -207,7 +207,9 @@ class FinerMesh:
         external = model.external_forces()
         finer_system = self._system_of(model)
         linear = self._two_level(finer_system, system, u, finer.prolongation)
-        solver = EquilibriumSolver(finer_system, EquilibriumOptions(tolerance=tolerance), linear=linear)
+        # the loads act already: one load step, or the state is taken not to exist there
+        options = EquilibriumOptions(tolerance=tolerance, max_total_newton=EquilibriumOptions.max_newton)
+        solver = EquilibriumSolver(finer_system, options, linear=linear)
         flat = finer.prolongation @ u
         acting = frozenset(mechanism.kind for mechanism in case.mechanisms)
         # the error at the edges of another mechanism would nearly invert elements

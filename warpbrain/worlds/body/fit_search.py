@@ -209,11 +209,11 @@ class FitSearch:
             moved = float(np.linalg.norm(self.z[self._layout.coefficients] - self._share_computed_at))
             if moved <= least * float(np.linalg.norm(np.concatenate(offsets))):
                 return False
+        before, z = self._mesh_share, self.z[self._layout.coefficients]
         share = mesh_share_of(self.effects, coefficients, self.state, known, finer, prior)
+        self._share_computed_at = z
         if share is None:
             return False
-        before, z = self._mesh_share, self.z[self._layout.coefficients]
-        self._share_computed_at = z
         before_U = self._U
         self._take_mesh_share(share, z)
         change, by_coefficients = share.at(z), share.columns()
