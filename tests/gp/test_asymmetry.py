@@ -20,11 +20,12 @@ from warpbrain.gp.hierarchy import (
     Hierarchy,
     Observations,
     Places,
+    fit_hierarchy,
     mean_asymmetry_of,
     observations,
     prior,
+    sample_hierarchies,
 )
-from warpbrain.gp.hierarchy_fit import fit_hierarchy, sample_hierarchies
 from warpbrain.gp.literature.forms import FORMS
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import GROUPS, OFFSET, STRETCHES, Study

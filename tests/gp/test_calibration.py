@@ -4,9 +4,17 @@ import numpy as np
 import pytest
 from scipy.stats import beta, binom
 
-from warpbrain.gp.leaving_out import INTERVALS, Score, calibration, compared, folds, methods_of
+from warpbrain.gp.leaving_out import (
+    INTERVALS,
+    Score,
+    calibration,
+    calibration_lines,
+    compared,
+    comparison_lines,
+    folds,
+    methods_of,
+)
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.score_table import calibration_lines, comparison_lines
 
 
 def score(values, levels=(), name="a"):

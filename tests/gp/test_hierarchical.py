@@ -4,8 +4,17 @@ import numpy as np
 import pytest
 
 from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import CENTRE, EFFECTS, Hierarchy, Places, Structure, observations, prior
-from warpbrain.gp.hierarchy_fit import fit_hierarchy, negative_log_likelihood
+from warpbrain.gp.hierarchy import (
+    CENTRE,
+    EFFECTS,
+    Hierarchy,
+    Places,
+    Structure,
+    fit_hierarchy,
+    negative_log_likelihood,
+    observations,
+    prior,
+)
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import STRETCHES, Study
 from warpbrain.gp.secant import invariant, log_energy, log_secant_modulus

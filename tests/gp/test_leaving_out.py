@@ -9,10 +9,9 @@ from scipy.stats import norm
 from warpbrain.errors import InputError
 from warpbrain.gp.candidates import OF_CURVES, CoregionalisedCandidate, HierarchicalCandidate, Prediction, candidates
 from warpbrain.gp.hierarchy import EFFECTS
-from warpbrain.gp.leaving_out import folds, leave_out
+from warpbrain.gp.leaving_out import folds, leave_out, read_scores, score_lines, write_scores
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import Study
-from warpbrain.gp.score_table import read_scores, score_lines, write_scores
 
 GREY = "hyperelastic/grey matter"
 SOME = [s for s in read_studies("corrected") if s.group in (GREY, "MRE/grey matter", "linear/brain")][::2]

@@ -296,17 +296,16 @@ def _add_compare(actions: argparse._SubParsersAction[Any]) -> None:
 
 def _compare(options: argparse.Namespace) -> None:
     from warpbrain.atomic import check_writable
+    from warpbrain.gp import leaving_out
     from warpbrain.gp.candidates import DEFAULT, candidates
-    from warpbrain.gp.leaving_out import calibration, compared, folds, leave_out, methods_of
     from warpbrain.gp.literature.studies import read_studies
-    from warpbrain.gp.score_table import calibration_lines, comparison_lines, read_scores, score_lines, write_scores
 
     path = options.csv or Path(f"warpbrain-gp-{options.variant}-{options.leave}.csv")
     check_writable(path)
     studies = read_studies(options.variant)
-    left = folds(studies, options.leave)
+    left = leaving_out.folds(studies, options.leave)
     held = list(left)
-    scores = read_scores(path, held)
+    scores = leaving_out.read_scores(path, held)
     done = {score.name for score in scores}
     chosen = [candidate for candidate in candidates() if options.only in candidate.name]
     if not chosen:
@@ -315,19 +314,25 @@ def _compare(options: argparse.Namespace) -> None:
     for candidate in chosen:
         if candidate.name not in done:
             with Progress(f"{candidate.name:<46}") as bar:
-                scores.append(leave_out(candidate, studies, options.leave, bar.show))
-            write_scores(path, scores, held)
+                scores.append(leaving_out.leave_out(candidate, studies, options.leave, bar.show))
+            leaving_out.write_scores(path, scores, held)
     papers = len({study.paper for study in studies})
     print(f"{len(studies)} studies of {papers} papers, one {options.leave} after the other left out:")
     shown = [score for score in scores if options.only in score.name]
-    print(*score_lines(shown), sep="\n")
+    print(*leaving_out.score_lines(shown), sep="\n")
     for score in shown:
         if score.levels:
-            lines = calibration_lines(calibration(score, methods_of(left)), options.leave)
+            lines = leaving_out.calibration_lines(
+                leaving_out.calibration(score, leaving_out.methods_of(left)), options.leave
+            )
             title = f"{score.name}: {options.leave}s whose level is within an interval (95 % interval of that part)"
             print("", title, *lines, sep="\n")
     default = next((score for score in scores if score.name == DEFAULT), None)
     others = [score for score in shown if score.name != DEFAULT]
     if default is not None and others:
-        print("", *comparison_lines(default.name, [compared(default, other) for other in others]), sep="\n")
+        print(
+            "",
+            *leaving_out.comparison_lines(default.name, [leaving_out.compared(default, other) for other in others]),
+            sep="\n",
+        )
     print("", f"written to {path}", sep="\n")

@@ -27,26 +27,16 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Asymmetry:
-    """What a model says of a group.
-
-    Attributes
-    ----------
-    strain : float
-        Largest equivalent strain of the group on both sides.
-    mean, low, high : float
-        Of all papers in the mean, and its 95 % posterior interval.
-    new_low, new_high, tension : float
-        95 % of new studies by new papers are between, and this part of them is stiffer in tension.
-    """
+    """What a model says of a group."""
 
     group: str
-    strain: float
-    mean: float
-    low: float
+    strain: float  # largest equivalent strain of the group on both sides
+    mean: float  # of all papers
+    low: float  # 95 % posterior interval of that
     high: float
-    new_low: float
+    new_low: float  # 95 % of new studies by new papers are between these
     new_high: float
-    tension: float
+    tension: float  # part of those that is stiffer in tension
 
 
 def asymmetry(model: Hierarchical, group: str) -> Asymmetry:
@@ -55,8 +45,8 @@ def asymmetry(model: Hierarchical, group: str) -> Asymmetry:
     Examples
     --------
     >>> from warpbrain.gp.trained import trained
-    >>> found = asymmetry(trained(), "hyperelastic/brain")
-    >>> found.low < found.mean < found.high < 0.0
+    >>> brain = asymmetry(trained(), "hyperelastic/brain")
+    >>> brain.low < brain.mean < brain.high < 0.0
     True
     """
     from scipy.special import ndtr
@@ -82,8 +72,9 @@ def asymmetry(model: Hierarchical, group: str) -> Asymmetry:
 def asymmetry_of(study: Study) -> float:
     """Of a published energy, within its own range."""
     stretches = _both_sides(_largest_strain(study.stretch))
-    found = _of_energies(study.energy(stretches), stretches)
-    return 0.0 if abs(found) < _ROUNDING else found
+    compression, tension = np.split(np.log(study.energy(stretches) / invariant(stretches)), 2)
+    mean = float(np.mean(tension - compression))
+    return 0.0 if abs(mean) < _ROUNDING else mean
 
 
 def asymmetries_of_papers(studies: Iterable[Study]) -> dict[str, tuple[float, bool]]:
@@ -93,8 +84,8 @@ def asymmetries_of_papers(studies: Iterable[Study]) -> dict[str, tuple[float, bo
         if study.hyperelastic:
             papers.setdefault(study.paper, []).append(study)
     return {
-        name: (float(np.mean([asymmetry_of(study) for study in own])), not all(study.symmetric for study in own))
-        for name, own in papers.items()
+        name: (float(np.mean([asymmetry_of(study) for study in of])), not all(study.symmetric for study in of))
+        for name, of in papers.items()
     }
 
 
@@ -105,11 +96,6 @@ def _largest_strain(stretch: Sequence[float]) -> float:
 
 def _both_sides(strain: float) -> Floats:
     return np.concatenate([stretch_of(-strain * STRAINS), stretch_of(strain * STRAINS)])
-
-
-def _of_energies(energies: Floats, stretches: Floats) -> float:
-    compression, tension = np.split(np.log(energies / invariant(stretches)), 2)
-    return float(np.mean(tension - compression))
 
 
 def _along(weights: Floats, mean: Floats, covariance: Floats) -> tuple[float, float]:

@@ -18,8 +18,7 @@ from scipy.special import logsumexp, ndtr
 from warpbrain.arrays import Floats
 from warpbrain.gp.coregionalised import Coregionalised, training_points
 from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import CENTRE, MEAN_ASYMMETRY, observations
-from warpbrain.gp.hierarchy_fit import SAMPLE, fit_hierarchy, sample_hierarchies
+from warpbrain.gp.hierarchy import CENTRE, MEAN_ASYMMETRY, SAMPLE, fit_hierarchy, observations, sample_hierarchies
 from warpbrain.gp.likelihood import TASKS, Likelihood
 from warpbrain.gp.literature.study import OFFSET, Study
 from warpbrain.gp.secant import invariant, log_secant_modulus
@@ -56,15 +55,12 @@ class Candidate(Protocol):
     @property
     def name(self) -> str:
         """What it is, in a few words."""
-        ...
 
     def fitted(self, studies: Sequence[Study]) -> Candidate:
         """The same kind fitted to studies, from where it stands."""
-        ...
 
     def predict(self, study: Study, stretches: Floats) -> Prediction:
         """What it says of a study that it was not fitted to."""
-        ...
 
     def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
         """How probable it holds it to be that studies which it was not fitted to are softer in the mean.
@@ -72,7 +68,6 @@ class Candidate(Protocol):
         The level is the mean log energy over the stretches of a study, and over studies. Points of a study, and studies
         of a paper, are no independent witnesses of a model's calibration; levels of papers are.
         """
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +82,6 @@ class CoregionalisedCandidate:
     model: Coregionalised | None = None
 
     def fitted(self, studies: Sequence[Study]) -> CoregionalisedCandidate:
-        """See `Candidate`."""
         data = training_points(studies, self.mean_modulus, POINTS)
         likelihood = Likelihood(data, self.kernel, JITTER)
         if self.model is not None:
@@ -102,14 +96,12 @@ class CoregionalisedCandidate:
         return replace(self, model=model)
 
     def predict(self, study: Study, stretches: Floats) -> Prediction:
-        """See `Candidate`."""
         assert self.model is not None
         mean, spread = self.model.log_energy(study.group, stretches)
         error = np.log(study.energy(stretches) + OFFSET) - mean
         return Prediction(_normal(error, spread), ndtr(error / spread), error)
 
     def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
-        """See `Candidate`."""
         assert self.model is not None
         mean, spread = self.model.level_of(studies, stretches)
         pairs = zip(studies, stretches, strict=True)
@@ -133,7 +125,6 @@ class HierarchicalCandidate:
     model: Hierarchical | None = None
 
     def fitted(self, studies: Sequence[Study]) -> HierarchicalCandidate:
-        """See `Candidate`."""
         first = None if self.model is None else self.model.hierarchy
         seen = observations(studies)
         hierarchy, _ = fit_hierarchy(seen, self.kernel, first, self.without, self.mean_asymmetry)
@@ -141,7 +132,6 @@ class HierarchicalCandidate:
         return replace(self, model=Hierarchical(tuple(studies), hierarchy, "", sample))
 
     def predict(self, study: Study, stretches: Floats) -> Prediction:
-        """See `Candidate`."""
         assert self.model is not None
         moments = self.model.moduli_of([study], [stretches])
         means = np.array([mean for mean, _ in moments])

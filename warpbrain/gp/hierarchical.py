@@ -155,10 +155,8 @@ class Hierarchical:
         """Draw `number` of a seed, see `Process`."""
         from scipy.special import ndtr
 
-        l, normal = (
-            np.asarray(stretches, dtype=np.float64),
-            standard_normal(1 + len(groups) * len(ANCHORS), number, seed),
-        )
+        l = np.asarray(stretches, dtype=np.float64)
+        normal = standard_normal(1 + len(groups) * len(ANCHORS), number, seed)
         which = min(int(ndtr(normal[0]) * len(self.conditionals)), len(self.conditionals) - 1)
 
         def moments(groups: tuple[str, ...], at: Floats, other: Floats) -> tuple[Floats, Floats]:

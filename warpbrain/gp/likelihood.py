@@ -85,11 +85,7 @@ class Replicates:
     @classmethod
     def of(cls, task: ArrayLike, x: ArrayLike, y: ArrayLike, digits: int = 12) -> Replicates:
         """Reduce observations: task (n,), stretch (n,) and value (n,); stretches that agree to `digits` are one."""
-        tasks, xs, ys = (
-            np.asarray(task, dtype=np.int64),
-            np.asarray(x, dtype=np.float64),
-            np.asarray(y, dtype=np.float64),
-        )
+        tasks, (xs, ys) = np.asarray(task, dtype=np.int64), np.asarray([x, y], dtype=np.float64)
         key = np.stack([tasks, np.round(xs, digits)], axis=1)
         _, first, inverse, count = np.unique(key, axis=0, return_index=True, return_inverse=True, return_counts=True)
         inverse = inverse.ravel()
@@ -112,14 +108,11 @@ class Replicates:
 
 @dataclass(frozen=True, eq=False)
 class Factored:
-    """The lower triangle (m, m) of a covariance, `weights` (m,) = `K^-1` times the observed means, and the condition.
+    """A covariance `K`."""
 
-    The condition number is in the 1-norm, as LAPACK estimates it.
-    """
-
-    cholesky: Floats
-    weights: Floats
-    condition: float
+    cholesky: Floats  # lower triangle (m, m)
+    weights: Floats  # `K^-1` times the observed means (m,)
+    condition: float  # in the 1-norm, as LAPACK estimates it
 
 
 class Likelihood:
@@ -148,10 +141,8 @@ class Likelihood:
     def factor(self, parameters: Parameters) -> Factored:
         """Factor the covariance of the means.
 
-        Raises
-        ------
-        SolveError
-            If it is not positive definite in double precision; a jitter would make it so, and has to be asked for.
+        `SolveError` if it is not positive definite in double precision; a jitter would make it so, and has to be asked
+        for.
         """
         from scipy.linalg import cho_solve, cholesky
         from scipy.linalg.lapack import dpocon

@@ -10,12 +10,12 @@ negative throughout a box, and of any order of magnitude. That changes the way, 
 
 from __future__ import annotations
 
-import abc
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, ClassVar
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,89 +57,46 @@ class Box:
 
 
 @dataclass(frozen=True)
-class MetaModel(abc.ABC):
-    """A law of few parameters on the incompressible uniaxial path `(l, l^-1/2, l^-1/2)` (supplement eq. (2))."""
+class MetaModel:
+    """A law of few parameters on the incompressible uniaxial path `(l, l^-1/2, l^-1/2)` (supplement eq. (2)).
 
-    #: Of its law, as in `warpbrain.physics.laws.LAWS`.
-    name: ClassVar[str]
-    parameter_names: ClassVar[tuple[str, ...]]
-    #: Of the parameters: "Pa", or "" for a number without unit.
-    units: ClassVar[tuple[str, ...]]
+    By itself one that is linear in its parameters, `Psi = sum_i values_i basis_i(l)`, all of them positive moduli.
+    """
 
-    @abc.abstractmethod
+    name: str  # of its law, as in `warpbrain.physics.laws.LAWS`
+    parameter_names: tuple[str, ...]
+    units: tuple[str, ...]  # of the parameters: "Pa", or "" for a number without unit
+    basis: tuple[Callable[[Floats], Floats], ...] = ()
+    moduli: tuple[float, ...] = ()  # shear modulus at rest of each for a parameter of one
+    least: float = 0.1  # [Pa], of the parameters of a fit
+
     def energy(self, stretches: Floats, values: Values) -> Floats:
         """Strain energy `Psi` [Pa] at stretches `l` > 0 of shape (n,), good to all digits near `l = 1`; (n,)."""
+        return np.asarray(sum(value * psi(stretches) for value, psi in zip(values, self.basis, strict=True)))
 
-    @abc.abstractmethod
     def jacobian(self, stretches: Floats, values: Values) -> Floats:
         """Its derivatives by the parameters, (n, p): the numerators of supplement eq. (3)."""
+        return np.stack([psi(stretches) for psi in self.basis], axis=1)
 
-    @abc.abstractmethod
     def boxes(self, search: str = "high") -> tuple[Box, ...]:
         """Boxes whose best optimum is the fit, for one of `SEARCHES`."""
+        size = len(self.basis)
+        return (Box((self.least,) * size, (math.inf,) * size, (1000.0,) * size),)
 
-    @abc.abstractmethod
     def law(self, values: Values) -> Law:
         """The law that a simulation takes; `InputError` if there is none, as with a modulus that is not positive."""
+        from warpbrain.physics.laws import LAWS
 
-    @abc.abstractmethod
+        kind: Any = LAWS[self.name]
+        return kind(*map(float, values))
+
     def shear_modulus(self, values: Values) -> float:
         """Shear modulus at rest `mu0` [Pa]; `d2Psi/dl2 = 3 mu0` at `l = 1`."""
-
-
-class _NeoHookean(MetaModel):
-    """`Psi = mu/2 (l^2 + 2/l - 3)`."""
-
-    name, parameter_names, units = "neo-hookean", ("mu",), ("Pa",)
-
-    def energy(self, stretches: Floats, values: Values) -> Floats:
-        return forms.neo_hookean(stretches, mu=values[0])
-
-    def jacobian(self, stretches: Floats, values: Values) -> Floats:
-        return 0.5 * forms.first(stretches)[:, None]
-
-    def boxes(self, search: str = "high") -> tuple[Box, ...]:
-        return (Box((1e-3,), (math.inf,), (1000.0,)),)
-
-    def law(self, values: Values) -> Law:
-        from warpbrain.physics.laws import NeoHookean
-
-        return NeoHookean(float(values[0]))
-
-    def shear_modulus(self, values: Values) -> float:
-        return float(values[0])
-
-
-class _MooneyRivlin(MetaModel):
-    """`Psi = C1 (l^2 + 2/l - 3) + C2 (2 l + l^-2 - 3)`, both coefficients positive."""
-
-    name, parameter_names, units = "mooney-rivlin", ("C1", "C2"), ("Pa", "Pa")
-
-    def energy(self, stretches: Floats, values: Values) -> Floats:
-        C1, C2 = values
-        return forms.mooney_rivlin(stretches, C1=C1, C2=C2)
-
-    def jacobian(self, stretches: Floats, values: Values) -> Floats:
-        return np.stack([forms.first(stretches), forms.second(stretches)], axis=1)
-
-    def boxes(self, search: str = "high") -> tuple[Box, ...]:
-        return (Box((0.1, 0.1), (math.inf, math.inf), (1000.0, 1000.0)),)
-
-    def law(self, values: Values) -> Law:
-        from warpbrain.physics.laws import MooneyRivlin
-
-        C1, C2 = values
-        return MooneyRivlin(float(C1), float(C2))
-
-    def shear_modulus(self, values: Values) -> float:
-        C1, C2 = values
-        return 2.0 * (float(C1) + float(C2))
+        return sum(modulus * float(value) for modulus, value in zip(self.moduli, values, strict=True))
 
 
 class _Ogden(MetaModel):
     """One term `Psi = mu/alpha (l^alpha + 2 l^(-alpha/2) - 3)`, `mu` and `alpha` of the same sign."""
-
-    name, parameter_names, units = "ogden", ("mu", "alpha"), ("Pa", "")
 
     def energy(self, stretches: Floats, values: Values) -> Floats:
         mu, alpha = values
@@ -183,35 +140,33 @@ class _Ogden(MetaModel):
         return 0.5 * float(mu) * float(alpha)
 
 
+def _neo_hookean(stretches: Floats) -> Floats:
+    return 0.5 * forms.first(stretches)
+
+
 #: Meta-models by the name of their law.
-METAMODELS: dict[str, MetaModel] = {model.name: model for model in (_NeoHookean(), _MooneyRivlin(), _Ogden())}
+METAMODELS: dict[str, MetaModel] = {
+    model.name: model
+    for model in (
+        MetaModel("neo-hookean", ("mu",), ("Pa",), (_neo_hookean,), (1.0,), least=1e-3),
+        MetaModel("mooney-rivlin", ("C1", "C2"), ("Pa", "Pa"), (forms.first, forms.second), (2.0, 2.0)),
+        _Ogden("ogden", ("mu", "alpha"), ("Pa", "")),
+    )
+}
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A meta-model that was fitted to a curve.
-
-    Attributes
-    ----------
-    cost, points : float and int
-        Half the sum of the squared residuals, and their number.
-    converged : bool
-        Whether the search ended where the cost is stationary in all directions that the bounds leave open; `message`
-        says why it ended.
-    evaluations : int
-        Of the energies, in all boxes together.
-    at_bound : tuple of str
-        Names of the parameters that lie at a bound.
-    """
+    """A meta-model that was fitted to a curve."""
 
     model: MetaModel
     values: tuple[float, ...]
-    cost: float
+    cost: float  # half the sum of the squared residuals
     points: int
-    converged: bool
-    message: str
-    evaluations: int
-    at_bound: tuple[str, ...] = ()
+    converged: bool  # the search ended where the cost is stationary in all directions that the bounds leave open
+    message: str  # why it ended
+    evaluations: int  # of the energies, in all boxes together
+    at_bound: tuple[str, ...] = ()  # names of the parameters that lie at a bound
 
     @property
     def rms(self) -> float:
@@ -231,31 +186,12 @@ class Fit:
 def fit(
     model: MetaModel, stretches: ArrayLike, log_energy: ArrayLike, search: str = "high", offset: float = 1e-3
 ) -> Fit:
-    """Fit a meta-model to a curve: the best optimum in all its boxes.
+    """Fit a meta-model to a curve of stretches `l` (n,), in any order, and log energies `y` (n,): the best optimum in
+    all its boxes, `converged` False if no parameters come near to it.
 
-    Parameters
-    ----------
-    model : MetaModel
-        One of `METAMODELS`.
-    stretches : (n,) array
-        `l` > 0, in any order.
-    log_energy : (n,) array
-        `y`, the logarithm of energies in Pa.
-    search : str
-        One of `SEARCHES`: how far exponents are searched.
-    offset : float
-        `d` [Pa], positive.
-
-    Returns
-    -------
-    Fit
-        With `converged` False if the curve is one that no parameters come near to.
-
-    Raises
-    ------
-    InputError
-        If the arrays are not finite, of different lengths or shorter than the parameters, a stretch is not between
-        1e-3 and 1e3, the offset is not positive, or the search is unknown.
+    `search` is one of `SEARCHES`, `offset` is `d` [Pa]. `InputError` if the arrays are not finite, of different lengths
+    or shorter than the parameters, a stretch is not between 1e-3 and 1e3, the offset is not positive, or the search is
+    unknown.
 
     Examples
     --------
@@ -271,9 +207,9 @@ def fit(
     if not (np.isfinite(offset) and offset > 0.0):
         raise InputError(f"offset = {offset:g} Pa: expected a positive number")
     with np.errstate(over="ignore", invalid="ignore"):
-        found = [_search(model, box, l, y, offset) for box in model.boxes(search)]
-    best = min(found, key=lambda one: one.cost)
-    return replace(best, evaluations=sum(one.evaluations for one in found))
+        fits = [_search(model, box, l, y, offset) for box in model.boxes(search)]
+    best = min(fits, key=attrgetter("cost"))
+    return replace(best, evaluations=sum(fitted.evaluations for fitted in fits))
 
 
 def _curve(model: MetaModel, stretches: ArrayLike, log_energy: ArrayLike) -> tuple[Floats, Floats]:
@@ -345,51 +281,26 @@ def _is_stationary(jacobian: Floats, residual: Floats, held: Bools) -> bool:
 
 
 def unstable(fit: Fit, poisson: float = 0.45, formulation: str = "coupled") -> str:
-    """Why a fit cannot be computed with, by the supplement's Table 2; empty if it can.
+    """Why a fit cannot be computed with, by the supplement's Table 2: the message of `require_stable`, or of the law if
+    it is none; empty if it can.
 
-    Parameters
-    ----------
-    fit : Fit
-    poisson : float
-        Poisson ratio at rest.
-    formulation : str
-        One of `warpbrain.physics.laws.FORMULATIONS`.
-
-    Returns
-    -------
-    str
-        The message of `warpbrain.physics.laws.stability.require_stable`, or of the law if it is none.
-
-    Raises
-    ------
-    InputError
-        If the Poisson ratio is outside (-1, 0.5) or the formulation is unknown.
+    `InputError` if the Poisson ratio at rest is outside (-1, 0.5) or the formulation is unknown.
     """
-    from warpbrain.physics.laws.stability import UnstableLawError, require_stable
-
     try:
         law = fit.law()
     except InputError as error:
         return str(error)
-    if not _is_stable(law.scaled_to(1.0), poisson, formulation):
-        try:
-            require_stable(law, poisson, formulation)
-        except UnstableLawError as error:
-            return str(error)
-    return ""
+    # the conditions are signs, and ratios to the shear modulus: all neo-Hookean laws are one
+    return _instability(law, poisson, formulation) if _instability(law.scaled_to(1.0), poisson, formulation) else ""
 
 
 @lru_cache(maxsize=64)
-def _is_stable(law: Law, poisson: float, formulation: str) -> bool:
-    """Whether a law of the shear modulus 1 Pa is stable; kept for the last ones that were asked for.
-
-    The conditions are signs, and ratios to the shear modulus: they hold for a law in one unit if they do in another.
-    All neo-Hookean laws are one then, so that the thousand of a prior are looked at once.
-    """
+def _instability(law: Law, poisson: float, formulation: str) -> str:
+    """The message of `require_stable`, kept for the last laws that were asked for; empty of a stable one."""
     from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 
     try:
         require_stable(law, poisson, formulation)
-    except UnstableLawError:
-        return False
-    return True
+    except UnstableLawError as error:
+        return str(error)
+    return ""

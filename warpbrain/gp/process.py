@@ -34,26 +34,21 @@ class Process(Protocol):
     @property
     def name(self) -> str:
         """Of the kind of model, as the command line calls it."""
-        ...
 
     @property
     def variant(self) -> str:
         """Of the literature that it learnt from."""
-        ...
 
     @property
     def studies(self) -> tuple[Study, ...]:
         """What it learnt from."""
-        ...
 
     @property
     def groups(self) -> tuple[str, ...]:
         """Groups that it has seen studies of."""
-        ...
 
     def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
         """Curves `k` standard deviations from the mean (the paper's samples), shape of `k` and `stretches` (..., n)."""
-        ...
 
     def draw(self, groups: Sequence[str], stretches: ArrayLike, number: int | tuple[int, ...], seed: int = 0) -> Floats:
         """Draw `number` of a seed, joint over groups: curves of shape (groups, n).
@@ -61,7 +56,6 @@ class Process(Protocol):
         A draw is a function: its value at a stretch does not depend on the other stretches that were asked for. A
         number of several parts, as (7, 1), is another draw: the first that replaces draw 7.
         """
-        ...
 
 
 def standard_normal(size: int, number: int | tuple[int, ...], seed: int) -> Floats:

@@ -30,27 +30,15 @@ CURVES = (-2.0, 0.0, 2.0)
 
 @dataclass(frozen=True)
 class DrawnLaws:
-    """Draw `number` of a seed of the laws of several tissues.
-
-    Attributes
-    ----------
-    groups : tuple of str
-        One for each tissue. Tissues of one group are of one curve.
-    stretches, curves : tuple of (n,) array
-        What was drawn for each tissue, `y = ln(Psi + 1e-4)`.
-    fits : tuple of Fit
-        The law nearest to each curve.
-    rejected : tuple of str
-        Why each attempt before this one was redrawn.
-    """
+    """Draw `number` of a seed of the laws of several tissues."""
 
     number: int
     seed: int
-    groups: tuple[str, ...]
-    stretches: tuple[Floats, ...]
-    curves: tuple[Floats, ...]
-    fits: tuple[Fit, ...]
-    rejected: tuple[str, ...]
+    groups: tuple[str, ...]  # one for each tissue; tissues of one group are of one curve
+    stretches: tuple[Floats, ...]  # (n,) of each tissue
+    curves: tuple[Floats, ...]  # what was drawn there, `y = ln(Psi + 1e-4)`
+    fits: tuple[Fit, ...]  # the law nearest to each curve
+    rejected: tuple[str, ...]  # why each attempt before this one was redrawn
 
     @property
     def laws(self) -> tuple[Law, ...]:
@@ -134,10 +122,10 @@ def draw_laws(
     metamodels = [_metamodel(name) for name in _one_each(law, groups)]
     formulations = _one_each(formulation, groups)
     distinct = tuple(dict.fromkeys(groups))
-    own = {group: usual_stretches(group) for group in distinct}
+    ranges = {group: usual_stretches(group) for group in distinct}
     # a draw is a function: groups of other ranges are the same draw where their ranges meet
-    at = np.unique(np.concatenate(list(own.values())))
-    places = {group: np.searchsorted(at, own[group]) for group in distinct}
+    at = np.unique(np.concatenate(list(ranges.values())))
+    places = {group: np.searchsorted(at, ranges[group]) for group in distinct}
     rejected: list[str] = []
     for attempt in range(ATTEMPTS):
         drawn = model.draw(distinct, at, (number, attempt) if attempt else number, seed)
@@ -145,21 +133,14 @@ def draw_laws(
         fits: list[Fit] = []
         reason = ""
         for group, metamodel, shape in zip(groups, metamodels, formulations, strict=True):
-            fits.append(_fit(model, metamodel, own[group], curves[group]))
+            fits.append(_fit(model, metamodel, ranges[group], curves[group]))
             reason = unstable(fits[-1], poisson, shape)
             if reason:
                 rejected.append(f"{group}: {reason}")
                 break
         if not reason:
-            return DrawnLaws(
-                number,
-                seed,
-                tuple(groups),
-                tuple(own[group] for group in groups),
-                tuple(curves[group] for group in groups),
-                tuple(fits),
-                tuple(rejected),
-            )
+            drawn_at, drawn_curves = (tuple(of[group] for group in groups) for of in (ranges, curves))
+            return DrawnLaws(number, seed, tuple(groups), drawn_at, drawn_curves, tuple(fits), tuple(rejected))
     raise SolveError(
         f"draw {number} of seed {seed}: all of {ATTEMPTS} attempts are unstable at the Poisson ratio {poisson:g}, "
         f"the last one: {rejected[-1]}"
@@ -188,30 +169,18 @@ def rejection_rate(draws: Sequence[DrawnLaws]) -> float:
 
 @dataclass(frozen=True)
 class Moduli:
-    """What a model says of the shear modulus [Pa] at rest of a group, through one law.
-
-    Attributes
-    ----------
-    fits, unstable : tuple of Fit and of str
-        Of the curves that lie `CURVES` standard deviations from the mean, and why each is unstable; empty if it is not.
-    median, low, high : float
-        Of stable draws: 50 %, 2.5 % and 97.5 % lie below.
-    median_error : float
-        Relative standard error of the median: the number of draws is finite.
-    rejection_rate : float
-        Part of the attempts that gave an unstable law.
-    """
+    """What a model says of the shear modulus [Pa] at rest of a group, through one law."""
 
     group: str
     law: str
-    fits: tuple[Fit, ...]
-    unstable: tuple[str, ...]
-    median: float
-    low: float
-    high: float
-    median_error: float
+    fits: tuple[Fit, ...]  # of the curves that lie `CURVES` standard deviations from the mean
+    unstable: tuple[str, ...]  # why each of these is; empty if it is not
+    median: float  # of stable draws
+    low: float  # 2.5 % of them lie below
+    high: float  # 97.5 %
+    median_error: float  # relative standard error: the number of draws is finite
     draws: int
-    rejection_rate: float
+    rejection_rate: float  # part of the attempts that gave an unstable law
 
 
 def moduli(model: Process, group: str, law: str, draws: int = 1000, seed: int = 0, poisson: float = 0.45) -> Moduli:
@@ -220,8 +189,8 @@ def moduli(model: Process, group: str, law: str, draws: int = 1000, seed: int = 
     Examples
     --------
     >>> from warpbrain.gp.trained import trained
-    >>> found = moduli(trained(), "hyperelastic/brain", "neo-hookean", draws=40)
-    >>> found.low < found.median < found.high
+    >>> brain = moduli(trained(), "hyperelastic/brain", "neo-hookean", draws=40)
+    >>> brain.low < brain.median < brain.high
     True
     """
     fits = tuple(law_of_curve(model, group, k, law) for k in CURVES)
@@ -230,18 +199,8 @@ def moduli(model: Process, group: str, law: str, draws: int = 1000, seed: int = 
     low, median, high = np.quantile(values, [0.025, 0.5, 0.975]).tolist()
     # of a normal distribution's median, in logarithms
     error = float(np.sqrt(0.5 * np.pi / draws) * np.log(values).std())
-    return Moduli(
-        group,
-        law,
-        fits,
-        tuple(unstable(fitted, poisson) for fitted in fits),
-        median,
-        low,
-        high,
-        error,
-        draws,
-        rejection_rate(drawn),
-    )
+    reasons = tuple(unstable(fitted, poisson) for fitted in fits)
+    return Moduli(group, law, fits, reasons, median, low, high, error, draws, rejection_rate(drawn))
 
 
 def _fit(model: Process, metamodel: MetaModel, stretches: Floats, curve: Floats) -> Fit:

@@ -24,14 +24,13 @@ from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
 from warpbrain.gp.coregionalised import Coregionalised, training_points
 from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import EFFECTS, Hierarchy, observations
-from warpbrain.gp.hierarchy_fit import SAMPLE, Fitted, fit_hierarchy, sample_hierarchies
+from warpbrain.gp.hierarchy import EFFECTS, SAMPLE, Fitted, Hierarchy, fit_hierarchy, observations, sample_hierarchies
 from warpbrain.gp.kernels import KERNELS
 from warpbrain.gp.likelihood import TASKS, Parameters
 from warpbrain.gp.literature.studies import VARIANTS, Variant, read_studies
 from warpbrain.gp.literature.study import GROUPS, Study
 from warpbrain.gp.process import Process
-from warpbrain.gp.training import Climb, train
+from warpbrain.gp.training import JITTER, Climb, train
 from warpbrain.values import finite
 
 Kind = Literal["hierarchical", "coregionalised"]
@@ -76,13 +75,7 @@ def find_model(name: str | Path, variant: Variant = "corrected") -> Process:
 
 
 def read_model(folder: Path) -> Process:
-    """A model that was written by `write_model`.
-
-    Raises
-    ------
-    InputError
-        With file and key, if something is missing or is not what it should be.
-    """
+    """A model that was written by `write_model`; `InputError` with file and key if something is not as it should be."""
     path = folder / MODEL
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
@@ -105,9 +98,9 @@ def read_model(folder: Path) -> Process:
             warnings.warn(f"{path}: of an older format, without a mean asymmetry: fitted again", stacklevel=2)
             return fitted_hierarchical(studies, variant, kernel)[0]
         sample = table.get("sample")
-        if not isinstance(sample, list) or not all(isinstance(one, dict) for one in sample):
+        if not isinstance(sample, list) or not all(isinstance(drawn, dict) for drawn in sample):
             raise InputError(f"{path}: sample: expected tables of parameters")
-        best, *others = (_hierarchy(path, one, kernel) for one in (given, *sample))
+        best, *others = (_hierarchy(path, each, kernel) for each in (given, *sample))
         return Hierarchical(studies, best, variant, tuple(others))
     arrays = {name: _numbers(path, given, name) for name in ("w", "kappa", "noise")}
     try:
@@ -125,31 +118,11 @@ def fit_model(
     climbs: int = 1,
     progress: Callable[[float, str], None] = lambda part, said: None,
 ) -> tuple[Process, dict[str, Any]]:
-    """Fit a model to the literature and to the studies of a user's file.
+    """Fit a model to the literature and to the studies of a user's file (`warpbrain.gp.literature.studies`).
 
-    Parameters
-    ----------
-    kind : {"hierarchical", "coregionalised"}
-    variant : {"corrected", "as_published"}
-    add : Path, optional
-        File of studies, see `warpbrain.gp.literature.studies`.
-    climbs : int
-        Of the coregionalised process, see `warpbrain.gp.training.train`.
-    progress : callable
-        Is told the part done, 0 to 1, and what is going on.
-
-    Returns
-    -------
-    model : Process
-    record : dict
-        Objective, convergence, restarts, conditioning and seconds; for `write_model` and for the reader.
-
-    Raises
-    ------
-    InputError
-        If the file of studies is wrong.
-    SolveError
-        If no covariance can be factored.
+    For `climbs` and `progress` see `warpbrain.gp.training.train`. Returns the model and, for `write_model` and for the
+    reader, a record: objective, convergence, restarts, conditioning and seconds. `InputError` if the file of studies is
+    wrong; `SolveError` if no covariance can be factored.
     """
     began = time.perf_counter()
     studies = read_studies(variant, add)
@@ -163,11 +136,11 @@ def fit_model(
     else:
         data = training_points(studies)
         training = train(data, climbs=climbs, progress=progress)
-        model = Coregionalised(studies, training.best.parameters, variant, training.kernel, training.jitter)
+        model = Coregionalised(studies, training.best.parameters, variant, training.kernel, JITTER)
         record |= {
             "points": int(data.count.sum()),
             "means of replicates": data.size,
-            "jitter": training.jitter,
+            "jitter": JITTER,
             "negative log likelihood": training.best.value,
             "climbs": [_climb_table(climb) for climb in training.climbs],
             "starts": [
@@ -196,24 +169,13 @@ def fitted_hierarchical(
 
 
 def write_model(folder: Path, model: Process, record: dict[str, Any], added: Path | None = None) -> None:
-    """Write a model with the record of its training, and the user's studies if any.
-
-    Parameters
-    ----------
-    folder : Path
-        Is there already.
-    model : Hierarchical or Coregionalised
-    record : dict
-        What JSON can hold.
-    added : Path, optional
-    """
+    """Write a model with the record of its training, and the user's studies if any, to a folder that is there."""
     if isinstance(model, Hierarchical):
         parameters = _described(model.hierarchy)
         kernel = model.hierarchy.kernel
     elif isinstance(model, Coregionalised):
-        own = model.parameters
-        parameters = {"length scale": own.length_scale, "jitter": model.jitter}
-        parameters |= {name: getattr(own, name).tolist() for name in ("w", "kappa", "noise")}
+        parameters = {"length scale": model.parameters.length_scale, "jitter": model.jitter}
+        parameters |= {name: getattr(model.parameters, name).tolist() for name in ("w", "kappa", "noise")}
         kernel = model.kernel
     else:
         raise TypeError(f"{type(model).__name__} is not a model that can be written")
@@ -225,7 +187,7 @@ def write_model(folder: Path, model: Process, record: dict[str, Any], added: Pat
         "training": record,
     }
     if isinstance(model, Hierarchical):
-        table |= {"format": FORMAT, "sample": [_described(one) for one in model.sample]}
+        table |= {"format": FORMAT, "sample": [_described(drawn) for drawn in model.sample]}
     # the studies first: a model without them would be another one
     if added is not None:
         text = added.read_text(encoding="utf-8")

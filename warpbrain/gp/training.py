@@ -20,6 +20,8 @@ from warpbrain.gp.likelihood import TASKS, Likelihood, Parameters, Replicates
 
 #: Variance added to the diagonal of the covariance, as in the paper's training.
 JITTER = 1e-8
+#: Of a climb on all observations, at most.
+_ITERATIONS = 200
 #: Free parameters stay between these, (length, w, kappa, noise): what is beyond changes nothing.
 _LOWEST = np.repeat([np.log(1e-2), -1e4, np.log(1e-10), np.log(1e-12)], [1, TASKS, TASKS, TASKS])
 _HIGHEST = np.repeat([np.log(1e1), 1e4, np.log(1e5), np.log(1e3)], [1, TASKS, TASKS, TASKS])
@@ -29,21 +31,16 @@ _LONGEST = np.repeat([0.5, np.inf, 3.0, 3.0], [1, TASKS, TASKS, TASKS])
 
 @dataclass(frozen=True, eq=False)
 class Climb:
-    """Where one optimisation ended.
-
-    `value` is the negative log marginal likelihood, `gain` what the last iteration lowered it by, `gradient` its
-    largest derivative by a free parameter, `condition` that of the covariance; it `converged` if an iteration gained
-    less than was asked for before they ran out.
-    """
+    """Where one optimisation ended."""
 
     parameters: Parameters
-    value: float
-    converged: bool
+    value: float  # negative log marginal likelihood
+    converged: bool  # an iteration gained less than was asked for before they ran out
     iterations: int
     evaluations: int
-    gain: float
-    gradient: float
-    condition: float
+    gain: float  # what the last iteration lowered the value by
+    gradient: float  # largest derivative by a free parameter
+    condition: float  # of the covariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +61,6 @@ class Training:
     climbs: tuple[Climb, ...]
     starts: tuple[Start, ...]
     step: int
-    jitter: float
     kernel: str
 
     @property
@@ -77,39 +73,18 @@ def train(
     data: Replicates,
     kernel: str = "matern32",
     *,
-    jitter: float = JITTER,
     climbs: int = 1,
     step: int = 5,
     gain: float = 1e-2,
-    iterations: int = 200,
     progress: Callable[[float, str], None] = lambda part, said: None,
 ) -> Training:
-    """Train on the means of replicates.
+    """Train on the means of replicates; `SolveError` if the covariance cannot be factored at any start.
 
-    Parameters
-    ----------
-    data : Replicates
-    kernel : str
-        One of `warpbrain.gp.kernels.KERNELS`.
-    jitter : float
-        Variance added to the diagonal.
-    climbs : int
-        From how many of the best starts to climb on all observations.
-    step : int
-        Starts are compared on every `step`-th stretch.
-    gain : float
-        Converged when an iteration lowers the negative log likelihood by less.
-    iterations : int
-        At most, of a climb on all observations.
-    progress : callable
-        Is told the part done, 0 to 1, and what is going on.
-
-    Raises
-    ------
-    SolveError
-        If the covariance cannot be factored at any start.
+    `climbs` are of the best starts, on all observations; starts are compared on every `step`-th stretch. A climb has
+    converged when an iteration lowers the negative log likelihood by less than the `gain`. `progress` is told the part
+    done, 0 to 1, and what is going on.
     """
-    thinned, whole = (Likelihood(d, kernel, jitter) for d in (data.thinned(step), data))
+    thinned, whole = (Likelihood(d, kernel, JITTER) for d in (data.thinned(step), data))
     progress(0.0, "all groups together")
     together = Start(None, climb(thinned, start(data), gain, 80))
     starts = [together]
@@ -118,25 +93,24 @@ def train(
         progress(0.1 + 0.15 * index / len(present), f"one group apart, {index + 1} of {len(present)}")
         with suppress(SolveError):
             starts.append(Start(group, climb(thinned, _apart(together.climb.parameters, group), gain, 25)))
-    starts.sort(key=lambda one: one.climb.value)
-    found: list[Climb] = []
-    for one in starts:
-        done = len(found) / climbs
+    starts.sort(key=lambda begun: begun.climb.value)
+    ended: list[Climb] = []
 
-        def told(iteration: int, value: float, done: float = done) -> None:
-            part = 0.25 + 0.75 * (done + iteration / iterations / climbs)
-            progress(part, f"climb {len(found) + 1} of {climbs}, negative log likelihood {value:.2f}")
+    def report(iteration: int, value: float) -> None:
+        part = 0.25 + 0.75 * (len(ended) + iteration / _ITERATIONS) / climbs
+        progress(part, f"climb {len(ended) + 1} of {climbs}, negative log likelihood {value:.2f}")
 
+    for begun in starts:
         with suppress(SolveError):
-            found.append(climb(whole, start(data, one.apart), gain, iterations, told))
-        if len(found) == climbs:
+            ended.append(climb(whole, start(data, begun.apart), gain, _ITERATIONS, report))
+        if len(ended) == climbs:
             break
-    if not found:
+    if not ended:
         raise SolveError(
-            f"none of {len(starts)} starts has a covariance that double precision can factor (jitter {jitter:g})"
+            f"none of {len(starts)} starts has a covariance that double precision can factor (jitter {JITTER:g})"
         )
-    found.sort(key=lambda one: one.value)
-    return Training(tuple(found), tuple(starts), step, jitter, kernel)
+    ended.sort(key=lambda climbed: climbed.value)
+    return Training(tuple(ended), tuple(starts), step, kernel)
 
 
 def start(data: Replicates, apart: int | None = None) -> Parameters:
@@ -183,18 +157,9 @@ def climb(
         if gained < gain:
             converged = True
             break
-    parameters = Parameters.from_vector(x)
-    free = _free(x, gradient)
-    return Climb(
-        parameters,
-        value,
-        converged,
-        iteration,
-        evaluations,
-        float(gained),
-        float(np.abs(gradient[free]).max()),
-        likelihood.factor(parameters).condition,
-    )
+    parameters, steepest = Parameters.from_vector(x), float(np.abs(gradient[_free(x, gradient)]).max())
+    condition = likelihood.factor(parameters).condition
+    return Climb(parameters, value, converged, iteration, evaluations, float(gained), steepest, condition)
 
 
 def _free(x: Floats, gradient: Floats) -> Bools:

@@ -55,26 +55,14 @@ class Convention:
 
 @dataclass(frozen=True)
 class Form:
-    """A form of strain energy.
-
-    Attributes
-    ----------
-    name : str
-    energy : callable
-        `Psi(l)` [Pa] on the incompressible uniaxial path: stretches of any shape, then the parameters by name.
-    shear_modulus : callable
-        `mu0` [Pa] of the parameters, the curvature of the energy at rest: `d2Psi/dl2 = 3 mu0` at `l = 1`.
-    conventions : mapping of str to Convention
-        By name; where a study names none, the one whose keys it gives, and the first if several have them.
-    of_first_invariant : bool
-        A function of I1 alone: whatever its parameters, tension and compression of one I1 have one energy.
-    """
+    """A form of strain energy."""
 
     name: str
-    energy: Callable[..., Floats]
-    shear_modulus: Callable[..., float]
+    energy: Callable[..., Floats]  # `Psi(l)` [Pa]: stretches of any shape, then the parameters by name
+    shear_modulus: Callable[..., float]  # `mu0` [Pa] of the parameters: `d2Psi/dl2 = 3 mu0` at `l = 1`
+    #: By name; where a study names none, the one whose keys it gives, and the first if several have them.
     conventions: Mapping[str, Convention]
-    of_first_invariant: bool = False
+    of_first_invariant: bool = False  # of I1 alone: tension and compression of one I1 have one energy
 
     def convention_of(self, keys: Iterable[str]) -> str:
         """The convention that has most of the keys; of equals the first."""
@@ -92,18 +80,14 @@ def second(l: Floats) -> Floats:
     return (l - 1.0) ** 2 * (2.0 * l + 1.0) / l**2
 
 
-def _keys(*keys: str | Parameter) -> tuple[Parameter, ...]:
-    """Names are those of moduli."""
-    return tuple(Parameter(key) if isinstance(key, str) else key for key in keys)
+def _other(convert: Callable[..., Parameters], *keys: str | Parameter) -> Convention:
+    """A paper's way; names are those of moduli."""
+    return Convention(tuple(Parameter(key) if isinstance(key, str) else key for key in keys), convert)
 
 
 def _ours(*keys: str | Parameter) -> Convention:
     """The paper writes it as we do."""
-    return Convention(_keys(*keys), lambda **parameters: parameters)
-
-
-def _other(convert: Callable[..., Parameters], *keys: str | Parameter) -> Convention:
-    return Convention(_keys(*keys), convert)
+    return _other(lambda **parameters: parameters, *keys)
 
 
 #: Forms by the name that a study gives.

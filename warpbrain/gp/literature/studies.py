@@ -200,20 +200,9 @@ class _Entry:
         sides = self._sides(form, texts["convention"])
         if len(self.problems.found) > before or stretch is None or sides is None:
             return None
-        convention, compression, tension = sides
+        texts |= {"form": form, "convention": sides[0]}
         study = Study(
-            texts["name"],
-            group,
-            form,
-            compression,
-            tension,
-            stretch,
-            texts["source"],
-            convention,
-            texts["checked"],
-            texts["note"],
-            self.reason,
-            number,
+            compression=sides[1], tension=sides[2], stretch=stretch, reason=self.reason, number=number, **texts
         )
         self._examine(study)
         return study if len(self.problems.found) == before else None

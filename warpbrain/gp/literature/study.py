@@ -34,46 +34,20 @@ OFFSET = 1e-4
 
 @dataclass(frozen=True)
 class Study:
-    """A strain energy of one study, on the incompressible uniaxial path `(l, l^-1/2, l^-1/2)`.
+    """A strain energy of one study, on the incompressible uniaxial path `(l, l^-1/2, l^-1/2)`."""
 
-    Attributes
-    ----------
-    name : str
-        As in the paper's Table 1.
-    group : str
-        Method and anatomy, one of `GROUPS`.
-    form : str
-        One of `warpbrain.gp.literature.forms.FORMS`.
-    compression, tension : mapping of str to float or tuple of float
-        Parameters of the form for `l <= 1` and `l >= 1` (moduli in Pa); the same unless the study fitted them apart.
-    stretch : tuple of float
-        Range (low, high) of `l` for which it speaks, around 1.
-    source : str
-        The paper as far as it is known, and where the numbers were read.
-    convention : str
-        In which its numbers are given, one of the form's; `compression` and `tension` are in ours.
-    checked : str
-        What is known about the agreement with the printed paper.
-    note : str
-        What else should be known.
-    reason : str or None
-        Why it differs from what the paper trained on; None if it does not.
-    number : int or None
-        `n` in the paper's Table 1.
-    """
-
-    name: str
-    group: str
-    form: str
-    compression: Parameters
-    tension: Parameters
-    stretch: tuple[float, float]
-    source: str = ""
-    convention: str = ""
-    checked: str = ""
-    note: str = ""
-    reason: str | None = None
-    number: int | None = None
+    name: str  # as in the paper's Table 1
+    group: str  # method and anatomy, one of `GROUPS`
+    form: str  # one of `warpbrain.gp.literature.forms.FORMS`
+    compression: Parameters  # of the form for `l <= 1`, moduli in Pa
+    tension: Parameters  # for `l >= 1`; the same unless the study fitted them apart
+    stretch: tuple[float, float]  # range of `l` for which it speaks, around 1
+    source: str = ""  # the paper as far as it is known, and where the numbers were read
+    convention: str = ""  # in which its numbers are given, one of the form's; the parameters are in ours
+    checked: str = ""  # what is known about the agreement with the printed paper
+    note: str = ""  # what else should be known
+    reason: str | None = None  # why it differs from what the paper trained on; None if it does not
+    number: int | None = None  # `n` in the paper's Table 1
 
     @property
     def task(self) -> int:
