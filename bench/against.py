@@ -131,7 +131,7 @@ def work(row: str, device: str) -> None:
 
 
 def fresh_arrays(mesh: Any, number: int) -> tuple[Any, ...]:
-    """As `warpbrain.bench.fresh`, which the other checkout may not have, of what the plain model needs of a mesh."""
+    """As `warpbrain.bench.measure`, which the other checkout may not have, of what the plain model needs of a mesh."""
     points = mesh.points + np.array([1e-6 * number, 0.0, 0.0])
     turned = (np.roll(values, number, axis=0) for values in (mesh.tetrahedra, mesh.tissue))
     return points, *turned, {name: members.copy() for name, members in mesh.node_sets.items()}

@@ -10,7 +10,7 @@ import pytest
 from shapes import cube
 
 from warpbrain.bench import measure
-from warpbrain.bench.fresh import case_of, fresh_arrays
+from warpbrain.bench.measure import case_of, fresh_arrays
 from warpbrain.bench.table3 import TABLE3
 from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import TetMesh

@@ -6,8 +6,8 @@ import platform
 import pytest
 from command import warpbrain
 
-from warpbrain.bench import self_test as module
-from warpbrain.bench.self_test import TOLERANCE
+from warpbrain.bench import health as module
+from warpbrain.bench.health import TOLERANCE
 
 
 def test_a_sound_machine():

@@ -41,28 +41,25 @@ def _bench(options: argparse.Namespace) -> None:
     if not 0.0 < options.tol < 1.0:
         raise InputError(f"--tol {options.tol:g}: expected a number between 0 and 1")
 
-    from warpbrain.atomic import check_writable
     from warpbrain.bench.measure import BODIES, RESTART, measure_row
     from warpbrain.bench.table3 import TABLE3
-    from warpbrain.report.summary import machine
     from warpbrain.simulation.dynamics import finest_tolerance
     from warpbrain.simulation.system import find_device, find_precision
     from warpbrain.terminal.progress import Progress
-    from warpbrain.terminal.quiet import start_warp_quietly
 
-    if options.json is not None:
-        check_writable(options.json)
     names = command.chosen("--rows", options.rows, list(TABLE3))
-    wp = start_warp_quietly()
+    versions, where = command.start(options), command.host()
+
+    import warp as wp
+
     devices = [d.alias for d in wp.get_devices()] if options.device == "all" else [find_device(options.device).alias]
-    versions, where = machine(), command.host()
     results = []
     for alias in devices:
         device = wp.get_device(alias)
         tolerance = finest_tolerance(options.tol, find_precision(options.precision))
         print(
             f"{device.name} ({alias}), {options.precision} precision, CG to {tolerance:.2g}, h = 1 ms, "
-            f"from rest again every {RESTART} steps; warpbrain {versions['warpbrain']}, Warp {versions['warp-lang']}"
+            f"from rest again every {RESTART} steps; {command.release(versions)}"
         )
         print(f"mean (sd) ms of {options.steps} steps after {options.warmup}; 'paper' and 'x faster' from its Table 3;")
         print(f"pre-processing: from a mesh in memory, {BODIES} meshes that no cache has seen, kernels loaded;")
@@ -75,8 +72,7 @@ def _bench(options: argparse.Namespace) -> None:
             results.append(measured)
             print(*_lines(measured), sep="\n")
         print("", *_table(results[-len(names) :]), sep="\n")
-    if options.json is not None:
-        command.write(options.json, {"versions": versions, "host": where, "rows": [_json(r) for r in results]})
+    command.write(options.json, {"versions": versions, "host": where, "rows": [_json(r) for r in results]})
 
 
 def _columns(measured: Any) -> dict[str, tuple[list[float], tuple[float, float | None]]]:

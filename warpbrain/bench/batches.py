@@ -13,10 +13,8 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.atomic import check_writable
 from warpbrain.bench import command
 from warpbrain.cases.shipped import find_case
-from warpbrain.ensemble.batch import Batch
 from warpbrain.ensemble.choosing import drawn_samples, swept_samples
 from warpbrain.ensemble.course import step_batch
 from warpbrain.ensemble.job import Job
@@ -25,7 +23,6 @@ from warpbrain.errors import InputError
 from warpbrain.gp.trained import trained
 from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.tetrahedron import PAIRS
-from warpbrain.report.summary import machine
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System, find_device
@@ -68,15 +65,12 @@ def _sizes(name: str, text: str) -> list[int]:
 def _bench(options: argparse.Namespace) -> None:
     batches = None if options.batches is None else _sizes("batches", options.batches)
     processes = [] if options.processes is None else _sizes("processes", options.processes)
-    if options.json is not None:
-        check_writable(options.json)
-    start_warp_quietly()
-    device, versions = find_device(options.device), machine()
+    versions, device = command.start(options), find_device(options.device)
     if batches is None:
         batches = [1, 4, 16, 32, 64, 128, 256, 512] if device.is_cuda else [1, 2, 4, 8]
     print(
         f"{device.name} ({device.alias}), {options.precision} precision, coarse phantom of one tissue, draws of its "
-        f"prior, {STEPS} steps of 1 ms from rest; warpbrain {versions['warpbrain']}, Warp {versions['warp-lang']}"
+        f"prior, {STEPS} steps of 1 ms from rest; {command.release(versions)}"
     )
     written: dict[str, Any] = {"versions": versions, "device": device.name, "precision": options.precision}
     progress = Progress("bench")
@@ -111,8 +105,7 @@ def _bench(options: argparse.Namespace) -> None:
         print(f"the paper's sweep to rest, {options.sweep}: {samples} samples in {seconds:.1f} s, {failed} failed, "
               f"{iterations} CG iterations")  # fmt: skip
         written["sweep"] = {"seconds": seconds, "samples": samples, "failed": failed, "cg_iterations": iterations}
-    if options.json is not None:
-        command.write(options.json, written)
+    command.write(options.json, written)
 
 
 @dataclass(frozen=True)
@@ -120,16 +113,12 @@ class MeasuredBatch:
     """Times of one size of batch."""
 
     slots: int
-    #: In a motion, and how many of them had no answer.
-    samples: int
-    failed: int
-    #: A step and sample, for each motion.
-    milliseconds: list[float]
-    #: Mean over all steps.
-    cg_iterations: float
-    #: Of a step and sample, each array counted once a kernel; and memory of the batch [bytes].
-    bytes_per_step: int
-    memory: int
+    samples: int  # in a motion
+    failed: int  # how many of them had no answer
+    milliseconds: list[float]  # a step and sample, for each motion
+    cg_iterations: float  # mean over all steps
+    bytes_per_step: int  # of a step and sample, each array counted once a kernel
+    memory: int  # of the batch [bytes]
 
     @property
     def best(self) -> float:
@@ -157,7 +146,7 @@ def measure_batches(sizes: list[int], device: str, precision: str) -> Iterator[M
         samples = sorted(whole.samples[:slots], key=lambda sample: sample.stiffness)
         numbers = [sample.number for sample in samples]
         course = whole.course()
-        batch = Batch(system, samples, slots, tolerance=course.tolerance, shapes=course.shapes(), linger=course.linger)
+        batch = course.batch_of(system, samples, slots)
         # loads kernels and captures the graph
         list(step_batch(batch, course, numbers))
         times = []

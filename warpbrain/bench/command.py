@@ -53,13 +53,33 @@ def chosen(option: str, text: str | None, known: Sequence[str]) -> list[str]:
     return names
 
 
-def write(path: Path, told: Any) -> None:
-    """Write what was measured as JSON, whole, and say so."""
+def write(path: Path | None, measured: Any) -> None:
+    """Write what was measured as JSON, whole, and say so; if a path is given."""
     from warpbrain.atomic import whole_file
 
-    with whole_file(path) as scratch:
-        scratch.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    print(f"written to {path}")
+    if path is not None:
+        with whole_file(path) as scratch:
+            scratch.write_text(json.dumps(measured, indent=1) + "\n", encoding="utf-8")
+        print(f"written to {path}")
+
+
+def start(options: argparse.Namespace) -> dict[str, str]:
+    """Check that a file or folder for what is measured can be written, and start Warp; returns the versions."""
+    from warpbrain.atomic import check_writable, output_folder
+    from warpbrain.report.summary import machine
+    from warpbrain.terminal.quiet import start_warp_quietly
+
+    if getattr(options, "json", None) is not None:
+        check_writable(options.json)
+    if getattr(options, "out", None) is not None:
+        output_folder(options.out)
+    start_warp_quietly()
+    return machine()
+
+
+def release(versions: Mapping[str, str]) -> str:
+    """Versions of this package and Warp, as printed."""
+    return f"warpbrain {versions['warpbrain']}, Warp {versions['warp-lang']}"
 
 
 def host() -> dict[str, Any]:
@@ -74,7 +94,7 @@ def host() -> dict[str, Any]:
 
 def processor() -> str:
     """Name of the processor, as far as the system tells it."""
-    told = Path("/proc/cpuinfo")
-    lines = told.read_text(encoding="utf-8").splitlines() if told.exists() else []
+    listed = Path("/proc/cpuinfo")
+    lines = listed.read_text(encoding="utf-8").splitlines() if listed.exists() else []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return next(iter(names), platform.processor() or "CPU")

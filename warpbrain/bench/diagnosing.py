@@ -9,15 +9,13 @@ from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
-from warpbrain.atomic import output_folder, safe_name
+from warpbrain.atomic import safe_name
 from warpbrain.bench import command
 from warpbrain.cases.shipped import find_case
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.estimation.options import Listener
-from warpbrain.report.summary import machine
 from warpbrain.simulation.system import find_device
 from warpbrain.terminal.progress import Progress
-from warpbrain.terminal.quiet import start_warp_quietly
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -43,39 +41,35 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _bench(options: argparse.Namespace) -> None:
-    start_warp_quietly()
-    device, versions, today = find_device(options.device), machine(), date.today().isoformat()
-    out = None if options.out is None else output_folder(options.out)
+    versions, device, today = command.start(options), find_device(options.device), date.today().isoformat()
     case = find_case(options.case, options.tissue)
     progress = Progress("bench")
-    runs, found = [], None
+    runs, diagnosis = [], None
     try:
         for number in range(options.runs):
             begun = time.perf_counter()
             listener = Listener(lambda text, part=number / options.runs: progress.show(part, text))  # type: ignore[misc]
-            found = Diagnosing(case, device=device.alias, listener=listener).run()
-            runs.append({**found.seconds, "total": time.perf_counter() - begun})
+            diagnosis = Diagnosing(case, device=device.alias, listener=listener).run()
+            runs.append({**diagnosis.seconds, "total": time.perf_counter() - begun})
     finally:
         progress.clear()
-    assert found is not None
-    sensors, equilibria = len(found.base.at.sensors), found.base.states.solves
+    assert diagnosis is not None
+    sensors, equilibria = len(diagnosis.base.at.sensors), diagnosis.base.states.solves
     print(f"{case.name}, {sensors} numbers that were recorded, on {device.name} ({device.alias}); {today}")
-    print(
-        f"{equilibria} equilibria; seconds of each run; warpbrain {versions['warpbrain']}, Warp {versions['warp-lang']}"
-    )
+    print(f"{equilibria} equilibria; seconds of each run; {command.release(versions)}")
     width = max(len(stage) for stage in runs[0])
     for stage in runs[0]:
         print(f"  {stage:<{width}}" + "".join(f"{run[stage]:10.2f}" for run in runs))
-    if out is not None:
-        told = {
-            "case": case.name,
-            "numbers": sensors,
-            "equilibria": equilibria,
-            "device": f"{device.name} ({device.alias})",
-            "processor": platform.processor() or platform.machine(),
-            "date": today,
-            "versions": versions,
-            "verdict": found.verdict,
-            "seconds": runs,
-        }
-        command.write(out / f"diagnose_{safe_name(device.alias)}_{today}.json", told)
+    measured = {
+        "case": case.name,
+        "numbers": sensors,
+        "equilibria": equilibria,
+        "device": f"{device.name} ({device.alias})",
+        "processor": platform.processor() or platform.machine(),
+        "date": today,
+        "versions": versions,
+        "verdict": diagnosis.verdict,
+        "seconds": runs,
+    }
+    name = f"diagnose_{safe_name(device.alias)}_{today}.json"
+    command.write(options.out and options.out / name, measured)

@@ -1,4 +1,9 @@
-"""What a report of a defect needs: versions, devices, memory, the folder of kernels, and whether devices are right."""
+"""What a report of a defect needs: versions, devices, memory, the folder of kernels, and whether devices are right.
+
+Whether they are says a test of a few seconds whose answer is known: a block whose whole surface is moved as one
+homogeneous deformation must deform so inside, whatever its mesh (the patch test: Irons and Razzaque 1972). Assembly,
+Newton's method and the linear solver all have to be right for that.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +11,24 @@ import ctypes
 import os
 import platform
 import re
+import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from warpbrain import __version__
 from warpbrain.bench.command import processor
-from warpbrain.bench.self_test import SelfTest, self_test
+from warpbrain.cases.shipped import find_case
+from warpbrain.errors import SolveError
+from warpbrain.mesh import boundary_faces, nodes_of
+from warpbrain.physics.laws import NeoHookean
+from warpbrain.simulation.equilibrium import solve_equilibrium
+from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.system import System
 from warpbrain.threads import processors, thread_count
 
 _GIB = 2.0**30
@@ -54,10 +68,10 @@ def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, An
 def _joined(ask: Callable[[], Any]) -> str | None:
     """A version of CUDA as text; None where there is no driver."""
     try:
-        found = ask()
+        version = ask()
     except RuntimeError:
         return None
-    return ".".join(map(str, found)) if found and any(found) else None
+    return ".".join(map(str, version)) if version and any(version) else None
 
 
 def _memory(name: str) -> float | None:
@@ -110,10 +124,10 @@ def health_lines(found: Mapping[str, Any]) -> list[str]:
     driver = f"CUDA driver {cuda['driver']}" if cuda["driver"] else "no CUDA driver"
     writable = "" if kernels["writable"] else "; CANNOT BE WRITTEN TO: set WARP_CACHE_PATH to a folder that can"
     devices = []
-    for one in found["devices"]:
-        size = one["memory_GiB"]
-        more = size and f", architecture {one['arch']}, {_gib(size['total'])}, {_gib(size['free'])} free"
-        devices.append(f"device     {one['alias']}: {one['name']}{more or ''}")
+    for device in found["devices"]:
+        size = device["memory_GiB"]
+        more = size and f", architecture {device['arch']}, {_gib(size['total'])}, {_gib(size['free'])} free"
+        devices.append(f"device     {device['alias']}: {device['name']}{more or ''}")
     lines = [
         f"warpbrain  {found['warpbrain']['version']} in {found['warpbrain']['folder']}",
         f"python     {found['python']} on {found['platform']}",
@@ -137,3 +151,48 @@ def health_lines(found: Mapping[str, Any]) -> list[str]:
 
 def _gib(size: float | None) -> str:
     return "not known" if size is None else f"{size:.1f} GiB"
+
+
+#: Largest error of a displacement that passes, of the largest displacement: Newton stops at 1e-8 of the forces.
+TOLERANCE = 1e-6
+#: Stretched by 10 %, squeezed, and sheared.
+_GRADIENT = np.array([[1.10, 0.05, 0.0], [0.0, 0.97, 0.0], [0.0, 0.02, 1.0]])
+
+
+@dataclass(frozen=True)
+class SelfTest:
+    """What came of it on one device, by its alias."""
+
+    device: str
+    nodes: int  # that had to find their place
+    error: float  # largest, of the largest displacement; NaN if there was no equilibrium
+    kernels_s: float  # for loading (the first time compiling) the kernels
+    solve_s: float  # for all the rest
+    problem: str = ""  # empty if it passed
+
+
+def self_test(device: str) -> SelfTest:
+    """Run the test on a device, by its alias."""
+    begun = time.perf_counter()
+    mesh = find_case("beam-gravity").mesh
+    surface = nodes_of(boundary_faces(mesh.tetrahedra), len(mesh.points))
+    exact = mesh.points @ (_GRADIENT - np.eye(3)).T
+    model = Model(
+        mesh,
+        {label: Material(NeoHookean(1000.0)) for label in mesh.labels},
+        constrained=np.repeat(surface[:, None], 3, axis=1),
+        prescribed=np.where(surface[:, None], exact, 0.0),
+    )
+    system = System(model, device)
+    kernels = system.load_kernels()
+    error, problem = np.nan, ""
+    try:
+        u = solve_equilibrium(system).u
+        error = float(np.abs(u - exact).max() / np.abs(exact).max())
+    except SolveError as failed:
+        problem = str(failed)
+    else:
+        if not error <= TOLERANCE:
+            problem = f"displacements are wrong by {error:.1e} of the largest; expected {TOLERANCE:.0e} at most"
+    seconds = time.perf_counter() - begun - kernels
+    return SelfTest(device, int(np.count_nonzero(~surface)), error, kernels, seconds, problem)

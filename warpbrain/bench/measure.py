@@ -1,21 +1,41 @@
-"""Measures one row: pre-processing, the phases of a step one by one, and the step as users get it."""
+"""Measures one row: pre-processing, the phases of a step one by one, and the step as users get it.
+
+Table 3 times everything from a mesh in memory to the first step. Here much of that is kept once it is made, because a
+diagnosis asks for the same mesh thousands of times; a second system of a mesh is then several times cheaper than the
+first. What is kept, and for how long:
+
+- as long as a `TetMesh` lives: its cached properties (labels, volumes, centres, boundary, node volumes), meshes made of
+  it (`shared`: refined, without a resection), which `with_node_sets` passes on; what a device was told of it, the
+  elements by device and precision, patterns and patches by what they are of (`warpbrain.simulation.assembly`);
+- by mesh, the latest ones: connected parts (`simulation.held`), balls (`physics.regions`), patches of a traction
+  (`physics.mechanisms.traction`), and what estimation and diagnosis ask of a mesh;
+- by bytes of coordinates: sites of a diagnosis (`diagnosis.sensors`);
+- as long as a `Case` or a `Model` lives: what is left of a resection, midside nodes, unit forces of the loads;
+- as long as the process lives: kernels, compiled and loaded, and memory that a GPU's pool keeps. Only these are warm
+  here: that is paid once on a machine or in a process, not for a mesh.
+
+A fresh mesh is therefore another object, and differs in content from every other: no cache by identity or by bytes,
+those above or those to come, can answer for it.
+"""
 
 from __future__ import annotations
 
 import gc
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
-from warpbrain.bench.fresh import case_of, fresh_arrays
 from warpbrain.bench.table3 import MAIN_LOOP, Row
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
 from warpbrain.kernels.persistent import blocks_stay
+from warpbrain.mesh import TetMesh
 from warpbrain.simulation.dynamics import PHASES, Simulator
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.phase_clock import PhaseClock
@@ -185,3 +205,33 @@ def count(system: System, cg_iterations: int) -> tuple[int, int]:
     # preconditioner and CG's start
     launches += 4 + passes + passes * cg_iterations
     return int(total), launches
+
+
+#: How far a body is moved from the one before it [m]: nothing that is computed with it is any harder for that.
+SHIFT = 1e-6
+
+
+def fresh_arrays(mesh: TetMesh, number: int) -> dict[str, Any]:
+    """Copies of the arguments of a mesh, of the same body but not the same bytes: `number` differs.
+
+    It is how often `SHIFT` to the right the body lies, and by how many places the numbers of its elements are turned
+    round: neighbours in memory stay neighbours.
+    """
+
+    def turned(values: NDArray[Any]) -> NDArray[Any]:
+        return np.roll(values, number, axis=0)
+
+    return {
+        "points": mesh.points + np.array([SHIFT * number, 0.0, 0.0]),
+        "tetrahedra": turned(mesh.tetrahedra),
+        "tissue": turned(mesh.tissue),
+        "node_sets": {name: members.copy() for name, members in mesh.node_sets.items()},
+        "element_sets": {name: turned(members) for name, members in mesh.element_sets.items()},
+        "element_vectors": {name: turned(vectors) for name, vectors in mesh.element_vectors.items()},
+        "cut": mesh.cut.copy(),
+    }
+
+
+def case_of(case: Case, arrays: Mapping[str, Any]) -> Case:
+    """The same case of a mesh that is checked anew."""
+    return replace(case, mesh=TetMesh(**arrays))

@@ -16,20 +16,18 @@ from typing import Any, TypeVar
 
 import warp as wp
 
-from warpbrain.atomic import output_folder, safe_name
+from warpbrain.atomic import safe_name
 from warpbrain.bench import command
 from warpbrain.bench.measure import RESTART
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.report.summary import machine
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System, find_device
 from warpbrain.terminal.progress import Progress
-from warpbrain.terminal.quiet import start_warp_quietly
 
 Result = TypeVar("Result")
 
@@ -68,13 +66,10 @@ def main(arguments: Sequence[str]) -> int:
 def _bench(options: argparse.Namespace) -> None:
     known = mechanisms()
     kinds = command.chosen("--kinds", options.kinds, list(known))
-    start_warp_quietly()
-    device, versions, today = find_device(options.device), machine(), date.today().isoformat()
-    out = None if options.out is None else output_folder(options.out)
+    versions, device, today = command.start(options), find_device(options.device), date.today().isoformat()
     print(
         f"{device.name} ({device.alias}), {options.precision} precision, {BASE}: a step of 1 ms, {options.steps} of "
-        f"each; an iteration of Newton's method, {options.equilibria} equilibria of each; "
-        f"warpbrain {versions['warpbrain']}, Warp {versions['warp-lang']}"
+        f"each; an iteration of Newton's method, {options.equilibria} equilibria of each; {command.release(versions)}"
     )
     print("median of the ratios with / without, which take turns")
     print(f"{'':<18} {'step':>6} {'ms':>8} {'CG':>9} {'Newton':>7} {'ms':>8} {'count':>7}")
@@ -87,18 +82,11 @@ def _bench(options: argparse.Namespace) -> None:
         progress.clear()
         rows.append(asdict(cost))
         print(_line(rows[-1]), flush=True)
-    if out is not None:
-        short = "cpu" if device.is_cpu else safe_name(device.name.lower().removeprefix("nvidia "))
-        path = out / f"mechanisms_{short}_{today}.json"
-        written = {
-            "versions": versions,
-            "device": command.processor() if device.is_cpu else device.name,
-            "date": today,
-            "precision": options.precision,
-            "case": BASE,
-            "rows": rows,
-        }
-        command.write(path, written)
+    short = "cpu" if device.is_cpu else safe_name(device.name.lower().removeprefix("nvidia "))
+    name = command.processor() if device.is_cpu else device.name
+    measured = {"versions": versions, "device": name, "date": today, "precision": options.precision, "case": BASE}
+    path = options.out and options.out / f"mechanisms_{short}_{today}.json"
+    command.write(path, {**measured, "rows": rows})
 
 
 def _line(row: dict[str, Any]) -> str:
@@ -116,27 +104,21 @@ def _line(row: dict[str, Any]) -> str:
 class Cost:
     """Samples of a mechanism beside the plain model, by `SIDES`; those of one index are neighbours in time."""
 
-    #: Mechanism and what was said of it; the plain model beside itself has no example.
     kind: str
-    example: str
-    #: Time of a time step, captured in a graph, and of an iteration of Newton's method, mean over an equilibrium [ms].
-    step: dict[str, list[float]]
-    newton: dict[str, list[float]]
-    #: Of each time step, and of each equilibrium.
-    cg_iterations: dict[str, list[int]]
-    newton_iterations: dict[str, list[int]]
+    example: str  # of the mechanism; none for the plain model beside itself
+    step: dict[str, list[float]]  # time of a time step, captured in a graph [ms]
+    newton: dict[str, list[float]]  # of an iteration of Newton's method, mean over an equilibrium [ms]
+    cg_iterations: dict[str, list[int]]  # of each time step
+    newton_iterations: dict[str, list[int]]  # of each equilibrium
 
 
 def measure_cost(case: Case, kind: str, example: str, device: str, precision: str, steps: int, equilibria: int) -> Cost:
     """Measure a mechanism beside a case without it, so many samples of each; no example is the plain model once more.
 
-    Raises
-    ------
-    SolveError
-        If a step or an equilibrium has no solution: there is no cost of that.
+    `SolveError` if a step or an equilibrium has no solution: there is no cost of that.
     """
     cases = (case, assume(case, example) if example else case)
-    systems = {side: System(model_of(one), device, precision) for side, one in zip(SIDES, cases, strict=True)}
+    systems = {side: System(model_of(each), device, precision) for side, each in zip(SIDES, cases, strict=True)}
     simulators = {side: Simulator(system) for side, system in systems.items()}
     for simulator in simulators.values():
         simulator.capture()

@@ -11,17 +11,14 @@ from hashlib import sha256
 from statistics import median
 from typing import Any
 
-from warpbrain.atomic import check_writable
 from warpbrain.bench import command
 from warpbrain.bench.table3 import TABLE3, Row
 from warpbrain.cases.shipped import find_case
 from warpbrain.errors import InputError
-from warpbrain.report.summary import machine
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
-from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.threads import MOST, processors
 
 #: Counts that are measured if none are named, as far as there are processors.
@@ -64,10 +61,7 @@ def _bench(options: argparse.Namespace) -> None:
     if not counts or not all(0 < n <= MOST for n in counts):
         raise InputError(f"--counts {listed}: expected whole numbers from 1 to {MOST}, with commas between them")
 
-    if options.json is not None:
-        check_writable(options.json)
-    start_warp_quietly()
-    where = command.host()
+    versions, where = command.start(options), command.host()
     print(f"{where['processor']}, {processors()} processors; median ms of {options.turns} turns, times as fast as one")
     measured = []
     for name, turn in (("a step", _steps(TABLE3[options.row])), ("equilibrium of 0529", _equilibria())):
@@ -76,9 +70,7 @@ def _bench(options: argparse.Namespace) -> None:
         for count, value in medians.items():
             print(f"  {name:<20}{count:4d} threads{value:10.2f}{medians[counts[0]] / value:8.2f}")
         measured.append({"what": name, "milliseconds": milliseconds, "medians": medians})
-    if options.json is not None:
-        told = {"versions": machine(), "host": where, "row": options.row, "measured": measured}
-        command.write(options.json, told)
+    command.write(options.json, {"versions": versions, "host": where, "row": options.row, "measured": measured})
 
 
 def _in_turns(turn: Callable[[], tuple[list[float], bytes]], counts: Sequence[int], turns: int) -> dict[int, Any]:
@@ -134,7 +126,7 @@ def _equilibria() -> Callable[[], tuple[list[float], bytes]]:
 
     def turn() -> tuple[list[float], bytes]:
         start = time.perf_counter()
-        found = solve_equilibrium(system)
-        return [1000.0 * (time.perf_counter() - start)], found.u.tobytes()
+        u = solve_equilibrium(system).u
+        return [1000.0 * (time.perf_counter() - start)], u.tobytes()
 
     return turn

@@ -192,12 +192,12 @@ class Batch:
 
     def _place_lists(self) -> None:
         b = self.slots
-        self._all, self._all_count = self._array(np.arange(b), int), self._array([b], int)
-        self._start, self._start_count = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
-        self._solve, self._solve_count = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
-        self._fresh, self._fresh_count = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
-        self._marked, self._stepping = self._zeros(b, dtype=int), self._zeros(b, dtype=int)
-        self._ready = self._zeros(b, dtype=int)
+        self._all = self._array(np.arange(b), int), self._array([b], int)
+        # slots, and how many of them are in the list
+        self._start, self._solve, self._fresh = (
+            (self._zeros(b, dtype=int), self._zeros(1, dtype=int)) for _ in range(3)
+        )
+        self._marked, self._stepping, self._ready = (self._zeros(b, dtype=int) for _ in range(3))
         self._linger_count = self._zeros(1, dtype=int)
         self._unsolved = np.zeros(b, dtype=bool)
 
@@ -268,8 +268,8 @@ class Batch:
         """One pass: slots `start` begin a step from an evaluated state, the states of `marked` are to be evaluated."""
         self._unsolved[start] = True
         stepping = np.flatnonzero(self._unsolved)
-        self._write_list(self._start, self._start_count, start)
-        self._write_list(self._solve, self._solve_count, stepping)
+        self._write_list(self._start, start)
+        self._write_list(self._solve, stepping)
         self._write_flags(self._marked, marked)
         self._write_flags(self._stepping, stepping)
         self._linger_count.assign(np.array([int(self._linger * len(stepping))], dtype=np.int32))
@@ -284,11 +284,11 @@ class Batch:
         min_J = self._min_J.numpy()[0].astype(np.float64)
         return States(ready, min_J, unbalanced, internal, iterations, residual, goal)
 
-    def _write_list(self, slots: wp.array, count: wp.array, values: NDArray[np.intp]) -> None:
+    def _write_list(self, listed: tuple[wp.array, wp.array], values: NDArray[np.intp]) -> None:
         padded = np.zeros(self.slots, dtype=np.int32)
         padded[: len(values)] = values
-        slots.assign(padded)
-        count.assign(np.array([len(values)], dtype=np.int32))
+        listed[0].assign(padded)
+        listed[1].assign(np.array([len(values)], dtype=np.int32))
 
     def _write_flags(self, flags: wp.array, slots: NDArray[np.intp]) -> None:
         values = np.zeros(self.slots, dtype=np.int32)
@@ -311,7 +311,7 @@ class Batch:
 
     def _capture(self) -> None:
         """Capture a pass in a graph: one launch from the host instead of hundreds."""
-        lists = (self._start_count, self._solve_count, self._marked, self._stepping)
+        lists = (self._start[1], self._solve[1], self._marked, self._stepping)
         kept = [wp.clone(values) for values in lists]
         for values in lists:
             values.zero_()
@@ -325,20 +325,17 @@ class Batch:
 
     def _record(self) -> None:
         self._begin_steps()
-        self._cg.iterate(self._solve, self._solve_count, self._linger_count)
+        self._cg.iterate(*self._solve, self._linger_count)
         self._launch(
-            self._motion.update, (self.system.size, self.slots), self._solve, self._solve_count, self._cg.solving,
+            self._motion.update, (self.system.size, self.slots), *self._solve, self._cg.solving,
             self._u_start, self._v_start, self._dv, self._prescribed, self.system.free, self._h, self._v, self._u,
         )  # fmt: skip
         self._launch(self._motion.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready)
-        self._launch(
-            self._sums_kernels.gather_active, self.slots, self._all, self._all_count, self._ready, self._fresh,
-            self._fresh_count,
-        )  # fmt: skip
+        self._launch(self._sums_kernels.gather_active, self.slots, *self._all, self._ready, *self._fresh)
         self._evaluate()
 
     def _begin_steps(self) -> None:
-        s, lanes, begun = self.system, self.slots, (self._start, self._start_count)
+        s, lanes, begun = self.system, self.slots, self._start
         if self._shapes is not None:
             self._launch(
                 self._motion.prescribe, (s.size, lanes), *begun, self._shapes, self._amounts, s.free, self._h, self._u,
@@ -362,7 +359,7 @@ class Batch:
 
     def _evaluate(self) -> None:
         """Forces, tangents, `J` and balance at the states of the fresh list."""
-        s, lanes, fresh = self.system, self.slots, (self._fresh, self._fresh_count)
+        s, lanes, fresh = self.system, self.slots, self._fresh
         for group in self._materials.groups:
             self._launch(
                 group.kernels.forces_and_tangents, (len(group.elements), lanes), *fresh, group.elements, group.tissue,

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Floats
 from warpbrain.ensemble.batch import Batch, States
 from warpbrain.ensemble.sample import Outcome, Sample, failure
+from warpbrain.kernels.linear import LinearResult
 from warpbrain.kernels.precision import Precision
+from warpbrain.simulation.dynamics import fault_of_step
 from warpbrain.simulation.model import Model, require_held
 from warpbrain.simulation.relaxation import LINEAR_TOLERANCE, RelaxationOptions, least_residual
 from warpbrain.simulation.system import System
@@ -50,6 +52,11 @@ class Course(abc.ABC):
     @abc.abstractmethod
     def shapes(self) -> Floats:
         """Of what prescribed displacements are sums, shape (shapes, n, 3)."""
+
+    def batch_of(self, system: System, samples: Sequence[Sample], slots: int) -> Batch:
+        """A batch for this course."""
+        shapes = self.shapes()
+        return Batch(system, samples, slots, tolerance=self.tolerance, shapes=shapes, linger=self.linger)
 
     def attach(self, batch: Batch) -> None:
         """Follow the slots of a batch."""
@@ -96,25 +103,11 @@ class Course(abc.ABC):
             self.batch.load_factors[row, slots] = [factors[time] for time in due[slots].tolist()]
 
     def why(self, slot: int, states: States) -> str:
-        """What is wrong with the state of a slot: the words of `warpbrain.simulation.dynamics.Simulator.check`."""
-        end = self.time[slot] + self.batch.time_step[slot]
-        when = f"{1000.0 * end:.4g} ms"
-        min_J, residual, goal = states.min_J[slot], states.cg_residual[slot], states.cg_goal[slot]
-        if min_J <= 0.0:
-            J = self.batch.element_J(slot)
-            e = int(np.argmin(J))
-            mesh = self.model.mesh
-            x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
-            return (
-                f"element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}, turned inside out by {when} "
-                f"(J = {min_J:.3g}): what acts is too much for this tissue or this time step"
-            )
-        if not (np.isfinite(residual) and np.isfinite(min_J)):
-            return f"the motion is not finite after {when}: conjugate gradients broke down"
-        return (
-            f"conjugate gradients did not converge in the step to {when}: residual {residual:.1e} after "
-            f"{states.cg_iterations[slot]} iterations, goal {goal:.1e}"
-        )
+        """What is wrong with the state of a slot."""
+        batch, end = self.batch, self.time[slot] + self.batch.time_step[slot]
+        numbers = (int(states.cg_iterations[slot]), float(states.cg_residual[slot]), float(states.cg_goal[slot]))
+        linear = LinearResult(*numbers, curvature=np.nan)
+        return fault_of_step(end, states.min_J[slot], linear, lambda: batch.system.least_of(batch.element_J(slot)))
 
 
 class Moving(Course):
@@ -232,14 +225,7 @@ def step_samples(system: System, course: Course, samples: Sequence[Sample], slot
         yield impossible
     queue = sorted((s for s in samples if s.materials is not None), key=lambda s: (s.stiffness, s.number))
     if queue:
-        batch = Batch(
-            system,
-            queue,
-            min(slots, len(queue)),
-            tolerance=course.tolerance,
-            shapes=course.shapes(),
-            linger=course.linger,
-        )
+        batch = course.batch_of(system, queue, min(slots, len(queue)))
         yield from step_batch(batch, course, [sample.number for sample in queue])
 
 
@@ -278,18 +264,8 @@ def _answers(
     model = course.model
     outcomes = []
     for slot, u, internal in zip(slots, batch.displacements(slots), batch.internal_forces(slots), strict=True):
-        time = float(course.time[slot])
-        outcomes.append(
-            Outcome(
-                number=int(number_in[slot]),
-                reason="",
-                steps=int(course.steps[slot]),
-                cg_iterations=int(course.cg_iterations[slot]),
-                time=time,
-                residual=float(course.residual[slot]),
-                min_J=float(min_J[slot]),
-                u=u,
-                reactions=model.reactions(internal, model.external_forces(time)),
-            )
-        )
+        number, steps, iterations = (int(of[slot]) for of in (number_in, course.steps, course.cg_iterations))
+        time, residual, least = (float(of[slot]) for of in (course.time, course.residual, min_J))
+        reactions = model.reactions(internal, model.external_forces(time))
+        outcomes.append(Outcome(number, "", steps, iterations, time, residual, least, u, reactions))
     return outcomes

@@ -37,6 +37,25 @@ def finest_tolerance(tolerance: float, precision: Precision) -> float:
     return max(tolerance, 20.0 * precision.epsilon)
 
 
+def fault_of_step(time: float, min_J: float, linear: LinearResult, most_compressed: Callable[[], str]) -> str:
+    """What is wrong with the end of a step at a time [s], in words; empty if nothing is."""
+    when = f"{1000.0 * time:.4g} ms"
+    if min_J <= 0.0:
+        # inversion first: it is the cause of what else may be wrong
+        return (
+            f"{most_compressed()}, turned inside out by {when} (J = {min_J:.3g}): what acts is too much for this "
+            "tissue or this time step"
+        )
+    if not (np.isfinite(linear.residual) and np.isfinite(min_J)):
+        return f"the motion is not finite after {when}: conjugate gradients broke down"
+    if not linear.converged:
+        return (
+            f"conjugate gradients did not converge in the step to {when}: residual {linear.residual:.1e} after "
+            f"{linear.iterations} iterations, goal {linear.tolerance:.1e}"
+        )
+    return ""
+
+
 class Simulator:
     """Steps a pre-processed model through time.
 
@@ -267,20 +286,8 @@ class Simulator:
         """
         linear = self.last_solve()
         _, min_J = self.system.energy()
-        when = f"{1000.0 * self.time:.4g} ms"
-        if min_J <= 0.0:
-            # inversion first: it is the cause of what else may be wrong
-            raise SolveError(
-                f"{self.system.most_compressed()}, turned inside out by {when} "
-                f"(J = {min_J:.3g}): what acts is too much for this tissue or this time step"
-            )
-        if not (np.isfinite(linear.residual) and np.isfinite(min_J)):
-            raise SolveError(f"the motion is not finite after {when}: conjugate gradients broke down")
-        if not linear.converged:
-            raise SolveError(
-                f"conjugate gradients did not converge in the step to {when}: residual {linear.residual:.1e} after "
-                f"{linear.iterations} iterations, goal {linear.tolerance:.1e}"
-            )
+        if fault := fault_of_step(self.time, min_J, linear, self.system.most_compressed):
+            raise SolveError(fault)
         return min_J
 
     def kinetic_energy(self) -> float:

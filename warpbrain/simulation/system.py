@@ -724,8 +724,11 @@ class System:
 
     def most_compressed(self) -> str:
         """Which element had the smallest `J` when the energy was last evaluated, and where it is, for a message."""
-        mesh = self.mesh
-        e = int(np.argmin(self.element_J.numpy()))
+        return self.least_of(self.element_J.numpy())
+
+    def least_of(self, J: Floats) -> str:
+        """The element with the smallest of some volume ratios (m,), and where it is, for a message."""
+        mesh, e = self.mesh, int(np.argmin(J))
         x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
         return f"element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}"
 
