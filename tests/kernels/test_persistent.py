@@ -8,7 +8,7 @@ from shapes import cube, distorted
 
 from warpbrain.errors import SolveError
 from warpbrain.kernels import persistent
-from warpbrain.kernels.linear import ConjugateGradient, LinearResult
+from warpbrain.kernels.linear import LinearResult, conjugate_gradient
 from warpbrain.kernels.precision import DOUBLE, Precision
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
@@ -35,7 +35,7 @@ def system_of(size: int, device: str, precision: Precision = DOUBLE) -> System:
 
 
 def solve(system: System, tolerance: float, start: float = 0.0) -> tuple[np.ndarray, LinearResult]:
-    cg = ConjugateGradient(
+    cg = conjugate_gradient(
         system.matrix, system.diagonal, system.load, system.solution, system.precision,
         tolerance=tolerance, max_iterations=5000, watch_curvature=True,
     )  # fmt: skip

@@ -43,7 +43,7 @@ def test_a_cpu_keeps_factors():
 def test_single_precision_is_for_the_captured_loop():
     system = System(body(), "cpu", "single")
     kept = KeptInverse(wp.get_device("cpu"))
-    assert type(system.linear_solver(tolerance=1e-3, max_iterations=100, factors=kept)) is ConjugateGradient
+    assert isinstance(system.linear_solver(tolerance=1e-3, max_iterations=100, factors=kept), ConjugateGradient)
 
 
 def test_it_finds_the_same_in_fewer_iterations(gpu):

@@ -16,12 +16,13 @@ of Python. Facts about Warp 1.19 that are dealt with here and nowhere else:
   over. CG therefore sees scalar views of our arrays.
 """
 
+import abc
 import math
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
@@ -220,91 +221,26 @@ def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
         warp_linear_internals._run_capturable_loop = original
 
 
-#: Aggregates of the coarse space, and rows of a matrix from which on it pays: the inverse of its matrix takes as long
-#: as some iterations, of which it saves more than half.
-_AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
+class LinearSolver(Protocol):
+    """What solves linear systems of one matrix: an operator, a preconditioner and a Krylov method.
+
+    `warpbrain.simulation.system.System.linear_solver` chooses one, and says why.
+    """
+
+    def multiply(self, x: wp.array, z: wp.array) -> None:
+        """`z = A x` of what is in the matrix."""
+
+    def prepare(self) -> None:
+        """Take notice of new values of the matrix; its pattern is kept."""
+
+    def solve(self, tolerance: float | None = None) -> None:
+        """Solve, from the present content of the solution array if that helps; the tolerance is relative."""
+
+    def result(self) -> LinearResult:
+        """How the last solve ended (waits for the device)."""
 
 
-class _OnCores:
-    """Solves with one matrix's pattern on the cores of a CPU; see `warpbrain.kernels.multicore_gradients`."""
-
-    def __init__(
-        self, size: int, precision: Precision, device: Any, nodes: tuple[NDArray[np.float64], wp.array] | None
-    ) -> None:
-        self._kernel, self._coarse_matrix = gradients_kernels(precision)
-        self._precision, self._device = precision, device
-        self._scratch = [self._zeros(size, precision.vec3) for _ in range(3)]
-        chunks = -(-size // CHUNK)
-        self._partial = self._zeros((chunks, 4), precision.scalar)
-        self._sync = self._zeros(sync_words(MOST), wp.uint64)
-        self.outcome = wp.full(8, math.nan, dtype=precision.scalar, device=device)
-        # values of the matrix changed since the coarse space was made
-        self.is_stale = True
-        # chunks of an aggregate, and aggregates
-        self._aggregate, self._count = -(-chunks // _AGGREGATES), 0
-        self._free = self._places = self._zeros(0, precision.vec3)
-        if nodes is not None and size >= _WORTH_A_COARSE_SPACE:
-            self._count = -(-chunks // self._aggregate)
-            points, self._free = nodes
-            self._places = wp.array(self._affine(points), dtype=precision.vec3, device=device)
-        self._coarse = self._zeros((self._count, 16 * self._count), precision.mat33)
-        self._inverse = self._zeros((12 * self._count, 12 * self._count), precision.scalar)
-        self._left, self._found = (self._zeros(12 * self._count, precision.scalar) for _ in range(2))
-        self._restricted = self._zeros((chunks, 4), precision.vec3)
-
-    def _zeros(self, shape: Any, dtype: Any) -> wp.array:
-        return wp.zeros(shape, dtype=dtype, device=self._device)
-
-    def _affine(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Coordinates of each row from the middle of its aggregate, 1 at most."""
-        of = np.arange(len(points)) // (CHUNK * self._aggregate)
-        middles = np.stack([np.bincount(of, along) for along in points.T], axis=1) / np.bincount(of)[:, None]
-        places = points - middles[of]
-        result: NDArray[np.float64] = places / np.abs(places).max()
-        return result
-
-    def _renew(self, matrix: BsrMatrix) -> None:
-        """Renew the coarse space after the values of the matrix changed; without one where it is not definite."""
-        inputs = [matrix.offsets, matrix.columns, matrix.values, self._aggregate, 4, self._free, self._places]
-        launch(self._coarse_matrix, self._count, [*inputs, self._coarse], self._device, least=1)
-        k = self._count
-        blocks = self._coarse.numpy().astype(np.float64).reshape(k, k, 4, 4, 3, 3)
-        galerkin = blocks.transpose(0, 2, 4, 1, 3, 5).reshape(12 * k, 12 * k)
-        diagonal = np.diagonal(galerkin)
-        # an aggregate that is held, or flat, has modes without stiffness: they are left alone
-        galerkin = galerkin + np.diag(np.where(diagonal > 0.0, 1e-10 * diagonal, 1.0))
-        with one_thread_of_blas():
-            factor, failed = lapack.dpotrf(galerkin, lower=1)
-            inverse = np.zeros_like(galerkin) if failed else lapack.dpotri(factor, lower=1)[0]
-        self._inverse.assign(np.tril(inverse) + np.tril(inverse, -1).T)
-
-    def solve(
-        self,
-        matrix: BsrMatrix,
-        inverse: wp.array,
-        b: wp.array,
-        x: wp.array,
-        *,
-        preconditioned: bool,
-        tolerance: float,
-        max_iterations: int,
-        watch_curvature: bool,
-    ) -> None:
-        """Run conjugate gradients from the present `x`."""
-        if self.is_stale and self._count:
-            self._renew(matrix)
-        self.is_stale = False
-        self._sync.zero_()
-        inputs = [
-            self._sync.ptr, give_way(), matrix.offsets, matrix.columns, matrix.values, int(preconditioned), inverse,
-            b, x, *self._scratch,
-            self._partial, self._precision.scalar(tolerance), max_iterations, int(watch_curvature), self.outcome,
-            self._aggregate, self._free, self._places, self._inverse, self._left, self._found, self._restricted,
-        ]  # fmt: skip
-        launch_together(self._kernel, len(b), inputs, self._device)
-
-
-class ConjugateGradient:
+class ConjugateGradient(abc.ABC):
     """Preconditioned CG for one symmetric matrix whose pattern does not change; nothing is allocated in a solve.
 
     Parameters
@@ -348,87 +284,30 @@ class ConjugateGradient:
     ) -> None:
         if preconditioner not in PRECONDITIONERS:
             raise ValueError(f"preconditioner {preconditioner!r}: expected one of {', '.join(PRECONDITIONERS)}")
-        self._matrix, self._beyond = matrix, beyond
-        self._diagonal = diagonal
-        self._precision = precision
+        self._matrix, self._diagonal, self._b, self._x = matrix, diagonal, right_hand_side, solution
+        self._precision, self._tolerance, self._max_iterations = precision, tolerance, max_iterations
+        self._kind, self._watch, self._beyond, self._nodes = preconditioner, watch_curvature, beyond, nodes
+        self._size, self._device = len(right_hand_side), right_hand_side.device
         self._kernels = linear_kernels(precision)
-        self._size = right_hand_side.shape[0]
-        self._device = right_hand_side.device
-        self._kind = preconditioner
-        self._persistent: PersistentSolve | None = None
-        if preconditioner != "fsai" and beyond is None and blocks_stay(self._device):
-            self._persistent = PersistentSolve(
-                matrix, diagonal, right_hand_side, solution, precision,
-                max_iterations=max_iterations, jacobi=preconditioner == "block-jacobi", watch=watch_curvature,
-            )  # fmt: skip
         self._inverse = wp.empty(self._size, dtype=precision.mat33, device=self._device)
-        self._least = wp.full(1, math.inf, dtype=precision.scalar, device=self._device)
-        chunks = (self._size + _CHUNK - 1) // _CHUNK
-        self._partial = wp.zeros((chunks, 2), dtype=precision.scalar, device=self._device)
-        self._watch = watch_curvature
-        self._fsai: Any = None
-        self._refused: float | None = None
-        self._views: dict[int, wp.array] = {}
-        batch = wp.array([0, 3 * self._size], dtype=int, device=self._device) if self._device.is_cpu else None
-        shape = (3 * self._size, 3 * self._size)
-        self._operator = warp_linear.LinearOperator(
-            shape, precision.mat33, self._device, self._multiply, batch_offsets=batch
-        )
-        self._preconditioner: Any = None
-        if preconditioner == "block-jacobi":
-            self._preconditioner = warp_linear.LinearOperator(
-                shape, precision.mat33, self._device, self._apply_diagonal
-            )
-        self._b, self._x = right_hand_side, solution
-        self._tolerance = tolerance
-        self._max_iterations = max_iterations
-        self._graphs: dict[float, Graph] = {}
-        self._solvers: dict[float, warp_linear.CG] = {}
-        self._launched = False
-        self._outcome: tuple[wp.array, wp.array, wp.array] | None = None
-        self._outcomes: dict[float, tuple[wp.array, wp.array, wp.array]] = {}
-        self._on_cores: _OnCores | None = None
-        if self._device.is_cpu and preconditioner != "fsai" and beyond is None:
-            self._on_cores = _OnCores(
-                self._size, precision, self._device, nodes if preconditioner == "block-jacobi" else None
-            )
+        self._solved = False
+        self._begin()
 
-    def _solver(self, tolerance: float) -> Any:
-        """Warp's solver for a tolerance, which it keeps for life; made when it is first asked for."""
-        if tolerance not in self._solvers:
-            self._solvers[tolerance] = warp_linear.CG(
-                self._operator,
-                self._scalars(self._b),
-                self._scalars(self._x),
-                tol=tolerance,
-                atol=0.0,
-                maxiter=self._max_iterations,
-                M=self._preconditioner,
-                check_every=0,
-                use_cuda_graph=True,
-            )
-        return self._solvers[tolerance]
+    @abc.abstractmethod
+    def _begin(self) -> None:
+        """Make what a solve needs."""
 
-    def _scalars(self, x: wp.array) -> wp.array:
-        """The scalars of an array of vectors, without a copy."""
-        return wp.array(ptr=x.ptr, shape=(3 * self._size,), dtype=self._precision.scalar, device=self._device)
+    @abc.abstractmethod
+    def _run(self, tolerance: float) -> None: ...
 
-    def _vectors(self, x: wp.array) -> wp.array:
-        """The vectors of an array of scalars, without a copy; the solver's arrays never move, so views are kept."""
-        view = self._views.get(x.ptr)
-        if view is None:
-            view = wp.array(ptr=x.ptr, shape=(self._size,), dtype=self._precision.vec3, device=self._device)
-            self._views[x.ptr] = view
-        return view
+    @abc.abstractmethod
+    def _ended(self) -> tuple[float, float, float, float]:
+        """Iterations, residual, goal and least curvature of the last solve."""
 
-    def _multiply(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        x, y, z = self._vectors(x), self._vectors(y), self._vectors(z)
-        self._launch_product(x, y, z, alpha, beta)
-        if self._watch and beta == 0.0:
-            launch(self._kernels.partial_curvature, self._partial.shape[0], [x, z, self._partial], self._device)
-            launch(self._kernels.least_curvature, 1, [self._partial, self._least], self._device)
+    def _zeros(self, shape: Any, dtype: Any = None) -> wp.array:
+        return wp.zeros(shape, dtype=dtype or self._precision.scalar, device=self._device)
 
-    def _launch_product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
+    def _product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         """`z = alpha A x + beta y`."""
         A, scalar = self._matrix, self._precision.scalar
         inputs = [A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)]
@@ -441,13 +320,12 @@ class ConjugateGradient:
 
     def _apply_diagonal(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
         scalar = self._precision.scalar
-        vectors = map(self._vectors, (x, y, z))
-        inputs = [self._inverse, *vectors, scalar(alpha), scalar(beta)]
+        inputs = [self._inverse, x, y, z, scalar(alpha), scalar(beta)]
         launch(self._kernels.apply_diagonal, self._size, inputs, self._device)
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         """`z = A x`."""
-        self._launch_product(x, z, z, 1.0, 0.0)
+        self._product(x, z, z, 1.0, 0.0)
 
     def precondition(self, x: wp.array, z: wp.array) -> None:
         """`z = D^-1 x`, `D` the diagonal blocks; of a solver with that preconditioner that is not one launch."""
@@ -455,86 +333,231 @@ class ConjugateGradient:
 
     def prepare(self) -> None:
         """Renew the preconditioner after the values of the matrix changed; its pattern is kept."""
-        if self._persistent is not None:
-            return
         if self._kind == "block-jacobi":
             inputs = [self._diagonal, self._matrix.values, self._inverse]
             launch(self._kernels.invert_diagonal, self._size, inputs, self._device)
-            if self._on_cores is not None:
-                # who solves in another way, and only prepares, does without a coarse space
-                self._on_cores.is_stale = True
-        elif self._kind == "fsai":
-            self._refused = None
-            if self._fsai is not None:
-                self._fsai.update(self._matrix)
-                return
-            try:
-                self._fsai = warp_linear.FSAI(self._matrix, reuse_pattern=True)
-            except ValueError:
-                # it refuses a diagonal that is not positive, which no positive definite matrix has
-                blocks = self._matrix.values.numpy()[self._diagonal.numpy()]
-                self._refused = float(np.min(np.diagonal(blocks, axis1=1, axis2=2)))
 
     def solve(self, tolerance: float | None = None) -> None:
         """Run CG from the present content of the solution array.
 
-        Within the capture of a graph this only records; otherwise Warp's solver replays a graph of its own. A tolerance
-        other than that of the constructor is rounded down to a quarter of a decade, so that few graphs serve all.
+        Within the capture of a graph this only records. A tolerance other than that of the constructor is rounded down
+        to a quarter of a decade, so that few graphs serve all.
         """
+        self._solved = True
+        self._run(self._tolerance if tolerance is None else 10.0 ** (math.floor(4.0 * math.log10(tolerance)) / 4.0))
+
+    def result(self) -> LinearResult:
+        """How the last solve ended (waits for the device)."""
+        if not self._solved:
+            raise RuntimeError("no solve has been run")
+        iterations, residual, goal, curvature = self._ended()
+        return LinearResult(int(iterations), residual, goal, curvature if self._watch else math.nan)
+
+
+def conjugate_gradient(matrix: BsrMatrix, *arrays: Any, **options: Any) -> ConjugateGradient:
+    """Conjugate gradients as one launch on a GPU and as one kernel on the cores of a CPU; parameters are as there.
+
+    Those know blocks alone, and their diagonal: for all else, and GPUs whose blocks cannot wait, there is Warp's loop.
+    """
+    kind: type[ConjugateGradient] = WarpGradient
+    if options.get("preconditioner") != "fsai" and options.get("beyond") is None:
+        device = matrix.device
+        kind = OneLaunchGradient if blocks_stay(device) else CoresGradient if device.is_cpu else WarpGradient
+    return kind(matrix, *arrays, **options)
+
+
+class OneLaunchGradient(ConjugateGradient):
+    """On a GPU; see `warpbrain.kernels.persistent`."""
+
+    def _begin(self) -> None:
+        self._persistent = PersistentSolve(
+            self._matrix, self._diagonal, self._b, self._x, self._precision,
+            max_iterations=self._max_iterations, jacobi=self._kind == "block-jacobi", watch=self._watch,
+        )  # fmt: skip
+
+    def prepare(self) -> None:
+        """Nothing: the launch inverts the diagonal blocks itself."""
+
+    def _run(self, tolerance: float) -> None:
+        self._persistent.launch(tolerance)
+
+    def _ended(self) -> tuple[float, float, float, float]:
+        return self._persistent.outcome()
+
+
+#: Aggregates of the coarse space, and rows of a matrix from which on it pays: the inverse of its matrix takes as long
+#: as some iterations, of which it saves more than half.
+_AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
+
+
+class CoresGradient(ConjugateGradient):
+    """On the cores of a CPU; see `warpbrain.kernels.multicore_gradients`."""
+
+    def _begin(self) -> None:
+        size, vec3 = self._size, self._precision.vec3
+        self._kernel, self._coarse_matrix = gradients_kernels(self._precision)
+        self._scratch = [self._zeros(size, vec3) for _ in range(3)]
+        chunks = -(-size // CHUNK)
+        self._partial = self._zeros((chunks, 4))
+        self._sync = self._zeros(sync_words(MOST), wp.uint64)
+        self._outcome = self._zeros(8)
+        # values of the matrix changed since the coarse space was made
+        self._is_stale = True
+        # chunks of an aggregate, and aggregates
+        self._aggregate, self._count = -(-chunks // _AGGREGATES), 0
+        self._free = self._places = self._zeros(0, vec3)
+        if self._nodes is not None and self._kind == "block-jacobi" and size >= _WORTH_A_COARSE_SPACE:
+            self._count = -(-chunks // self._aggregate)
+            points, self._free = self._nodes
+            self._places = wp.array(self._affine(points), dtype=vec3, device=self._device)
+        self._coarse = self._zeros((self._count, 16 * self._count), self._precision.mat33)
+        self._coarse_inverse = self._zeros((12 * self._count, 12 * self._count))
+        self._coarse_residual, self._coarse_solution = (self._zeros(12 * self._count) for _ in range(2))
+        self._restricted = self._zeros((chunks, 4), vec3)
+
+    def _affine(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Coordinates of each row from the middle of its aggregate, 1 at most."""
+        of = np.arange(len(points)) // (CHUNK * self._aggregate)
+        middles = np.stack([np.bincount(of, along) for along in points.T], axis=1) / np.bincount(of)[:, None]
+        places = points - middles[of]
+        result: NDArray[np.float64] = places / np.abs(places).max()
+        return result
+
+    def _renew(self) -> None:
+        """Renew the coarse space after the values of the matrix changed; without one where it is not definite."""
+        A = self._matrix
+        inputs = [A.offsets, A.columns, A.values, self._aggregate, 4, self._free, self._places]
+        launch(self._coarse_matrix, self._count, [*inputs, self._coarse], self._device, least=1)
+        k = self._count
+        blocks = self._coarse.numpy().astype(np.float64).reshape(k, k, 4, 4, 3, 3)
+        galerkin = blocks.transpose(0, 2, 4, 1, 3, 5).reshape(12 * k, 12 * k)
+        diagonal = np.diagonal(galerkin)
+        # an aggregate that is held, or flat, has modes without stiffness: they are left alone
+        galerkin = galerkin + np.diag(np.where(diagonal > 0.0, 1e-10 * diagonal, 1.0))
+        with one_thread_of_blas():
+            factor, failed = lapack.dpotrf(galerkin, lower=1)
+            inverse = np.zeros_like(galerkin) if failed else lapack.dpotri(factor, lower=1)[0]
+        self._coarse_inverse.assign(np.tril(inverse) + np.tril(inverse, -1).T)
+
+    def prepare(self) -> None:
+        super().prepare()
+        # who solves in another way, and only prepares, does without a coarse space
+        self._is_stale = True
+
+    def _run(self, tolerance: float) -> None:
+        if self._is_stale and self._count:
+            self._renew()
+        self._is_stale = False
+        self._sync.zero_()
+        A = self._matrix
+        inputs = [
+            self._sync.ptr, give_way(), A.offsets, A.columns, A.values, int(self._kind != "none"), self._inverse,
+            self._b, self._x, *self._scratch, self._partial, self._precision.scalar(tolerance), self._max_iterations,
+            int(self._watch), self._outcome, self._aggregate, self._free, self._places, self._coarse_inverse,
+            self._coarse_residual, self._coarse_solution, self._restricted,
+        ]  # fmt: skip
+        launch_together(self._kernel, self._size, inputs, self._device)
+
+    def _ended(self) -> tuple[float, float, float, float]:
+        iterations, residual, goal, curvature = self._outcome.numpy()[:4].tolist()
+        return iterations, residual**0.5, goal**0.5, curvature
+
+
+class WarpGradient(ConjugateGradient):
+    """Of Warp, captured once in a graph for each tolerance and replayed."""
+
+    def _begin(self) -> None:
+        self._least = wp.full(1, math.inf, dtype=self._precision.scalar, device=self._device)
+        self._partial = self._zeros(((self._size + _CHUNK - 1) // _CHUNK, 2))
+        self._fsai: Any = None
+        self._refused: float | None = None
+        self._views: dict[int, wp.array] = {}
+        batch = wp.array([0, 3 * self._size], dtype=int, device=self._device) if self._device.is_cpu else None
+        of = (3 * self._size, 3 * self._size), self._precision.mat33, self._device
+        self._operator = warp_linear.LinearOperator(*of, self._multiply_scalars, batch_offsets=batch)
+        self._preconditioner: Any = None
+        if self._kind == "block-jacobi":
+            self._preconditioner = warp_linear.LinearOperator(*of, self._precondition_scalars)
+        self._graphs: dict[float, Graph] = {}
+        self._solvers: dict[float, warp_linear.CG] = {}
+        self._outcome: tuple[wp.array, ...] = ()
+        self._outcomes: dict[float, tuple[wp.array, ...]] = {}
+
+    def _solver(self, tolerance: float) -> Any:
+        """Warp's solver for a tolerance, which it keeps for life; made when it is first asked for."""
+        if tolerance not in self._solvers:
+            b, x = (
+                wp.array(ptr=vectors.ptr, shape=(3 * self._size,), dtype=self._precision.scalar, device=self._device)
+                for vectors in (self._b, self._x)
+            )
+            self._solvers[tolerance] = warp_linear.CG(
+                self._operator, b, x, tol=tolerance, atol=0.0, maxiter=self._max_iterations, M=self._preconditioner,
+                check_every=0, use_cuda_graph=True,
+            )  # fmt: skip
+        return self._solvers[tolerance]
+
+    def _vectors(self, x: wp.array) -> wp.array:
+        """The vectors of an array of scalars, without a copy; the solver's arrays never move, so views are kept."""
+        view = self._views.get(x.ptr)
+        if view is None:
+            view = wp.array(ptr=x.ptr, shape=(self._size,), dtype=self._precision.vec3, device=self._device)
+            self._views[x.ptr] = view
+        return view
+
+    def _multiply_scalars(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
+        x, y, z = map(self._vectors, (x, y, z))
+        self._product(x, y, z, alpha, beta)
+        if self._watch and beta == 0.0:
+            launch(self._kernels.partial_curvature, self._partial.shape[0], [x, z, self._partial], self._device)
+            launch(self._kernels.least_curvature, 1, [self._partial, self._least], self._device)
+
+    def _precondition_scalars(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
+        self._apply_diagonal(self._vectors(x), self._vectors(y), self._vectors(z), alpha, beta)
+
+    def prepare(self) -> None:
+        super().prepare()
+        if self._kind != "fsai":
+            return
+        self._refused = None
+        if self._fsai is not None:
+            self._fsai.update(self._matrix)
+            return
+        try:
+            self._fsai = warp_linear.FSAI(self._matrix, reuse_pattern=True)
+        except ValueError:
+            # it refuses a diagonal that is not positive, which no positive definite matrix has
+            blocks = self._matrix.values.numpy()[self._diagonal.numpy()]
+            self._refused = float(np.min(np.diagonal(blocks, axis1=1, axis2=2)))
+
+    def _run(self, tolerance: float) -> None:
         if self._refused is not None:
             return
-        wanted = self._tolerance if tolerance is None else 10.0 ** (math.floor(4.0 * math.log10(tolerance)) / 4.0)
-        if self._persistent is not None:
-            self._persistent.launch(wanted)
-            self._launched = True
-            return
-        if self._on_cores is not None:
-            self._on_cores.solve(
-                self._matrix, self._inverse, self._b, self._x,
-                preconditioned=self._kind != "none", tolerance=wanted,
-                max_iterations=self._max_iterations, watch_curvature=self._watch,
-            )  # fmt: skip
-            return
         if self._device.is_capturing:
-            self._record(wanted)
+            self._record(tolerance)
             return
-        if wanted not in self._graphs:
-            graph = Graph(self._device)
+        if tolerance not in self._graphs:
+            self._graphs[tolerance] = graph = Graph(self._device)
             with graph.capture():
-                self._record(wanted)
-            self._graphs[wanted] = graph
-        self._graphs[wanted].launch()
-        self._outcome = self._outcomes[wanted]
+                self._record(tolerance)
+        self._graphs[tolerance].launch()
+        self._outcome = self._outcomes[tolerance]
 
     def _record(self, tolerance: float) -> None:
         solver = self._solver(tolerance)
         if self._watch:
             self._least.fill_(float("inf"))
-        if self._device.is_cpu:
-            with _conditional_loop(self._kernels.test_convergence, self._least):
-                self._outcome = solver(M=self._fsai)
-        else:
+        on_cpu = self._device.is_cpu
+        with _conditional_loop(self._kernels.test_convergence, self._least) if on_cpu else nullcontext():
             self._outcome = solver(M=self._fsai)
         self._outcomes[tolerance] = self._outcome
 
     def result(self) -> LinearResult:
-        """How the last solve ended (waits for the device)."""
-        if self._on_cores is not None:
-            iterations, residual, tolerance, curvature = map(float, self._on_cores.outcome.numpy()[:4])
-            if math.isnan(iterations):
-                raise RuntimeError("no solve has been run")
-            curvature = curvature if self._watch else float("nan")
-            return LinearResult(int(iterations), residual**0.5, tolerance**0.5, curvature)
-        if self._refused is not None:
-            return LinearResult(0, float("nan"), 0.0, self._refused)
-        if self._persistent is not None and self._launched:
-            steps, left, goal, least = self._persistent.outcome()
-            return LinearResult(steps, left, goal, least if self._watch else float("nan"))
-        if self._outcome is None:
-            raise RuntimeError("no solve has been run")
-        iterations, residual, tolerance = (float(values.numpy().ravel()[0]) for values in self._outcome)
-        curvature = float(self._least.numpy()[0]) if self._watch else float("nan")
-        return LinearResult(int(iterations), residual**0.5, tolerance**0.5, curvature)
+        return super().result() if self._refused is None else LinearResult(0, math.nan, 0.0, self._refused)
+
+    def _ended(self) -> tuple[float, float, float, float]:
+        outcome = (*self._outcome, self._least)
+        iterations, residual, goal, curvature = (float(values.numpy().ravel()[0]) for values in outcome)
+        return iterations, residual**0.5, goal**0.5, curvature
 
 
 @np.errstate(over="ignore", invalid="ignore")

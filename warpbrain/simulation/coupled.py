@@ -16,7 +16,7 @@ residual of the eliminated system is small.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
@@ -32,22 +32,6 @@ if TYPE_CHECKING:
 
 #: What MINRES is asked for, relative to what is asked of the solve, in the first place; and how often it may go on.
 _FIRST, _ROUNDS = 0.3, 6
-
-
-class LinearSolver(Protocol):
-    """What solves the system's linear systems."""
-
-    def multiply(self, x: wp.array, z: wp.array) -> None:
-        """`z = A x` of what is in the matrix."""
-
-    def prepare(self) -> None:
-        """Take notice of new values of the matrix."""
-
-    def solve(self, tolerance: float | None = None) -> None:
-        """Solve, from the present content of the solution array if that helps."""
-
-    def result(self) -> LinearResult:
-        """How the last solve ended."""
 
 
 class CoupledSolver:

@@ -17,8 +17,7 @@ import warp as wp
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
-from warpbrain.kernels.linear import LinearResult
-from warpbrain.simulation.coupled import LinearSolver
+from warpbrain.kernels.linear import LinearResult, LinearSolver
 from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.model import require_held
 from warpbrain.simulation.multisecant import Multisecant

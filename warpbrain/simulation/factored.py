@@ -24,8 +24,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
-from warpbrain.kernels.linear import LinearResult, host_gradients
-from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
+from warpbrain.kernels.linear import LinearResult, LinearSolver, host_gradients
+from warpbrain.simulation.coupled import CoupledSolver
 from warpbrain.simulation.sparse_factors import SparseFactors
 
 if TYPE_CHECKING:

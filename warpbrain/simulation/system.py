@@ -17,7 +17,7 @@ from warp.sparse import BsrMatrix, bsr_zeros
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
-from warpbrain.kernels.linear import ConjugateGradient, solver_kernels
+from warpbrain.kernels.linear import LinearSolver, conjugate_gradient, solver_kernels
 from warpbrain.kernels.module import begin_loading
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import PRECISIONS, Precision
@@ -31,7 +31,7 @@ from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import T, Term
 from warpbrain.simulation.assembly import Assembly
 from warpbrain.simulation.averaged import PART, AveragedTerm, Patches, averaged_modulus, own_modulus, patches_of
-from warpbrain.simulation.coupled import CoupledSolver, LinearSolver
+from warpbrain.simulation.coupled import CoupledSolver
 from warpbrain.simulation.factored import FactoredSolver, KeptFactors
 from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
@@ -572,7 +572,7 @@ class System:
             The matrix is without inertia, so that a coarse space is worth its making.
         factors : KeptFactors, optional
         """
-        plain = ConjugateGradient(
+        plain = conjugate_gradient(
             self.matrix,
             self.diagonal,
             self.load,
