@@ -47,22 +47,13 @@ PRECONDITIONERS = ("block-jacobi", "fsai", "none")
 
 @dataclass(frozen=True)
 class LinearResult:
-    """How a solve by conjugate gradients ended.
-
-    Attributes
-    ----------
-    iterations : int
-    residual, tolerance : float
-        Norm of the residual `b - A x` (as CG updates it, unless a solve is one launch) and the norm that was to be
-        reached.
-    curvature : float
-        Smallest `p . A p / p . p` over the search directions `p`, or NaN if it was not watched. Not positive: the
-        matrix is not positive definite.
-    """
+    """How a solve by conjugate gradients ended."""
 
     iterations: int
-    residual: float
-    tolerance: float
+    residual: float  # norm of `b - A x`, as CG updates it, unless a solve is one launch
+    tolerance: float  # norm that was to be reached
+    #: Smallest `p . A p / p . p` over the search directions `p`, or NaN if it was not watched. Not positive: the matrix
+    #: is not positive definite.
     curvature: float
 
     @property

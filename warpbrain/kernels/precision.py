@@ -11,20 +11,10 @@ import warp as wp
 
 @dataclass(frozen=True)
 class Precision:
-    """Warp and NumPy types of one floating-point precision.
+    """Warp and NumPy types of one floating-point precision."""
 
-    Attributes
-    ----------
-    name : str
-        ``"double"`` or ``"single"``.
-    scalar, vec3, mat33 : type
-        Warp scalar, vector and 3 x 3 block types.
-    numpy : numpy.dtype
-        The matching NumPy type.
-    """
-
-    name: str
-    scalar: Any
+    name: str  # ``"double"`` or ``"single"``
+    scalar: Any  # Warp's types
     vec3: Any
     mat33: Any
     numpy: np.dtype[Any]

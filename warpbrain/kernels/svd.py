@@ -39,29 +39,15 @@ def _orthogonalise(w0: Any, w1: Any, r0: Any, r1: Any, small: Any):
 
 @wp.func
 def singular_value_decomposition(F: Any, small: Any):
-    """`F = U diag(l) V^T` for `det F > 0`; `U` and `V` orthogonal, `l` positive and unordered.
+    """`F = U diag(l) V^T` for `det F > 0`: `U`, `l` and `V`; `U` and `V` orthogonal, `l` positive and unordered.
 
-    Parameters
-    ----------
-    F : mat33
-    small : scalar
-        Squared cosine below which two columns count as orthogonal: the square of the rounding error.
-
-    Returns
-    -------
-    U : mat33
-    l : vec3
-    V : mat33
+    `small` is the squared cosine below which two columns count as orthogonal: the square of the rounding error.
     """
     # the rows of W are the columns of F V, the rows of R those of V
     W = wp.transpose(F)
     R = wp.identity(n=3, dtype=F.dtype)
-    w0 = W[0]
-    w1 = W[1]
-    w2 = W[2]
-    r0 = R[0]
-    r1 = R[1]
-    r2 = R[2]
+    w0, w1, w2 = W[0], W[1], W[2]
+    r0, r1, r2 = R[0], R[1], R[2]
     for _sweep in range(SWEEPS):
         w0, w1, r0, r1, first = _orthogonalise(w0, w1, r0, r1, small)
         w0, w2, r0, r2, second = _orthogonalise(w0, w2, r0, r2, small)

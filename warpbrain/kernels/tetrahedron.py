@@ -26,33 +26,18 @@ PAIRS = ((0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3),
 class ElementKernels:
     """The kernels of one law in one precision, each with one thread for an element of a group.
 
-    Attributes
-    ----------
-    forces : wp.Kernel
-        ``(elements, nodes, inverse_edges, volume, parameters, u) -> element_forces``
-    forces_and_tangents : wp.Kernel
-        The same with ``element_blocks`` as a second output.
-    energy : wp.Kernel
-        ``(elements, nodes, inverse_edges, volume, parameters, u) -> element_energy [J], element_J``
-    stress : wp.Kernel
-        ``(elements, F, parameters) -> energy density [Pa], P [Pa]`` for given deformation gradients.
-    moduli : wp.Kernel
-        ``(elements, F, parameters) -> blocks[e, j, l]`` with ``blocks[e, j, l][i, k] = dP_ij/dF_kl`` [Pa];
-        launched over (elements, 3, 3).
-    tangents : wp.func
-        ``(F, G, V, parameters, row) -> V P, K11, K12, K13, K22, K23, K33``, of which kernels of other shapes are made.
-    stress_at, energy_at : wp.func
-        ``(F, parameters, row) -> P`` and ``-> energy density``, likewise.
+    The last three are device functions, of which kernels of other shapes are made.
     """
 
-    forces: Any
-    forces_and_tangents: Any
-    energy: Any
-    stress: Any
+    forces: Any  # ``(elements, nodes, inverse_edges, volume, parameters, u) -> element_forces``
+    forces_and_tangents: Any  # the same with ``element_blocks`` as a second output
+    energy: Any  # ``(elements, nodes, inverse_edges, volume, parameters, u) -> element_energy [J], element_J``
+    stress: Any  # ``(elements, F, parameters) -> energy density [Pa], P [Pa]`` for given deformation gradients
+    #: ``(elements, F, parameters) -> blocks[e, j, l]`` with ``[i, k]`` = ``dP_ij/dF_kl`` [Pa]; over (elements, 3, 3)
     moduli: Any
-    tangents: Any
-    stress_at: Any
-    energy_at: Any
+    tangents: Any  # ``(F, G, V, parameters, row) -> V P, K11, K12, K13, K22, K23, K33``
+    stress_at: Any  # ``(F, parameters, row) -> P``
+    energy_at: Any  # ``(F, parameters, row) -> energy density``
 
 
 class DeviceLaw(Protocol):
@@ -133,33 +118,18 @@ def _blocks(
 class Stencil:
     """How kernels see elements of one shape: at each quadrature point as a linear tetrahedron.
 
-    Attributes
-    ----------
-    suffix : str
-        Of the names of compiled modules.
-    points : int
-        Quadrature points, of equal weights.
-    nodes : type
-        Of the array of nodes.
-    gradient : wp.func
-        ``(u, nodes, e, point, G) -> F``; the rows of `G` are the gradients of the barycentric coordinates 1 to 3.
-    directions : wp.func
-        ``(G) -> D``: the rows `d_j` of the six `w d_j . dP/dF . d_k`, j <= k, that `blocks` takes.
-    forces, blocks : wp.func
-        ``(w P, point, G, element_forces, row)`` and ``(six blocks, point, G, element_blocks, row)``: store what a point
-        adds.
-    unroll : int or None
-        See `warpbrain.kernels.module.compiled_module`.
+    The rows of `G` are the gradients of the barycentric coordinates 1 to 3; `forces` and `blocks` store what a point
+    adds.
     """
 
-    suffix: str
-    points: int
-    nodes: Any
-    gradient: Any
-    directions: Any
-    forces: Any
-    blocks: Any
-    unroll: int | None = None
+    suffix: str  # of the names of compiled modules
+    points: int  # quadrature points, of equal weights
+    nodes: Any  # type of the array of nodes
+    gradient: Any  # ``(u, nodes, e, point, G) -> F``
+    directions: Any  # ``(G) -> D``: the rows `d_j` of the six `w d_j . dP/dF . d_k`, j <= k, that `blocks` takes
+    forces: Any  # ``(w P, point, G, element_forces, row)``
+    blocks: Any  # ``(six blocks, point, G, element_blocks, row)``
+    unroll: int | None = None  # see `warpbrain.kernels.module.compiled_module`
 
 
 #: Linear tetrahedra.

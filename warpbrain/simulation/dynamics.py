@@ -21,7 +21,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.errors import InputError, SolveError, require_kind
-from warpbrain.kernels.dynamics import dynamics_kernels
+from warpbrain.kernels.assembly import dynamics_kernels
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.kernels.multicore import Graph, launch
 from warpbrain.kernels.precision import Precision
