@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warpbrain.simulation.extrapolated import extrapolated
+from warpbrain.simulation.multisecant import extrapolated
 
 
 def test_what_is_linear_is_hit_within_a_few_percent() -> None:

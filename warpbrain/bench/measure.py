@@ -36,9 +36,8 @@ from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
 from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.mesh import TetMesh
-from warpbrain.simulation.dynamics import PHASES, Simulator
+from warpbrain.simulation.dynamics import PHASES, PhaseClock, Simulator
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
 #: The motion starts again from rest after this many steps: the phantom's load crushes its softest mesh after 50 to

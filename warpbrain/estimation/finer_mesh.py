@@ -43,9 +43,9 @@ from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.two_level import TwoLevelGradient
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.extrapolated import extrapolated
 from warpbrain.simulation.finer import FinerCase, free_prolongation, restricted
 from warpbrain.simulation.model import Material, Model
+from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.simulation.sensitivity import SensitivitySolver
 from warpbrain.simulation.sparse_factors import SparseFactors
 from warpbrain.simulation.system import System

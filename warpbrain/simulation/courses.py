@@ -11,10 +11,9 @@ from typing import Any
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments, recorded_times
 from warpbrain.errors import InputError
-from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.dynamics import PhaseClock, Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.quasi_static import follow_slowly, growing_times
 from warpbrain.simulation.relaxation import RelaxationOptions, RelaxationStep, relax_to_rest
 from warpbrain.simulation.result import NodalState, nodal_state_of
@@ -88,13 +87,19 @@ def follow(case: Case, system: System, course: Course, watching: Watching) -> Fo
     return _to_rest(system, course, watching) if course.to_rest else _equilibrium(system, course, watching)
 
 
+def _timed(watch: Callable[[Any], None]) -> tuple[list[float], Callable[[Any], None]]:
+    """A list for the times of steps, and who notes them there and watches."""
+    times: list[float] = []
+
+    def on_step(step: Any) -> None:
+        times.append(time.perf_counter())
+        watch(step)
+
+    return times, on_step
+
+
 def _equilibrium(system: System, course: Course, watching: Watching) -> Followed:
-    first: list[float] = []
-
-    def on_step(step: NewtonStep) -> None:
-        first.append(time.perf_counter())
-        watching.newton(step)
-
+    times, on_step = _timed(watching.newton)
     solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=course.tolerance), on_step)
     state = solver.solve()
     solution = {
@@ -105,17 +110,11 @@ def _equilibrium(system: System, course: Course, watching: Watching) -> Followed
         "iterations_with_indefinite_tangent": state.unstable_iterations,
         "history": [vars(step) for step in state.history],
     }
-    begun = first[0] if first else time.perf_counter()
-    return Followed(solution, None, begun, solver.clock.seconds, solver.clock.counts)
+    return Followed(solution, None, (*times, time.perf_counter())[0], solver.clock.seconds, solver.clock.counts)
 
 
 def _to_rest(system: System, course: Course, watching: Watching) -> Followed:
-    first: list[float] = []
-
-    def on_step(step: RelaxationStep) -> None:
-        first.append(time.perf_counter())
-        watching.relaxation(step)
-
+    times, on_step = _timed(watching.relaxation)
     clock = PhaseClock(system.device)
     state = relax_to_rest(system, RelaxationOptions(tolerance=course.tolerance), on_step, clock)
     solution = {
@@ -124,7 +123,7 @@ def _to_rest(system: System, course: Course, watching: Watching) -> Followed:
         "relative_residual": state.residual,
         "history": [vars(step) for step in state.history],
     }
-    return Followed(solution, None, first[0], clock.seconds, clock.counts)
+    return Followed(solution, None, (*times, time.perf_counter())[0], clock.seconds, clock.counts)
 
 
 def _motion(system: System, steps: int, watching: Watching) -> Followed:
@@ -134,21 +133,12 @@ def _motion(system: System, steps: int, watching: Watching) -> Followed:
     history: list[dict[str, Any]] = []
     begun = 0.0
     for step in range(1, steps + 1):
-        # a prescribed displacement without a history of its own is reached evenly over the run
-        due = simulator.time + simulator.time_step
-        simulator.prescribe(system.model.prescribed_at(due, step / steps))
-        simulator.timed_step(clock)
-        min_J = simulator.check()
+        min_J = simulator.step_to(step / steps, clock)
         begun = begun or time.perf_counter()
         noted = None
         if step % every == 0 or step == steps:
-            kinetic, solve = simulator.kinetic_energy(), simulator.last_solve()
-            noted = {
-                "time_s": simulator.time,
-                "cg_iterations": solve.iterations,
-                "min_J": min_J,
-                "kinetic_J": kinetic,
-            }
+            noted = {"time_s": simulator.time, "cg_iterations": simulator.last_solve().iterations, "min_J": min_J}
+            noted["kinetic_J"] = simulator.kinetic_energy()
             history.append(noted)
         watching.motion(step, simulator.time, noted)
     solution = {
@@ -167,15 +157,14 @@ def _slowly(case: Case, system: System, until: float, course: Course, watching: 
     times = sorted({*growing_times(until, course.steps or SLOW_STEPS), *recorded})
     states: dict[float, NodalState] = {}
     clock = PhaseClock(system.device)
-    first: list[float] = []
     taken: list[NewtonStep] = []
     history: list[dict[str, Any]] = []
 
-    def on_step(step: NewtonStep) -> None:
-        first.append(time.perf_counter())
+    def watch(step: NewtonStep) -> None:
         taken.append(step)
         watching.slow_newton(len(history) / len(times), step)
 
+    noted_at, on_step = _timed(watch)
     options = EquilibriumOptions(tolerance=course.tolerance)
     for number, moment in enumerate(follow_slowly(system, times, options, on_step, clock), 1):
         if moment.time in recorded:
@@ -193,8 +182,7 @@ def _slowly(case: Case, system: System, until: float, course: Course, watching: 
         taken.clear()
         watching.slow(number, len(times), noted)
     solution = {"kind": "slow change", "time_s": until, "history": history}
-    begun = first[0] if first else time.perf_counter()
-    return Followed(solution, until, begun, clock.seconds, clock.counts, states)
+    return Followed(solution, until, (*noted_at, time.perf_counter())[0], clock.seconds, clock.counts, states)
 
 
 def states_at_rest(case: Case, system: System, end: NodalState, tolerance: float) -> dict[float, NodalState]:

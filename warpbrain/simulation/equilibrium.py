@@ -18,10 +18,10 @@ import warp as wp
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.linear import LinearResult, LinearSolver
+from warpbrain.simulation.dynamics import PhaseClock
 from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.model import require_held
 from warpbrain.simulation.multisecant import Multisecant
-from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
 #: Out-of-balance force, relative, from which on steps say something of the steps to come.

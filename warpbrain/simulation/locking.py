@@ -7,7 +7,6 @@ its height, that bends under its weight, beside P2-P1 elements of scikit-fem on 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,31 +23,23 @@ MEASURED = {
 }
 
 
-@dataclass(frozen=True)
-class Choice:
-    """Elements, and why."""
-
-    elements: str
-    reason: str
-
-
 def largest_poisson(model: Model) -> float:
     """Of the tissues that the mesh has."""
     return max(model.materials[label].poisson for label in model.mesh.labels)
 
 
-def choose_elements(model: Model, linear_only: Sequence[str] = ()) -> Choice:
-    """Elements of a model for which nobody asked for any; `linear_only` is to be done with it, and cannot be done with
-    nodes in the middle of edges.
+def choose_elements(model: Model, linear_only: Sequence[str] = ()) -> tuple[str, str]:
+    """Elements of a model for which nobody asked for any, and why; `linear_only` is to be done with it, and cannot be
+    done with nodes in the middle of edges.
     """
     poisson = largest_poisson(model)
     if poisson <= NEARLY_INCOMPRESSIBLE:
-        return Choice("tet4", f"the default up to nu = {NEARLY_INCOMPRESSIBLE:g}")
+        return "tet4", f"the default up to nu = {NEARLY_INCOMPRESSIBLE:g}"
     near = f"nu = {poisson:g} is above {NEARLY_INCOMPRESSIBLE:g}, where tet4 and tet10 lock"
     against = [*linear_only, *unaware_of_midsides(model)]
     if not against:
-        return Choice("tet10-mixed", f"{near}; --elements tet4-averaged is many times as fast and less exact")
-    return Choice("tet4-averaged", f"{near}; not tet10-mixed because of {', '.join(against)}")
+        return "tet10-mixed", f"{near}; --elements tet4-averaged is many times as fast and less exact"
+    return "tet4-averaged", f"{near}; not tet10-mixed because of {', '.join(against)}"
 
 
 def locking_sentences(elements: str, poisson: float, instead: str | None = None) -> list[str]:

@@ -123,9 +123,6 @@ def _equilibrium(system: System, start: Floats, say: Callable[[float], None]) ->
 def _motion(system: System, steps: int, say: Callable[[float], None]) -> NodalState:
     simulator = Simulator(system)
     for step in range(1, steps + 1):
-        due = simulator.time + simulator.time_step
-        simulator.prescribe(system.model.prescribed_at(due, step / steps))
-        simulator.step()
-        simulator.check()
+        simulator.step_to(step / steps)
         say(step / steps)
     return nodal_state_of(system, simulator.time)

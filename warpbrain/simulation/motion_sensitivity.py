@@ -50,7 +50,6 @@ class MotionSensitivity:
         theta: ArrayLike,
         scales: ArrayLike | None = None,
         tolerance: float = 1e-10,
-        max_cg: int = 10_000,
     ) -> None:
         self.simulator = simulator
         system = simulator.system
@@ -61,7 +60,7 @@ class MotionSensitivity:
         count = len(self._stencil)
         self._solver: SeveralSolver | None = None
         if count:
-            self._solver = several_solver(system, count, self._tolerance, max_cg)
+            self._solver = several_solver(system, count, self._tolerance)
         self.u, self.v = (np.zeros((count, system.size, 3)) for _ in range(2))
 
     def step(self) -> None:
@@ -79,12 +78,12 @@ class MotionSensitivity:
             self.v = self._by_parameters(self._solver, u_start, v_start, u_end)
             self.u = self.u + simulator.time_step * self.v
             if stencil.remembers:
-                stencil.remember(lambda k, offset: self._advance(u_end + offset * self.u[k]))
 
-    def _advance(self, u: Floats) -> None:
-        system = self.simulator.system
-        system.u.assign(u)
-        system.advance()
+                def advance(k: int, offset: float) -> None:
+                    system.u.assign(u_end + offset * self.u[k])
+                    system.advance()
+
+                stencil.remember(advance)
 
     def _by_parameters(self, solver: SeveralSolver, u_start: Floats, v_start: Floats, u_end: Floats) -> Floats:
         """Derivatives (p, n, 3) of the velocity at the end of the step."""

@@ -15,8 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
-from typing import Any
 
 import numpy as np
 import warp as wp
@@ -138,14 +136,10 @@ class ParameterStencil:
         factors = self._of_models(k, lambda model: model.external_forces(time, self.model.unit_forces))
         nodes = self.model.quadratic or self.model.mesh
         rates = [
-            load.unit_forces_rate(nodes, partial(self._of_loads, k, number))
-            for number, load in enumerate(self.model.loads)
+            load.unit_forces_rate(nodes, lambda of, n=n: self._of_models(k, lambda model: of(model.loads[n])))
+            for n, load in enumerate(self.model.loads)
         ]
         return factors + self.model.external_forces(time, rates)
-
-    def _of_loads(self, k: int, number: int, of: Callable[[Any], Floats]) -> Floats:
-        """Derivative by parameter k of what a function finds for a load, by its number."""
-        return self._of_models(k, lambda model: of(model.loads[number]))
 
     def by_prescribed(self, k: int) -> Floats:
         """Derivative of the prescribed displacements [m] by parameter k; nothing is asked of a system."""

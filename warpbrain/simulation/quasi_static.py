@@ -14,10 +14,10 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
+from warpbrain.simulation.dynamics import PhaseClock
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver, NewtonStep
 from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.model import require_held
-from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
 #: How often a step is halved before the run gives up.
@@ -77,7 +77,8 @@ def follow_slowly(
     u, now, pending = np.zeros(system.model.mesh.points.shape), 0.0, False
     for number, time in enumerate(series.tolist()):
         step, taken = time - now, 0
-        guess = _ahead(u, near, number)
+        # where the state of the step may be, by the state before and the course that is near
+        guess = None if number >= len(near) else near[0] if number == 0 else u + (near[number] - near[number - 1])
         while now < time:
             if pending:
                 # only now is it known that nobody looks at the state before any more
@@ -99,10 +100,3 @@ def follow_slowly(
             u, now, taken, pending = state.u, end, taken + 1, True
         system.u.assign(u)
         yield Moment(time, state, taken)
-
-
-def _ahead(u: Floats, near: Sequence[Floats], number: int) -> Floats | None:
-    """Where the state (n, 3) of a step may be, by the state before and a course that is near; None without one."""
-    if number >= len(near):
-        return None
-    return near[number] if number == 0 else u + (near[number] - near[number - 1])

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from warpbrain.errors import SolveError, require_kind
 from warpbrain.kernels.precision import Precision
-from warpbrain.simulation.dynamics import Simulator
+from warpbrain.simulation.dynamics import PhaseClock, Simulator
 from warpbrain.simulation.model import require_held
-from warpbrain.simulation.phase_clock import PhaseClock
 from warpbrain.simulation.system import System
 
 #: Relative tolerance of the linear solve of a step. Rest is judged by the forces themselves, so a step need not be

@@ -88,8 +88,7 @@ class Running:
         model = model_of(case)
         self.chosen: str | None = None
         if elements is None:
-            choice = choose_elements(model, needed_by)
-            elements, self.chosen = choice.elements, choice.reason
+            elements, self.chosen = choose_elements(model, needed_by)
         elif elements not in ELEMENTS:
             raise InputError(f"elements = {elements!r}: expected one of {', '.join(ELEMENTS)}")
         self.model = replace(model, elements=elements)

@@ -34,7 +34,7 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
 from warpbrain.kernels.block_linear import BlockConjugateGradient
 from warpbrain.kernels.linear import LinearResult
-from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
+from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.parameter_stencil import ModelOf, ParameterStencil
 from warpbrain.simulation.system import System
@@ -218,7 +218,11 @@ class SensitivitySolver:
         start = np.array([stencil.by_prescribed(k) for k in range(len(stencil))])
 
         def left_of(k: int, moved: Floats) -> Floats:
-            return loaded[k] - self._by_path(stencil, k, state, moved)
+            def internal(offset: float, _: Model) -> Floats:
+                system.u.assign(state + offset * moved)
+                return system.internal_forces()
+
+            return loaded[k] - stencil.derivative(k, internal)
 
         left = np.array([left_of(k, moved) for k, moved in enumerate(start)])
         # differences are exact to the rounding of forces over the step
@@ -253,16 +257,6 @@ class SensitivitySolver:
             after = system.remembered()
         stencil.shift_memory(after, before)
 
-    def _by_path(self, stencil: ParameterStencil, k: int, state: Floats, moved: Floats) -> Floats:
-        """Derivative of the internal forces (n, 3) by parameter k along the way that the state takes with it."""
-        system = self.system
-
-        def internal(offset: float, _: Model) -> Floats:
-            system.u.assign(state + offset * moved)
-            return system.internal_forces()
-
-        return stencil.derivative(k, internal)
-
     def _solver(self, count: int) -> SeveralSolver:
         if count not in self._solvers:
             self._solvers[count] = several_solver(self.system, count, self._tolerance, self._max_cg)
@@ -293,7 +287,7 @@ class Corrections:
         return np.where(self._constrained, 0.0, solved)
 
 
-def several_solver(system: System, count: int, tolerance: float, max_cg: int) -> SeveralSolver:
+def several_solver(system: System, count: int, tolerance: float, max_cg: int = 10_000) -> SeveralSolver:
     """A solver for a system's matrix, with what terms add to it of their own, and several right-hand sides."""
     if system.coupled or not system.assembled:
         return InTurn(system, tolerance, max_cg)
@@ -328,8 +322,6 @@ def secant(
     without: Model,
     present: Model,
     nodes: NDArray[np.integer] | None = None,
-    options: EquilibriumOptions | None = None,
-    device: str | None = None,
 ) -> Secant:
     """The difference that a switch makes: between two models that are alike but for it.
 
@@ -339,7 +331,7 @@ def secant(
     shared = np.arange(len(present.mesh.points)) if nodes is None else np.asarray(nodes, dtype=np.int64)
     states = []
     for model in (present, without):
-        state = solve_equilibrium(System(model, device), options)
+        state = solve_equilibrium(System(model))
         states.append((state.u, model.reactions(state.internal, model.external_forces())))
     (u, reactions), (u_without, reactions_without) = states
     return Secant(shared, u - u_without[shared], reactions - reactions_without[shared])

@@ -127,8 +127,7 @@ class Rig:
         #: Why the elements of a glued specimen were chosen; None if they were asked for.
         self.chosen: str | None = None
         if glued and elements is None:
-            choice = choose_elements(model, ("the specimen",))
-            elements, self.chosen = choice.elements, choice.reason
+            elements, self.chosen = choose_elements(model, ("the specimen",))
         self.system = System(replace(model, elements=elements) if glued and elements else model, device, precision)
         self.solver = EquilibriumSolver(self.system, options)
         self._top = mesh.node_sets["top"]

@@ -19,7 +19,7 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.marginal import Marginal
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions
-from warpbrain.simulation.extrapolated import extrapolated
+from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
 from warpbrain.worlds.body.evidence import evidence_of
