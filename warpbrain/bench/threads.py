@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from statistics import median
 from typing import Any
+from unittest.mock import patch
 
 from warpbrain.bench import command
 from warpbrain.bench.table3 import TABLE3, Row
@@ -79,7 +79,7 @@ def _in_turns(turn: Callable[[], tuple[list[float], bytes]], counts: Sequence[in
     answers = set()
     for number in range(turns + 1):
         for count in counts:
-            with _threads(count):
+            with patch.dict(os.environ, OMP_NUM_THREADS=str(count)):
                 milliseconds, answer = turn()
             answers.add(sha256(answer).hexdigest())
             if number:
@@ -87,20 +87,6 @@ def _in_turns(turn: Callable[[], tuple[list[float], bytes]], counts: Sequence[in
     if len(answers) > 1:
         raise AssertionError(f"{len(answers)} different answers by the number of threads")
     return samples
-
-
-@contextmanager
-def _threads(count: int) -> Iterator[None]:
-    """Say how many threads there are to be while it lasts."""
-    before = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = str(count)
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["OMP_NUM_THREADS"]
-        else:
-            os.environ["OMP_NUM_THREADS"] = before
 
 
 def _steps(row: Row) -> Callable[[], tuple[list[float], bytes]]:

@@ -30,7 +30,6 @@ def block_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of a precision; arrays of vectors are (rows, right-hand sides)."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"block_linear_{precision.name}")
-    chunk = wp.constant(_CHUNK)
 
     @kernels.add
     def multiply(
@@ -52,7 +51,7 @@ def block_kernels(precision: Precision) -> KernelSet:
         t, r = wp.tid()
         first = scalar(0.0)
         second = scalar(0.0)
-        for i in range(t * chunk, wp.min((t + 1) * chunk, x.shape[0])):
+        for i in range(t * _CHUNK, wp.min((t + 1) * _CHUNK, x.shape[0])):
             first += wp.dot(x[i, r], y[i, r])
             second += wp.dot(x[i, r], z[i, r])
         partial[t, r, 0] = first

@@ -76,7 +76,6 @@ def linear_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of the linear solver in a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"linear_{precision.name}")
-    chunk = wp.constant(_CHUNK)
 
     @kernels.add
     def multiply(
@@ -126,7 +125,7 @@ def linear_kernels(precision: Precision) -> KernelSet:
         t = wp.tid()
         pAp = scalar(0.0)
         pp = scalar(0.0)
-        for i in range(t * chunk, wp.min((t + 1) * chunk, p.shape[0])):
+        for i in range(t * _CHUNK, wp.min((t + 1) * _CHUNK, p.shape[0])):
             pAp += wp.dot(p[i], Ap[i])
             pp += wp.dot(p[i], p[i])
         partial[t, 0] = pAp

@@ -32,10 +32,6 @@ def _kernels(precision: Precision, unknown: Any) -> KernelSet:
     scalar = precision.scalar
     is_scalar = unknown is scalar
     kernels = KernelSet(f"minimal_residual_{1 if is_scalar else unknown._length_}_{precision.name}")
-    chunk = wp.constant(_CHUNK)
-    GAMMA_BEFORE, GAMMA, DELTA, ETA = (wp.constant(k) for k in (_GAMMA_BEFORE, _GAMMA, _DELTA, _ETA))
-    C_BEFORE, C, S_BEFORE, S = (wp.constant(k) for k in (_C_BEFORE, _C, _S_BEFORE, _S))
-    ALPHA1, ALPHA2, ALPHA3, NORM = (wp.constant(k) for k in (_ALPHA1, _ALPHA2, _ALPHA3, _NORM))
 
     if is_scalar:
 
@@ -57,7 +53,7 @@ def _kernels(precision: Precision, unknown: Any) -> KernelSet:
     def partial_dot(x: wp.array[unknown], y: wp.array[unknown], partial: wp.array[scalar]):
         t = wp.tid()
         total = scalar(0.0)
-        for i in range(t * chunk, wp.min((t + 1) * chunk, x.shape[0])):
+        for i in range(t * _CHUNK, wp.min((t + 1) * _CHUNK, x.shape[0])):
             total += product(x[i], y[i])
         partial[t] = total
 
@@ -76,21 +72,21 @@ def _kernels(precision: Precision, unknown: Any) -> KernelSet:
         iterations: wp.array[int],
         go_on: wp.array[int],
     ):
-        gamma = wp.sqrt(state[GAMMA])
-        state[NORM] = wp.sqrt(state[NORM])
-        if state[NORM] == scalar(0.0):
+        gamma = wp.sqrt(state[_GAMMA])
+        state[_NORM] = wp.sqrt(state[_NORM])
+        if state[_NORM] == scalar(0.0):
             # nothing is asked for: what is left of a first guess has to go
-            state[NORM] = gamma
-        state[GAMMA_BEFORE] = scalar(1.0)
-        state[GAMMA] = gamma
-        state[ETA] = gamma
-        state[C_BEFORE] = scalar(1.0)
-        state[C] = scalar(1.0)
-        state[S_BEFORE] = scalar(0.0)
-        state[S] = scalar(0.0)
+            state[_NORM] = gamma
+        state[_GAMMA_BEFORE] = scalar(1.0)
+        state[_GAMMA] = gamma
+        state[_ETA] = gamma
+        state[_C_BEFORE] = scalar(1.0)
+        state[_C] = scalar(1.0)
+        state[_S_BEFORE] = scalar(0.0)
+        state[_S] = scalar(0.0)
         iterations[0] = 0
         go_on[0] = 0
-        if gamma > tolerance[0] * state[NORM] and most > 0:
+        if gamma > tolerance[0] * state[_NORM] and most > 0:
             go_on[0] = 1
 
     @kernels.add
@@ -99,10 +95,10 @@ def _kernels(precision: Precision, unknown: Any) -> KernelSet:
     ):
         """`v` of the next Lanczos step; `A z` is of a `z` not yet divided by its norm, and so is delta."""
         i = wp.tid()
-        gamma = state[GAMMA]
-        delta = state[DELTA] / (gamma * gamma)
+        gamma = state[_GAMMA]
+        delta = state[_DELTA] / (gamma * gamma)
         now = v[i]
-        v[i] = Az[i] / gamma - delta / gamma * now - gamma / state[GAMMA_BEFORE] * v_before[i]
+        v[i] = Az[i] / gamma - delta / gamma * now - gamma / state[_GAMMA_BEFORE] * v_before[i]
         v_before[i] = now
 
     @kernels.add
@@ -118,27 +114,27 @@ def _kernels(precision: Precision, unknown: Any) -> KernelSet:
         total = scalar(0.0)
         for t in range(partial.shape[0]):
             total += partial[t]
-        gamma = state[GAMMA]
-        delta = state[DELTA] / (gamma * gamma)
+        gamma = state[_GAMMA]
+        delta = state[_DELTA] / (gamma * gamma)
         # rounding can make the square of a norm that is next to nothing negative
         following = wp.sqrt(wp.max(total, scalar(0.0)))
-        alpha0 = state[C] * delta - state[C_BEFORE] * state[S] * gamma
+        alpha0 = state[_C] * delta - state[_C_BEFORE] * state[_S] * gamma
         alpha1 = wp.sqrt(alpha0 * alpha0 + following * following)
-        state[ALPHA1] = alpha1
-        state[ALPHA2] = state[S] * delta + state[C_BEFORE] * state[C] * gamma
-        state[ALPHA3] = state[S_BEFORE] * gamma
-        state[C_BEFORE] = state[C]
-        state[S_BEFORE] = state[S]
-        state[C] = alpha0 / alpha1
-        state[S] = following / alpha1
-        state[GAMMA_BEFORE] = gamma
-        state[GAMMA] = following
+        state[_ALPHA1] = alpha1
+        state[_ALPHA2] = state[_S] * delta + state[_C_BEFORE] * state[_C] * gamma
+        state[_ALPHA3] = state[_S_BEFORE] * gamma
+        state[_C_BEFORE] = state[_C]
+        state[_S_BEFORE] = state[_S]
+        state[_C] = alpha0 / alpha1
+        state[_S] = following / alpha1
+        state[_GAMMA_BEFORE] = gamma
+        state[_GAMMA] = following
         # the update needs `c eta`, and the next step `-s eta`
-        state[DELTA] = state[C] * state[ETA]
-        state[ETA] = -state[S] * state[ETA]
+        state[_DELTA] = state[_C] * state[_ETA]
+        state[_ETA] = -state[_S] * state[_ETA]
         iterations[0] = iterations[0] + 1
         # written so that a residual that is not a number ends the loop
-        if not (wp.abs(state[ETA]) > tolerance[0] * state[NORM]) or iterations[0] >= most:
+        if not (wp.abs(state[_ETA]) > tolerance[0] * state[_NORM]) or iterations[0] >= most:
             go_on[0] = 0
 
     @kernels.add
@@ -152,10 +148,10 @@ def _kernels(precision: Precision, unknown: Any) -> KernelSet:
     ):
         i = wp.tid()
         now = w[i]
-        new = (z[i] / state[GAMMA_BEFORE] - state[ALPHA3] * w_before[i] - state[ALPHA2] * now) / state[ALPHA1]
+        new = (z[i] / state[_GAMMA_BEFORE] - state[_ALPHA3] * w_before[i] - state[_ALPHA2] * now) / state[_ALPHA1]
         w_before[i] = now
         w[i] = new
-        x[i] = x[i] + state[DELTA] * new
+        x[i] = x[i] + state[_DELTA] * new
         z[i] = z_next[i]
 
     return kernels

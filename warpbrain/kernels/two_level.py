@@ -14,6 +14,7 @@ takes as long as there are numbers in the matrix. A GPU has done its hundreds of
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -62,14 +63,12 @@ class TwoLevelGradient:
     ) -> None:
         self.slow = False
         self._tolerance = tolerance
-        self._plain = plain
-        self._coarse = coarse
+        self._plain, self._coarse = plain, coarse
         self._prolong, self._restrict = prolongation, prolongation.T.tocsr()
-        self._arrays: dict[str, wp.array] = {"b": right_hand_side, "x": solution}
-        for name in ("r", "z", "p", "Ap", "left", "step", "changed"):
-            self._arrays[name] = wp.zeros_like(right_hand_side)
+        self._given, self._made = wp.zeros_like(right_hand_side), wp.zeros_like(right_hand_side)
         # arrays of the CPU are seen by NumPy without a copy
-        self._flat = {name: array.numpy().reshape(-1) for name, array in self._arrays.items()}
+        arrays = (right_hand_side, solution, self._given, self._made)
+        self._b, self._x, self._in, self._out = (array.numpy().reshape(-1) for array in arrays)
         self._largest = 0.0
         self._power = np.random.default_rng(0).normal(size=3 * right_hand_side.shape[0])
         self._result: LinearResult | None = None
@@ -81,85 +80,62 @@ class TwoLevelGradient:
     def prepare(self) -> None:
         """Take notice of new values of the matrix."""
         self._plain.prepare()
-        step, left = self._flat["step"], self._flat["left"]
         for _ in range(_FIRST if self._largest == 0.0 else _AGAIN):
-            step[:] = self._power / np.linalg.norm(self._power)
-            self._product("step", "changed")
-            self._diagonal("changed", "left")
-            self._largest = float(np.linalg.norm(left))
-            self._power[:] = left
+            self._power = self._over_diagonal(self._times_matrix(self._power / np.linalg.norm(self._power))).copy()
+            self._largest = float(np.linalg.norm(self._power))
 
     def solve(self, tolerance: float | None = None) -> None:
         """Solve from the present content of the solution array, until ``|b - A x| <= tolerance |b|``."""
         tolerance = self._tolerance if tolerance is None else tolerance
-        start = self._flat["x"].copy()
-        self._result = self._iterate(tolerance)
-        if self._result is None:
-            self.slow = True
-            self._flat["x"][:] = start
+        start, r = self._x.copy(), self._b.copy()
+        goal = tolerance * float(np.linalg.norm(r))
+        if start.any():
+            r -= self._times_matrix(start)
+        self._result = host_gradients(self._times_matrix, self._cycle, self._x, r, goal, _MOST)
+        self.slow = self.slow or self._result.iterations > _MOST // 4
+        if not (self._result.converged or self._result.indefinite):
+            self._result, self.slow = None, True
+            self._x[:] = start
             self._plain.solve(tolerance)
-        elif self._result.iterations > _MOST // 4:
-            self.slow = True
 
     def result(self) -> LinearResult:
         """How the last solve ended."""
         return self._plain.result() if self._result is None else self._result
 
-    def _iterate(self, tolerance: float) -> LinearResult | None:
-        """Conjugate gradients; None where the plain solver should be asked."""
-        x, r = self._flat["x"], self._flat["r"]
-        r[:] = self._flat["b"]
-        goal = tolerance * float(np.linalg.norm(r))
-        if x.any():
-            self._product("x", "Ap")
-            r -= self._flat["Ap"]
-
-        def multiply(p: Floats) -> Floats:
-            self._flat["p"][:] = p
-            self._product("p", "Ap")
-            return self._flat["Ap"]
-
-        result = host_gradients(multiply, self._cycle, x, r, goal, _MOST)
-        return result if result.converged or result.indefinite else None
-
     def _cycle(self, r: Floats) -> Floats:
         """What the two levels make of a residual."""
-        z, left, step = self._flat["z"], self._flat["left"], self._flat["step"]
-        z[:] = 0.0
-        left[:] = r
-        self._smooth()
-        self._go()
-        step[:] = self._prolong @ self._coarse.solve((self._restrict @ left)[:, None])[:, 0]
-        self._go()
-        self._smooth()
-        z += step
-        return z
+        z, left = np.zeros_like(r), r.copy()
 
-    def _smooth(self) -> None:
+        def go(step: Floats) -> None:
+            """Take a step; what is left of the residual after it."""
+            z[:] += step
+            left[:] -= self._times_matrix(step)
+
+        go(self._smooth(left, go))
+        go(self._prolong @ self._coarse.solve((self._restrict @ left)[:, None])[:, 0])
+        return z + self._smooth(left, go)
+
+    def _smooth(self, left: Floats, go: Callable[[Floats], None]) -> Floats:
         """Two terms of Chebyshev's iteration (Saad 2003, Iterative Methods for Sparse Linear Systems, algorithm 12.1).
 
         The second step is left to be taken.
         """
         largest = _MARGIN * self._largest
         middle, half = 0.5 * (1.0 + _SMOOTHED_FROM) * largest, 0.5 * (1.0 - _SMOOTHED_FROM) * largest
-        self._diagonal("left", "step")
-        step = self._flat["step"]
-        step /= middle
-        self._go()
+        step = self._over_diagonal(left) / middle
+        go(step)
         sigma = middle / half
         rho = 1.0 / (2.0 * sigma - 1.0 / sigma)
-        self._diagonal("left", "changed")
-        step *= rho / sigma
-        step += (2.0 * rho / half) * self._flat["changed"]
+        return rho / sigma * step + (2.0 * rho / half) * self._over_diagonal(left)
 
-    def _go(self) -> None:
-        """Take the step; what is left of the residual after it."""
-        self._flat["z"][:] += self._flat["step"]
-        self._product("step", "changed")
-        self._flat["left"][:] -= self._flat["changed"]
+    def _times_matrix(self, x: Floats) -> Floats:
+        """`A x`, until the next product."""
+        self._in[:] = x
+        self._plain.multiply(self._given, self._made)
+        return self._out
 
-    def _product(self, x: str, z: str) -> None:
-        self._plain.multiply(self._arrays[x], self._arrays[z])
-
-    def _diagonal(self, x: str, z: str) -> None:
-        self._plain.precondition(self._arrays[x], self._arrays[z])
+    def _over_diagonal(self, x: Floats) -> Floats:
+        """`D^-1 x`, likewise."""
+        self._in[:] = x
+        self._plain.precondition(self._given, self._made)
+        return self._out

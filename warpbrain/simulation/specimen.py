@@ -85,6 +85,7 @@ class _State:
     newton: int = 0
     min_J: float = 1.0
     unstable_iterations: int = 0
+    u: Floats | None = None  # displacement (n, 3) [m] to go on from; None for rest
 
 
 class Rig:
@@ -202,16 +203,15 @@ class Rig:
         if self.follows_time(recording):
             return self._through_time(recording, rest, steps, on_state)
         sides = imposed_values(recording.imposed, rest, steps)
-        states, at_rest = [_State(rest)], None
+        at_rest = _State(rest)
         if self.system.model.mechanisms:
-            equilibrium = self._equilibrium(recording, rest, rest, None)
-            states, at_rest = [self._state(recording, rest, equilibrium)], equilibrium.u
+            at_rest = self._equilibrium(recording, rest, at_rest)
+        states = [at_rest]
         for side in sides:
-            u, previous = at_rest, rest
+            last = at_rest
             for value in side.tolist():
-                equilibrium = self._equilibrium(recording, value, previous, u)
-                u, previous = equilibrium.u, value
-                states.append(self._state(recording, value, equilibrium))
+                last = self._equilibrium(recording, value, last)
+                states.append(last)
                 if on_state is not None:
                     on_state((len(states) - 1) / sum(map(len, sides)))
         if recording.force_controlled:
@@ -223,14 +223,11 @@ class Rig:
         states_beyond: list[_State] = []
         reach = max(float(np.abs(recording.imposed - rest).max()), np.finfo(float).tiny)
         for sign, force in ((-1.0, float(recording.response.min())), (1.0, float(recording.response.max()))):
-            last = max(states, key=lambda state: sign * state.imposed)
-            u: Floats | None = None
+            last = replace(max(states, key=lambda state: sign * state.imposed), u=None)
             for _ in range(_FARTHER * steps):
                 if sign * last.response >= sign * force:
                     break
-                value = last.imposed + sign * reach / steps
-                state = self._equilibrium(recording, value, last.imposed, u)
-                u, last = state.u, self._state(recording, value, state)
+                last = self._equilibrium(recording, last.imposed + sign * reach / steps, last)
                 states_beyond.append(last)
             else:
                 raise SolveError(
@@ -247,35 +244,28 @@ class Rig:
         reach = max(float(np.abs(recording.imposed - rest).max()), np.finfo(float).tiny)
         ramps = [[time for time, _ in m.ramp] for m in self.system.model.mechanisms if m.ramp]
         history = history_of(recording.time, recording.imposed, reach, steps, self._shortest, ramps)
-        start = float(history.time[0])
+        start, first = float(history.time[0]), float(history.imposed[0])
         self.system.forget()
-        equilibrium = self._step(recording, rest, np.zeros((len(self._top), 3)), math.inf, start)
-        if history.imposed[0] != rest:
-            equilibrium = self._step(recording, float(history.imposed[0]), equilibrium.u, 0.0, start)
-        states = [self._state(recording, float(history.imposed[0]), equilibrium)]
+        state = self._step(recording, rest, np.zeros((len(self._top), 3)), math.inf, start)
+        if first != rest:
+            state = self._step(recording, first, state.u, 0.0, start)
+        states = [state]
         for k in range(1, len(history.time)):
             before, time, value = (float(x) for x in (history.time[k - 1], history.time[k], history.imposed[k]))
-            equilibrium = self._step(recording, value, equilibrium.u, time - before, time)
-            states.append(self._state(recording, value, equilibrium))
+            states.append(self._step(recording, value, states[-1].u, time - before, time))
             if on_state is not None:
                 on_state(len(states) / len(history.time))
         return _result(recording, states, history)
 
-    def _state(self, recording: TestRecording, value: float, equilibrium: Equilibrium) -> _State:
-        response = self._response(recording, equilibrium.u, equilibrium.internal)
-        min_J = equilibrium.history[-1].min_J if equilibrium.history else 1.0
-        return _State(value, response, len(equilibrium.history), min_J, equilibrium.unstable_iterations)
-
-    def _step(self, recording: TestRecording, value: float, start: Floats, h: float, time: float) -> Equilibrium:
+    def _step(self, recording: TestRecording, value: float, start: Floats | None, h: float, time: float) -> _State:
         """The state a time step `h` after another, at a time."""
+        assert start is not None
         return self._solved(recording, value, lambda u: self.solver.step(start, h, time, u), at=f" at {time:.4g} s")
 
-    def _equilibrium(
-        self, recording: TestRecording, value: float, previous: float, start: Floats | None
-    ) -> Equilibrium:
-        """Equilibrium at an imposed value, from the state `start` at the value before it."""
-        came = f", coming from {SHOWN[recording.quantities[0]][0] * previous:.4g}"
-        return self._solved(recording, value, lambda u: self.solver.solve(start=start, prescribed=u), came=came)
+    def _equilibrium(self, recording: TestRecording, value: float, last: _State) -> _State:
+        """Equilibrium at an imposed value, from the state before it."""
+        came = f", coming from {SHOWN[recording.quantities[0]][0] * last.imposed:.4g}"
+        return self._solved(recording, value, lambda u: self.solver.solve(start=last.u, prescribed=u), came=came)
 
     def _solved(
         self,
@@ -284,10 +274,13 @@ class Rig:
         solve: Callable[[Floats], Equilibrium],
         at: str = "",
         came: str = "",
-    ) -> Equilibrium:
+    ) -> _State:
         led = np.where(self._led[:, None], self._platen(recording, value), 0.0)
         try:
-            return solve(led * self.system.model.constrained)
+            state = solve(led * self.system.model.constrained)
+            response = self._response(recording, state.u, state.internal)
+            min_J = state.history[-1].min_J if state.history else 1.0
+            return _State(value, response, len(state.history), min_J, state.unstable_iterations, state.u)
         except SolveError as error:
             factor, unit = SHOWN[recording.quantities[0]]
             raise SolveError(
