@@ -140,12 +140,12 @@ def phantom_job(count: int, precision: str) -> Job:
 
 def measure_batches(sizes: list[int], device: str, precision: str) -> Iterator[MeasuredBatch]:
     """Measure motions of as many samples as a batch has slots."""
-    whole = phantom_job(max(sizes), precision)
-    system = whole.system(device)
+    job = phantom_job(max(sizes), precision)
+    system = job.system(device)
     for slots in sizes:
-        samples = sorted(whole.samples[:slots], key=lambda sample: sample.stiffness)
+        samples = sorted(job.samples[:slots], key=lambda sample: sample.stiffness)
         numbers = [sample.number for sample in samples]
-        course = whole.course()
+        course = job.course()
         batch = course.batch_of(system, samples, slots)
         # loads kernels and captures the graph
         list(step_batch(batch, course, numbers))

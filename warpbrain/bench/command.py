@@ -32,14 +32,14 @@ def run(
     parser = OneLineParser(prog=f"python -m warpbrain.bench {command}".rstrip(), description=description)
     for name, settings in options.items():
         parser.add_argument(name, **settings)
-    asked = parser.parse_args(arguments)
+    parsed = parser.parse_args(arguments)
 
     def measure() -> None:
         for name, settings in options.items():
-            value = getattr(asked, name.strip("-"))
+            value = getattr(parsed, name.strip("-"))
             if settings.get("type") is int and value < 1:
                 raise InputError(f"{name} {value}: expected a whole number of at least 1")
-        bench(asked)
+        bench(parsed)
 
     return exit_status(parser.prog, measure)
 

@@ -85,17 +85,17 @@ def _packages() -> dict[str, str | None]:
         declared = requires("warpbrain") or []
     except PackageNotFoundError:  # run from its sources
         declared = ["warp-lang", "numpy", "scipy", "meshio", "h5py", "matplotlib", "pyvista"]
-    found: dict[str, str | None] = {}
+    versions: dict[str, str | None] = {}
     for line in declared:
         if re.search(r"extra == .(test|docs).", line):
             continue
         match = re.match(r"[\w.-]+", line)
         assert match is not None
         try:
-            found[match[0]] = version(match[0])
+            versions[match[0]] = version(match[0])
         except PackageNotFoundError:
-            found[match[0]] = None
-    return found
+            versions[match[0]] = None
+    return versions
 
 
 def _kernels(folder: Path) -> dict[str, Any]:
@@ -116,21 +116,21 @@ def _pictures() -> str | None:
     return "there is no OpenGL library: on Debian and Ubuntu, apt-get install libegl1"
 
 
-def health_lines(found: Mapping[str, Any]) -> list[str]:
+def health_lines(report: Mapping[str, Any]) -> list[str]:
     """As printed; `found` is of `health`."""
-    memory, processor, cuda, kernels = (found[name] for name in ("memory_GiB", "processor", "cuda", "kernels"))
-    installed = [f"{name} {version}" for name, version in found["packages"].items() if version]
-    missing = [name for name, version in found["packages"].items() if not version]
+    memory, processor, cuda, kernels = (report[name] for name in ("memory_GiB", "processor", "cuda", "kernels"))
+    installed = [f"{name} {version}" for name, version in report["packages"].items() if version]
+    missing = [name for name, version in report["packages"].items() if not version]
     driver = f"CUDA driver {cuda['driver']}" if cuda["driver"] else "no CUDA driver"
     writable = "" if kernels["writable"] else "; CANNOT BE WRITTEN TO: set WARP_CACHE_PATH to a folder that can"
     devices = []
-    for device in found["devices"]:
+    for device in report["devices"]:
         size = device["memory_GiB"]
         more = size and f", architecture {device['arch']}, {_gib(size['total'])}, {_gib(size['free'])} free"
         devices.append(f"device     {device['alias']}: {device['name']}{more or ''}")
     lines = [
-        f"warpbrain  {found['warpbrain']['version']} in {found['warpbrain']['folder']}",
-        f"python     {found['python']} on {found['platform']}",
+        f"warpbrain  {report['warpbrain']['version']} in {report['warpbrain']['folder']}",
+        f"python     {report['python']} on {report['platform']}",
         f"processor  {processor['name']}, {processor['usable']} usable, {processor['threads']} threads",
         f"memory     {_gib(memory['total'])}, {_gib(memory['free'])} free",
         f"installed  {', '.join(installed)}",
@@ -138,9 +138,9 @@ def health_lines(found: Mapping[str, Any]) -> list[str]:
         f"cuda       {driver}, Warp built with {cuda['toolkit'] or 'none'}",
         *devices,
         f"kernels    {kernels['folder']}, {kernels['size_GiB']:.2f} GiB{writable}",
-        f"pictures   {found['pictures'] or 'an OpenGL library is there'}",
+        f"pictures   {report['pictures'] or 'an OpenGL library is there'}",
     ]
-    for test in found["self_test"]:
+    for test in report["self_test"]:
         result = f"FAILED: {test['problem']}" if test["problem"] else (
             f"passed: {test['nodes']} nodes found to {test['error']:.0e} of their displacement in "
             f"{test['solve_s']:.1f} s, after {test['kernels_s']:.1f} s for kernels"

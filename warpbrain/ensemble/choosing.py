@@ -123,7 +123,7 @@ def overloaded(model: Model, samples: Sequence[Sample], device: str | None = Non
 
     def stiffness(sample: Sample) -> float:
         """Mean logarithm of the shear moduli [Pa]."""
-        return float(np.mean([np.log(one.law.shear_modulus) for one in (sample.materials or {}).values()]))
+        return float(np.mean([np.log(material.law.shear_modulus) for material in (sample.materials or {}).values()]))
 
     ordered = sorted((sample for sample in samples if sample.materials is not None), key=stiffness)
 

@@ -173,9 +173,9 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def checksum_of(said: Any) -> str:
+def checksum_of(values: Any) -> str:
     """SHA-256 of plain values, whatever the order of their keys."""
-    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 
 def _digest(arrays: Mapping[str, NDArray[Any]]) -> str:

@@ -105,7 +105,7 @@ class CoregionalisedCandidate:
         assert self.model is not None
         mean, spread = self.model.level_of(studies, stretches)
         pairs = zip(studies, stretches, strict=True)
-        level = np.mean([np.log(study.energy(own) + OFFSET).mean() for study, own in pairs])
+        level = np.mean([np.log(study.energy(l) + OFFSET).mean() for study, l in pairs])
         return float(ndtr((level - mean) / spread))
 
 
@@ -147,9 +147,9 @@ class HierarchicalCandidate:
     def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
         """See `Candidate`; of log secant moduli, which differ from log energies by what is known."""
         assert self.model is not None
-        moduli = [log_secant_modulus(own, study.energy(own)) for study, own in zip(studies, stretches, strict=True)]
-        level = np.mean([own.mean() for own in moduli])
-        weights = np.concatenate([np.full(len(own), 1.0 / len(own) / len(moduli)) for own in moduli])
+        moduli = [log_secant_modulus(l, study.energy(l)) for study, l in zip(studies, stretches, strict=True)]
+        level = np.mean([of_study.mean() for of_study in moduli])
+        weights = np.concatenate([np.full(len(of_study), 1.0 / len(of_study) / len(moduli)) for of_study in moduli])
         return float(
             np.mean(
                 [

@@ -121,8 +121,8 @@ class Hierarchical:
         sources = {**{name: index for index, name in enumerate(known)}, **{n: -1 - k for k, n in enumerate(new)}}
         rows = [
             (-1 - index, sources[study.paper], study.task, l, study.symmetric)
-            for index, (study, own) in enumerate(zip(studies, stretches, strict=True))
-            for l in own
+            for index, (study, at) in enumerate(zip(studies, stretches, strict=True))
+            for l in at
         ]
         return self.moments(places_of(rows))
 

@@ -69,15 +69,15 @@ def leave_out(
 
     `SolveError` if a covariance cannot be factored.
     """
-    whole = candidate.fitted(studies)
+    on_all = candidate.fitted(studies)
     held = folds(studies, fold)
     predictions: list[list[Prediction]] = []
     levels: list[float] = []
-    for index, left in enumerate(held.values()):
+    for index, left_out in enumerate(held.values()):
         progress(index / len(held))
-        without = whole.fitted([study for study in studies if study not in left])
-        predictions.append([without.predict(study, _seen(study)) for study in left])
-        levels.append(without.level_pit(left, [_seen(study) for study in left]))
+        without = on_all.fitted([study for study in studies if study not in left_out])
+        predictions.append([without.predict(study, _seen(study)) for study in left_out])
+        levels.append(without.level_pit(left_out, [_seen(study) for study in left_out]))
     values = np.array([np.mean([p.log_density.mean() for p in group]) for group in predictions])
     each = [np.mean([(p.error**2).mean() for p in group]) for group in predictions]
     within = [np.mean([np.mean(np.abs(p.pit - 0.5) < half) for g in predictions for p in g]) for half in (0.25, 0.475)]
@@ -125,7 +125,9 @@ class Comparison:
 
 def methods_of(held: Mapping[str, Sequence[Study]]) -> list[str]:
     """The method of what was left out together, by the order of `held`; no paper of the literature has two."""
-    return [" and ".join(dict.fromkeys(study.group.partition("/")[0] for study in left)) for left in held.values()]
+    return [
+        " and ".join(dict.fromkeys(study.group.partition("/")[0] for study in left_out)) for left_out in held.values()
+    ]
 
 
 def calibration(score: Score, methods: Sequence[str]) -> list[Calibration]:

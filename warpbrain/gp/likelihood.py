@@ -167,11 +167,11 @@ class Likelihood:
     def _value(self, parameters: Parameters, factored: Factored) -> float:
         data = self.data
         noise = parameters.noise[data.task]
-        own = 0.5 * (data.count - 1) * np.log(2.0 * math.pi * noise) + 0.5 * np.log(data.count)
-        own += 0.5 * data.scatter / noise
+        of_replicates = 0.5 * (data.count - 1) * np.log(2.0 * math.pi * noise) + 0.5 * np.log(data.count)
+        of_replicates += 0.5 * data.scatter / noise
         log_determinant = 2.0 * float(np.log(np.diag(factored.cholesky)).sum())
         constant = 0.5 * data.size * math.log(2.0 * math.pi)
-        return 0.5 * float(data.mean @ factored.weights) + 0.5 * log_determinant + constant + float(own.sum())
+        return 0.5 * float(data.mean @ factored.weights) + 0.5 * log_determinant + constant + float(of_replicates.sum())
 
     def value_gradient_and_information(self, parameters: Parameters) -> tuple[float, Floats, Floats]:
         """As `value`, with its derivative (37,) and the average information (37, 37) in the vector of parameters."""
@@ -205,13 +205,13 @@ class Likelihood:
         from scipy.linalg import solve_triangular
 
         data, w, a = self.data, parameters.w, factored.weights
-        own = np.zeros((data.size, TASKS))
-        own[np.arange(data.size), data.task] = 1.0
-        by_task = k @ (own * a[:, None])
+        members = np.zeros((data.size, TASKS))
+        members[np.arange(data.size), data.task] = 1.0
+        by_task = k @ (members * a[:, None])
         # columns K_i a
-        by_w = w[data.task, None] * by_task + own * (by_task @ w)[:, None]
-        by_kappa = parameters.kappa * own * by_task
-        by_noise = parameters.noise * own * (a / data.count)[:, None]
+        by_w = w[data.task, None] * by_task + members * (by_task @ w)[:, None]
+        by_kappa = parameters.kappa * members * by_task
+        by_noise = parameters.noise * members * (a / data.count)[:, None]
         columns = np.concatenate([(by_length @ a)[:, None], by_w, by_kappa, by_noise], axis=1)
         half = solve_triangular(factored.cholesky, columns, lower=True, check_finite=False)
         information = 0.5 * half.T @ half

@@ -118,10 +118,10 @@ class Prior:
 
     def samples(self, count: int, seed: int | None = None) -> Floats:
         """Draws 0 to `count` - 1 of a seed (the prior's own unless given), shape (count, p)."""
-        own = self.seed if seed is None else seed
-        if own == self.seed and count <= len(self.theta):
+        drawn = self.seed if seed is None else seed
+        if drawn == self.seed and count <= len(self.theta):
             return self.theta[:count].copy()
-        return _theta(draw_many(self.model, self.groups, self.laws_of, count, own, self.poisson, self.formulation))
+        return _theta(draw_many(self.model, self.groups, self.laws_of, count, drawn, self.poisson, self.formulation))
 
     @cached_property
     def mean(self) -> Floats:
@@ -146,8 +146,8 @@ class Prior:
 
     def log_density(self, theta: ArrayLike) -> Floats | float:
         """Log density of the draws by `theta`: a number for (p,), an array (m,) for (m, p); see `FoldedDensity`."""
-        found = self._density.log_density(self._points(theta))
-        return found if np.ndim(theta) > 1 else float(found[0])
+        density = self._density.log_density(self._points(theta))
+        return density if np.ndim(theta) > 1 else float(density[0])
 
     def laws(self, theta: ArrayLike) -> tuple[Law, ...]:
         """The law of each tissue at a vector (p,).
@@ -173,9 +173,9 @@ class Prior:
 
     @cached_property
     def _density(self) -> FoldedDensity:
-        found = [coordinate for _, coordinate in self._coordinates]
-        low, high = (np.array([getattr(coordinate, side) for coordinate in found]) for side in ("low", "high"))
-        signed = [coordinate.signed for coordinate in found]
+        listed = [coordinate for _, coordinate in self._coordinates]
+        low, high = (np.array([getattr(coordinate, side) for coordinate in listed]) for side in ("low", "high"))
+        signed = [coordinate.signed for coordinate in listed]
         negative = (self.theta[:, signed] < 0.0).astype(np.int64)
         clusters = negative @ (2 ** np.arange(negative.shape[1]))
         return FoldedDensity(self.theta, low, high, clusters)
@@ -211,10 +211,10 @@ class FoldedDensity:
             away = solve_triangular(self._factor, image.T, lower=True).T
             squares = np.sum(away**2, axis=1)[:, None] - 2.0 * away @ centres.T + np.sum(centres**2, axis=1)
             terms.append(logsumexp(-0.5 * squares, axis=1))
-        found: Floats = logsumexp(terms, axis=0)
-        found -= np.log(count) + 0.5 * size * np.log(2.0 * np.pi) + np.log(np.diag(self._factor)).sum()
+        density: Floats = logsumexp(terms, axis=0)
+        density -= np.log(count) + 0.5 * size * np.log(2.0 * np.pi) + np.log(np.diag(self._factor)).sum()
         inside = np.all((points >= self.low) & (points <= self.high), axis=1)
-        return np.where(inside, found, -np.inf)
+        return np.where(inside, density, -np.inf)
 
     def _images(self, points: Floats) -> list[Floats]:
         """The points and their mirror images in all sides; a kernel is narrow, so images of images are of no weight."""

@@ -90,8 +90,8 @@ def read_model(folder: Path) -> Process:
     kernel = _choice(path, table, "kernel", tuple(KERNELS))
     added = folder / STUDIES
     studies = read_studies(variant, added if added.exists() else None)
-    given = table.get("parameters")
-    if not isinstance(given, dict):
+    numbers = table.get("parameters")
+    if not isinstance(numbers, dict):
         raise InputError(f"{path}: parameters: expected a table")
     if kind == "hierarchical":
         if _choice(path, table | {"format": table.get("format", 1)}, "format", (1, FORMAT)) == 1:
@@ -100,14 +100,14 @@ def read_model(folder: Path) -> Process:
         sample = table.get("sample")
         if not isinstance(sample, list) or not all(isinstance(drawn, dict) for drawn in sample):
             raise InputError(f"{path}: sample: expected tables of parameters")
-        best, *others = (_hierarchy(path, each, kernel) for each in (given, *sample))
+        best, *others = (_hierarchy(path, each, kernel) for each in (numbers, *sample))
         return Hierarchical(studies, best, variant, tuple(others))
-    arrays = {name: _numbers(path, given, name) for name in ("w", "kappa", "noise")}
+    arrays = {name: _numbers(path, numbers, name) for name in ("w", "kappa", "noise")}
     try:
-        parameters = Parameters(_positive(path, given, "length scale"), **arrays)
+        parameters = Parameters(_positive(path, numbers, "length scale"), **arrays)
     except InputError as error:
         raise InputError(f"{path}: parameters: {error}") from None
-    return Coregionalised(studies, parameters, variant, kernel, _positive(path, given, "jitter"))
+    return Coregionalised(studies, parameters, variant, kernel, _positive(path, numbers, "jitter"))
 
 
 def fit_model(
@@ -197,9 +197,9 @@ def write_model(folder: Path, model: Process, record: dict[str, Any], added: Pat
         path.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
 
 
-def _hierarchy(path: Path, given: dict[str, Any], kernel: str) -> Hierarchy:
-    spread = {name: _positive(path, given, name) for name in EFFECTS}
-    return Hierarchy(spread, _positive(path, given, "length scale"), kernel)
+def _hierarchy(path: Path, numbers: dict[str, Any], kernel: str) -> Hierarchy:
+    spread = {name: _positive(path, numbers, name) for name in EFFECTS}
+    return Hierarchy(spread, _positive(path, numbers, "length scale"), kernel)
 
 
 def _described(hierarchy: Hierarchy) -> dict[str, Any]:

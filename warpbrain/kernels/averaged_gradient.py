@@ -27,10 +27,10 @@ def averaged_kernels(precision: Precision) -> KernelSet:
     def gradient(nodes: wp.array2d[int], gradients: wp.array2d[vec3], u: wp.array[vec3], F: wp.array[mat33]):
         """``(nodes, gradients, u) -> F``, one thread for a patch."""
         t = wp.tid()
-        found = wp.identity(n=3, dtype=scalar)
+        mean = wp.identity(n=3, dtype=scalar)
         for b in range(nodes.shape[1]):
-            found += wp.outer(u[nodes[t, b]], gradients[t, b])
-        F[t] = found
+            mean += wp.outer(u[nodes[t, b]], gradients[t, b])
+        F[t] = mean
 
     @kernels.add
     def forces(gradients: wp.array2d[vec3], volume: wp.array[scalar], P: wp.array[mat33], out: wp.array2d[vec3]):

@@ -49,8 +49,8 @@ def coupled_kernels(precision: Precision, scalars: int) -> KernelSet:
         offsets: wp.array[int],
         columns: wp.array[int],
         compliance: wp.array[scalar],
-        own: wp.array[vec3],
-        others: wp.array[vec3],
+        coupling: wp.array[vec3],
+        transposed: wp.array[vec3],
         free: wp.array[vec3],
         root: wp.array[scalar],
         x: wp.array[vector],
@@ -64,8 +64,8 @@ def coupled_kernels(precision: Precision, scalars: int) -> KernelSet:
         for k in range(offsets[i], offsets[i + 1]):
             z = x[columns[k]]
             # constrained components of a vector that is iterated on are zero
-            taken += wp.dot(own[k], displacement(z))
-            pushed += z[place] * others[k]
+            taken += wp.dot(coupling[k], displacement(z))
+            pushed += z[place] * transposed[k]
             flow += compliance[k] * z[place]
         push = root[0] * wp.cw_mul(free[i], pushed)
         total = y[i]
@@ -80,7 +80,7 @@ def coupled_kernels(precision: Precision, scalars: int) -> KernelSet:
         offsets: wp.array[int],
         columns: wp.array[int],
         compliance: wp.array[scalar],
-        own: wp.array[vec3],
+        coupling: wp.array[vec3],
         free: wp.array[vec3],
         root: wp.array[scalar],
         inverse: wp.array[mat33],
@@ -91,7 +91,7 @@ def coupled_kernels(precision: Precision, scalars: int) -> KernelSet:
         total = scalar(0.0)
         for k in range(offsets[i], offsets[i + 1]):
             j = columns[k]
-            along = wp.cw_mul(free[j], own[k])
+            along = wp.cw_mul(free[j], coupling[k])
             total += root[0] * root[0] * wp.dot(along, inverse[j] * along)
             if j == i:
                 total += compliance[k]

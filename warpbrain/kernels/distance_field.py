@@ -75,8 +75,8 @@ def smooth_distance(precision: Precision) -> Any:
     def along_axis(s: scalar, n: int):
         """First of four coefficients, their weights, and first and second derivatives of these, at `s` spacings."""
         zero, half, one, two, three = scalar(0.0), scalar(0.5), scalar(1.0), scalar(2.0), scalar(3.0)
-        whole = wp.floor(s)
-        t = s - whole
+        interval = wp.floor(s)
+        t = s - interval
         r = one - t
         sixth = scalar(1.0 / 6.0)
         w = sixth * vec4(
@@ -89,7 +89,7 @@ def smooth_distance(precision: Precision) -> Any:
             -half * r * r, half * t * (three * t - scalar(4.0)), half * r * (scalar(4.0) - three * r), half * t * t
         )
         dd = vec4(r, three * t - two, three * r - two, t)
-        first = int(whole) - 1
+        first = int(interval) - 1
         base = wp.clamp(first, 0, n - 4)
         W = vec4(zero, zero, zero, zero)
         D = vec4(zero, zero, zero, zero)

@@ -106,10 +106,10 @@ def extra_kernels(
         t = wp.tid()
         e = elements[t]
         s = stretch[t]
-        found = scalar(0.0)
+        total = scalar(0.0)
         for point in range(points):
             F = gradient_at(u, nodes, e, point, inverse_edges[e]) / s
-            found += energy(F, data, t)
-        out[t] = share * scale[0] * volume[t] * s * s * s * found
+            total += energy(F, data, t)
+        out[t] = share * scale[0] * volume[t] * s * s * s * total
 
     return forces, tangents, energies

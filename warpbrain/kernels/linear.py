@@ -76,6 +76,7 @@ def linear_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of the linear solver in a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"linear_{precision.name}")
+    chunk = wp.constant(_CHUNK)
 
     @kernels.add
     def multiply(
@@ -125,7 +126,7 @@ def linear_kernels(precision: Precision) -> KernelSet:
         t = wp.tid()
         pAp = scalar(0.0)
         pp = scalar(0.0)
-        for i in range(t * _CHUNK, wp.min((t + 1) * _CHUNK, p.shape[0])):
+        for i in range(t * chunk, wp.min((t + 1) * chunk, p.shape[0])):
             pAp += wp.dot(p[i], Ap[i])
             pp += wp.dot(p[i], p[i])
         partial[t, 0] = pAp
@@ -569,8 +570,8 @@ def host_gradients(
     before, least = math.inf, math.inf
     for iteration in range(most + 1):
         # as a product, since NumPy hands a norm of CuPy's over to three kernels
-        left = math.sqrt(float(r @ r))
-        if not left > goal or iteration == most:
+        residual = math.sqrt(float(r @ r))
+        if not residual > goal or iteration == most:
             break
         z = precondition(r)
         along = float(r @ z)
@@ -587,4 +588,4 @@ def host_gradients(
         x += along / curvature * p
         r -= along / curvature * Ap
         before = along
-    return LinearResult(iteration, left, goal, least if math.isfinite(least) else math.nan)
+    return LinearResult(iteration, residual, goal, least if math.isfinite(least) else math.nan)

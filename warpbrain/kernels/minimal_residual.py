@@ -32,6 +32,7 @@ def _kernels(precision: Precision, unknown: Any) -> KernelSet:
     scalar = precision.scalar
     is_scalar = unknown is scalar
     kernels = KernelSet(f"minimal_residual_{1 if is_scalar else unknown._length_}_{precision.name}")
+    chunk = wp.constant(_CHUNK)
 
     if is_scalar:
 
@@ -53,7 +54,7 @@ def _kernels(precision: Precision, unknown: Any) -> KernelSet:
     def partial_dot(x: wp.array[unknown], y: wp.array[unknown], partial: wp.array[scalar]):
         t = wp.tid()
         total = scalar(0.0)
-        for i in range(t * _CHUNK, wp.min((t + 1) * _CHUNK, x.shape[0])):
+        for i in range(t * chunk, wp.min((t + 1) * chunk, x.shape[0])):
             total += product(x[i], y[i])
         partial[t] = total
 

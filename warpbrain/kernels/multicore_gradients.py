@@ -202,10 +202,10 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
                         restrict(t, r, free, places, restricted)
             elif kind == coarse:
                 for m in range((modes * share) // all_shares, (modes * (share + 1)) // all_shares):
-                    found = scalar(0.0)
+                    total_of_row = scalar(0.0)
                     for q in range(modes):
-                        found += coarse_inverse[m, q] * coarse_residual[q]
-                    coarse_solution[m] = found
+                        total_of_row += coarse_inverse[m, q] * coarse_residual[q]
+                    coarse_solution[m] = total_of_row
             elif kind == direction:
                 beta = outcome[6]
                 for i in range(first * chunk, wp.min(last * chunk, rows)):

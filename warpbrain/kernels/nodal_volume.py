@@ -33,10 +33,10 @@ def _weight(corner: int, point: int, w: Any):
 @wp.func
 def _pressure_at(p: wp.array[Any], patches: wp.array2d[int], e: int, point: int, w: Any):
     """`w p` at a quadrature point."""
-    found = w - w
+    pressure = w - w
     for a in range(4):
-        found += _weight(a, point, w) * p[patches[e, a]]
-    return found
+        pressure += _weight(a, point, w) * p[patches[e, a]]
+    return pressure
 
 
 @cache
@@ -57,13 +57,13 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
     ):
         """``(nodes, inverse_edges, volume, u) -> moments``, what an element adds to `M_a` of its corners."""
         e = wp.tid()
-        found = vec4()
+        element_moments = vec4()
         for point in range(POINTS):
             J = wp.determinant(gradient_at(u, nodes, e, point, inverse_edges[e]))
             for a in range(4):
-                found[a] += _weight(a, point, share * volume[e]) * J
+                element_moments[a] += _weight(a, point, share * volume[e]) * J
         for a in range(4):
-            out[e, a] = found[a]
+            out[e, a] = element_moments[a]
 
     @kernels.add
     def pressures(
@@ -153,10 +153,10 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
     def gather(first: wp.array[int], parts: wp.array[int], of_elements: wp.array[vec3], g: wp.array[vec3]):
         """``(first, parts, of_elements) -> g``, one thread for a node of a patch."""
         k = wp.tid()
-        found = vec3()
+        total = vec3()
         for part in range(first[k], first[k + 1]):
-            found += of_elements[parts[part]]
-        g[k] = found
+            total += of_elements[parts[part]]
+        g[k] = total
 
     @kernels.add
     def diagonal(
@@ -170,13 +170,13 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
     ):
         """``(first, entries, patches, c, g) -> g in the order of nodes, blocks``, one thread for a node."""
         b = wp.tid()
-        found = mat33()
+        total = mat33()
         for k in range(first[b], first[b + 1]):
-            own = g[entries[k]]
+            g_ab = g[entries[k]]
             # every product with a vector reads this, one after the other
-            by_node[k] = own
-            found += wp.outer(c[patches[k]] * own, own)
-        blocks[b, 0] = found
+            by_node[k] = g_ab
+            total += wp.outer(c[patches[k]] * g_ab, g_ab)
+        blocks[b, 0] = total
 
     @kernels.add
     def taken_up(
@@ -190,11 +190,11 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
     ):
         """``(first, nodes, c, g, columns, x) -> change of p_a``, one thread for a patch."""
         a = wp.tid()
-        found = scalar(0.0)
+        total = scalar(0.0)
         for k in range(first[a], first[a + 1]):
             b = nodes[k]
-            found += wp.dot(g[k], wp.cw_mul(columns[b], x[b]))
-        change[a] = c[a] * found
+            total += wp.dot(g[k], wp.cw_mul(columns[b], x[b]))
+        change[a] = c[a] * total
 
     @kernels.add
     def push(
@@ -202,7 +202,7 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
         patches: wp.array[int],
         by_node: wp.array[vec3],
         change: wp.array[scalar],
-        own: wp.array2d[mat33],
+        diagonal_blocks: wp.array2d[mat33],
         columns: wp.array[vec3],
         rows: wp.array[vec3],
         x: wp.array[vec3],
@@ -213,9 +213,9 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
         """``(first, patches, g in the order of nodes, change, diagonal, columns, rows, x, factor, scale) -> y``, one
         thread for a node: without the diagonal blocks, added to `y`."""
         b = wp.tid()
-        found = -(own[b, 0] * wp.cw_mul(columns[b], x[b]))
+        force = -(diagonal_blocks[b, 0] * wp.cw_mul(columns[b], x[b]))
         for k in range(first[b], first[b + 1]):
-            found += change[patches[k]] * by_node[k]
-        y[b] += factor * scale[0] * wp.cw_mul(rows[b], found)
+            force += change[patches[k]] * by_node[k]
+        y[b] += factor * scale[0] * wp.cw_mul(rows[b], force)
 
     return kernels

@@ -243,26 +243,26 @@ def pore_kernels(precision: Precision) -> KernelSet:
         contributions: wp.array[int],
         element_coupling: wp.array2d[vec3],
         closed: wp.array[scalar],
-        own: wp.array[vec3],
-        others: wp.array[vec3],
+        coupling: wp.array[vec3],
+        transposed: wp.array[vec3],
     ):
         """One thread for an entry: `db_i/du_j` and `db_j/du_i`, zero for the `b` of drained nodes."""
         k = wp.tid()
         total = vec3()
-        other = vec3()
+        total_transposed = vec3()
         for c in range(first[k], first[k + 1]):
             which = contributions[c]
             corner = which % 16
             total += element_coupling[which // 16, corner % 4]
-            other += element_coupling[which // 16, corner // 4]
-        own[k] = closed[rows[k]] * total
-        others[k] = closed[columns[k]] * other
+            total_transposed += element_coupling[which // 16, corner // 4]
+        coupling[k] = closed[rows[k]] * total
+        transposed[k] = closed[columns[k]] * total_transposed
 
     @kernels.add
     def taken_up(
         offsets: wp.array[int],
         columns: wp.array[int],
-        own: wp.array[vec3],
+        coupling: wp.array[vec3],
         mask: wp.array[vec3],
         x: wp.array[vec3],
         out: wp.array[scalar],
@@ -272,14 +272,14 @@ def pore_kernels(precision: Precision) -> KernelSet:
         total = scalar(0.0)
         for k in range(offsets[i], offsets[i + 1]):
             j = columns[k]
-            total += wp.dot(own[k], wp.cw_mul(mask[j], x[j]))
+            total += wp.dot(coupling[k], wp.cw_mul(mask[j], x[j]))
         out[i] = total
 
     @kernels.add
     def push(
         offsets: wp.array[int],
         columns: wp.array[int],
-        others: wp.array[vec3],
+        transposed: wp.array[vec3],
         p: wp.array[scalar],
         factor: scalar,
         mask: wp.array[vec3],
@@ -289,7 +289,7 @@ def pore_kernels(precision: Precision) -> KernelSet:
         i = wp.tid()
         total = vec3()
         for k in range(offsets[i], offsets[i + 1]):
-            total += p[columns[k]] * others[k]
+            total += p[columns[k]] * transposed[k]
         y[i] = y[i] + factor * wp.cw_mul(mask[i], total)
 
     @kernels.add

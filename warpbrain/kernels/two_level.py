@@ -104,29 +104,29 @@ class TwoLevelGradient:
 
     def _cycle(self, r: Floats) -> Floats:
         """What the two levels make of a residual."""
-        z, left = np.zeros_like(r), r.copy()
+        z, residual = np.zeros_like(r), r.copy()
 
         def go(step: Floats) -> None:
             """Take a step; what is left of the residual after it."""
             z[:] += step
-            left[:] -= self._times_matrix(step)
+            residual[:] -= self._times_matrix(step)
 
-        go(self._smooth(left, go))
-        go(self._prolong @ self._coarse.solve((self._restrict @ left)[:, None])[:, 0])
-        return z + self._smooth(left, go)
+        go(self._smooth(residual, go))
+        go(self._prolong @ self._coarse.solve((self._restrict @ residual)[:, None])[:, 0])
+        return z + self._smooth(residual, go)
 
-    def _smooth(self, left: Floats, go: Callable[[Floats], None]) -> Floats:
+    def _smooth(self, residual: Floats, go: Callable[[Floats], None]) -> Floats:
         """Two terms of Chebyshev's iteration (Saad 2003, Iterative Methods for Sparse Linear Systems, algorithm 12.1).
 
         The second step is left to be taken.
         """
         largest = _MARGIN * self._largest
         middle, half = 0.5 * (1.0 + _SMOOTHED_FROM) * largest, 0.5 * (1.0 - _SMOOTHED_FROM) * largest
-        step = self._over_diagonal(left) / middle
+        step = self._over_diagonal(residual) / middle
         go(step)
         sigma = middle / half
         rho = 1.0 / (2.0 * sigma - 1.0 / sigma)
-        return rho / sigma * step + (2.0 * rho / half) * self._over_diagonal(left)
+        return rho / sigma * step + (2.0 * rho / half) * self._over_diagonal(residual)
 
     def _times_matrix(self, x: Floats) -> Floats:
         """`A x`, until the next product."""

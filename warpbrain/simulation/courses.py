@@ -199,10 +199,10 @@ def states_at_rest(case: Case, system: System, end: NodalState, tolerance: float
     for at, number in zip(moments.times, moments.numbers, strict=True):
         if number not in reached:
             model = replace(model_of(moments.cases[number]), elements=system.model.elements)
-            other = System(model, str(system.device), system.precision.name)
-            equilibrium = EquilibriumSolver(other, EquilibriumOptions(tolerance=tolerance)).solve(start=near)
-            other.u.assign(equilibrium.u)
-            reached[number] = nodal_state_of(other)
+            system_then = System(model, str(system.device), system.precision.name)
+            equilibrium = EquilibriumSolver(system_then, EquilibriumOptions(tolerance=tolerance)).solve(start=near)
+            system_then.u.assign(equilibrium.u)
+            reached[number] = nodal_state_of(system_then)
             near = equilibrium.u
         states[at] = reached[number]
     return states

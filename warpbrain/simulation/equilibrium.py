@@ -388,8 +388,8 @@ class EquilibriumSolver:
                 )
             # far from equilibrium the tangent changes too much from step to step
             near = secants is not None and not moving and relative < _NEAR
-            predicted, left = secants.split(u, r) if secants is not None and near else (0.0, r)
-            d, linear, shift, indefinite = self._descent(left, prescribed, moving, min(eta, 0.5), shift)
+            predicted, remaining = secants.split(u, r) if secants is not None and near else (0.0, r)
+            d, linear, shift, indefinite = self._descent(remaining, prescribed, moving, min(eta, 0.5), shift)
             d = d + predicted
             with self.clock.phase("line search"):
                 alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)

@@ -135,9 +135,9 @@ class FactoredSolver:
         load = self._system.load.numpy().astype(np.float64).ravel()
         if self._block is not None:
             return self._block.solve(load, wanted, self._factors, MOST)
-        x, left = np.zeros_like(load), load.copy()
+        x, residual = np.zeros_like(load), load.copy()
         goal = wanted * float(np.linalg.norm(load))
-        result = host_gradients(lambda p: self._K @ p, self._factors.solve, x, left, goal, MOST)
+        result = host_gradients(lambda p: self._K @ p, self._factors.solve, x, residual, goal, MOST)
         self._system.solution.assign(x.reshape(-1, 3))
         return result
 
@@ -207,8 +207,8 @@ class CoupledBlock:
             nonlocal x
             if done >= most:
                 return 0
-            left = b - operator(x)
-            more, taken = _minimal_residual(operator, preconditioner, left, weight, tolerance * length, most - done)
+            residual = b - operator(x)
+            more, taken = _minimal_residual(operator, preconditioner, residual, weight, tolerance * length, most - done)
             x = x + more
             self._system.solution.assign(x[:size].reshape(-1, 3))
             return taken
@@ -235,8 +235,8 @@ def _minimal_residual(
         H[k + 1, k] = np.linalg.norm(v)
         begin = length * np.eye(1, k + 2)[0]
         answer = np.linalg.lstsq(H[: k + 2, : k + 1], begin, rcond=None)[0]
-        left = float(np.linalg.norm(begin - H[: k + 2, : k + 1] @ answer))
-        if not left > goal or H[k + 1, k] == 0.0:
+        residual = float(np.linalg.norm(begin - H[: k + 2, : k + 1] @ answer))
+        if not residual > goal or H[k + 1, k] == 0.0:
             break
         basis.append(v / H[k + 1, k])
     return np.asarray(answer @ np.array(moved)), len(moved)

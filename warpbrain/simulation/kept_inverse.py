@@ -125,10 +125,10 @@ class InvertedSolver(FactoredSolver):
                 self._captured.multiply(p, Ap)
                 return flat_Ap
 
-            left = cupy.asarray(system.load).ravel().copy()
-            x = cupy.zeros_like(left)
-            goal = wanted * float(cupy.linalg.norm(left))
-            result = host_gradients(multiply, self._factors.solve, x, left, goal, MOST)
+            residual = cupy.asarray(system.load).ravel().copy()
+            x = cupy.zeros_like(residual)
+            goal = wanted * float(cupy.linalg.norm(residual))
+            result = host_gradients(multiply, self._factors.solve, x, residual, goal, MOST)
             cupy.asarray(system.solution).ravel()[:] = x
         return result
 

@@ -159,10 +159,10 @@ class Model:
 
         Nothing that is known of the model is found again. `InputError` if a tissue has no material.
         """
-        other: Model = object.__new__(Model)
-        other.__dict__.update(vars(self), materials=all_substituted(materials, self.mechanisms))
-        other._require_materials()
-        return other
+        model: Model = object.__new__(Model)
+        model.__dict__.update(vars(self), materials=all_substituted(materials, self.mechanisms))
+        model._require_materials()
+        return model
 
     def _require_materials(self) -> None:
         missing = sorted(set(self.mesh.labels) - set(self.materials))
@@ -239,8 +239,8 @@ class Model:
 
         A mean over elements of several kinds would hold the wall of a cavity, however little of it is left.
         """
-        left = [mechanism.remaining_part(self.mesh, 1.0) for mechanism in self.emptying]
-        rows = np.stack([self.mesh.tissue.astype(np.float64), *left], axis=1)
+        parts = [mechanism.remaining_part(self.mesh, 1.0) for mechanism in self.emptying]
+        rows = np.stack([self.mesh.tissue.astype(np.float64), *parts], axis=1)
         return np.asarray(np.unique(rows, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
 
     def remaining_share(self, scales: Sequence[float]) -> Floats:

@@ -117,12 +117,12 @@ class MotionSensitivity:
             system.u.assign(u_start if linearised else u_end)
             system.evaluate_tangents()
 
-        def correct(left: Floats) -> Floats:
+        def correct(residual: Floats) -> Floats:
             if system.coupled:
                 # what terms have of their own is in no matrix, and a look beside changes it
                 with stencil.here():
                     stand()
-            return corrections.correct(left)
+            return corrections.correct(residual)
 
         with stencil.here():
             stand()
@@ -130,12 +130,12 @@ class MotionSensitivity:
             inertia = float(np.linalg.norm(_host(system.mass)[:, None] * v_end))
             corrections = Corrections(solver, system, self._tolerance)
         start = np.zeros_like(self.v)
-        left = np.array([left_of(k, dv) for k, dv in enumerate(start)])
+        residual = np.array([left_of(k, dv) for k, dv in enumerate(start)])
         free = ~system.model.constrained
         # differences are exact to the rounding of what is summed over the step of a parameter
         rounding = ROUNDINGS * system.precision.epsilon * (h * system.size_of_forces() + inertia)
-        goals = 2.0 * self._tolerance * lengths(left, free) + rounding / stencil.steps
-        return refine(left_of, correct, start, left, goals, free)[0]
+        goals = 2.0 * self._tolerance * lengths(residual, free) + rounding / stencil.steps
+        return refine(left_of, correct, start, residual, goals, free)[0]
 
 
 def follow(

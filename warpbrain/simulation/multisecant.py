@@ -88,8 +88,8 @@ def toward_equilibrium(
         norms.append(norm)
         if norm <= tolerance * float(np.linalg.norm(internal) + np.linalg.norm(external)):
             break
-        predicted, left = secants.split(u, r)
-        u = u + predicted + inverse(left)
+        predicted, remaining = secants.split(u, r)
+        u = u + predicted + inverse(remaining)
     return best
 
 

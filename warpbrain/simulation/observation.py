@@ -77,16 +77,16 @@ def observe(
 
 
 def _compare(
-    case: Case, recording: Recording, result: State, time: float | None, others: Mapping[float, State]
+    case: Case, recording: Recording, result: State, time: float | None, states: Mapping[float, State]
 ) -> Comparison:
-    groups = _rows_by_time(case, recording, time, others)
-    state_of = partial(_state_at, case, recording, result, time, others)
+    groups = _rows_by_time(case, recording, time, states)
+    state_of = partial(_state_at, case, recording, result, time, states)
     before = None if recording.reference is None else state_of(recording.reference)
     return joined([_compared(case, recording, state_of(at), at, before, rows) for at, rows in groups])
 
 
 def _rows_by_time(
-    case: Case, recording: Recording, time: float | None, others: Mapping[float, State]
+    case: Case, recording: Recording, time: float | None, states: Mapping[float, State]
 ) -> list[tuple[float, Ints]]:
     """Ints of a recording that are compared, by the time of the state that they are compared with."""
     assert isinstance(recording, PointsRecording | SurfaceRecording | ForceRecording)
@@ -94,15 +94,15 @@ def _rows_by_time(
     rows = compared_rows(recording)
     if recording.time is None:
         return [(math.inf, rows_at(recording))]
-    if time is not None and others:
-        rows = rows[np.isin(times[rows], [*others, time])]
+    if time is not None and states:
+        rows = rows[np.isin(times[rows], [*states, time])]
         if not len(rows):
             return [(time, rows_at(recording, time))]
     elif time is not None:
         return [(time, rows_at(recording, time))]
     elif goes_on(case):
         return [(math.inf, rows_at(recording))]
-    elif not others:
+    elif not states:
         moments = Moments.of(case, {*times[rows].tolist(), math.inf})
         last = moments.number(math.inf)
         rows = rows[[moments.number(at) == last for at in times[rows].tolist()]]
@@ -114,11 +114,11 @@ def _rows_by_time(
 
 
 def _state_at(
-    case: Case, recording: Recording, result: State, time: float | None, others: Mapping[float, State], at: float
+    case: Case, recording: Recording, result: State, time: float | None, states: Mapping[float, State], at: float
 ) -> State:
     """The state of a time; `InputError` if it is not known."""
-    if at in others:
-        return others[at]
+    if at in states:
+        return states[at]
     if math.isinf(at) or at == time:
         return result
     if time is None and not goes_on(case):

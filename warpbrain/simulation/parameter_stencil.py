@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -99,8 +101,8 @@ class ParameterStencil:
         """Add the same to what is remembered at every place: `after - before`."""
         for remembered in self._remembered:
             for place in remembered.values():
-                for arrays, left, right in zip(place, before, after, strict=True):
-                    for array, a, b in zip(arrays, left, right, strict=True):
+                for arrays, earlier, right in zip(place, before, after, strict=True):
+                    for array, a, b in zip(arrays, earlier, right, strict=True):
                         array.assign(array.numpy() + (b.numpy() - a.numpy()))
 
     def _go(self, k: int, distance: int) -> tuple[float, Model]:
@@ -135,10 +137,11 @@ class ParameterStencil:
         # the product rule: factors and what is left of the tissue, then the loads themselves, which may know better
         factors = self._of_models(k, lambda model: model.external_forces(time, self.model.unit_forces))
         nodes = self.model.quadratic or self.model.mesh
-        rates = [
-            load.unit_forces_rate(nodes, lambda of, n=n: self._of_models(k, lambda model: of(model.loads[n])))
-            for n, load in enumerate(self.model.loads)
-        ]
+
+        def of_load(number: int, of: Callable[[Any], Floats]) -> Floats:
+            return self._of_models(k, lambda model: of(model.loads[number]))
+
+        rates = [load.unit_forces_rate(nodes, partial(of_load, n)) for n, load in enumerate(self.model.loads)]
         return factors + self.model.external_forces(time, rates)
 
     def by_prescribed(self, k: int) -> Floats:

@@ -52,7 +52,7 @@ def refine(
     left_of: Callable[[int, Floats], Floats],
     correct: Callable[[Floats], Floats],
     solution: Floats,
-    left: Floats,
+    residual: Floats,
     goals: Floats,
     free: Bools,
 ) -> tuple[Floats, Floats]:
@@ -68,27 +68,27 @@ def refine(
     of what may be left on the `free` components (n, 3). Returns the solution, and what is left on every component;
     `SolveError` if the known part of the matrix is too far from the whole.
     """
-    solution, left = solution.copy(), left.copy()
+    solution, residual = solution.copy(), residual.copy()
     tried: list[list[Floats]] = [[] for _ in goals]
     gained: list[list[Floats]] = [[] for _ in goals]
     for _ in range(_MOST):
-        open_ = np.flatnonzero(lengths(left, free) > goals)
+        open_ = np.flatnonzero(lengths(residual, free) > goals)
         if not len(open_):
-            return solution, left
-        wanted = np.zeros_like(left)
-        wanted[open_] = np.where(free, left[open_], 0.0)
+            return solution, residual
+        wanted = np.zeros_like(residual)
+        wanted[open_] = np.where(free, residual[open_], 0.0)
         steps = correct(wanted)
         for k in open_:
             now = left_of(int(k), solution[k] + steps[k])
             tried[k].append(steps[k])
-            gained[k].append(left[k] - now)
-            solution[k], left[k] = solution[k] + steps[k], now
+            gained[k].append(residual[k] - now)
+            solution[k], residual[k] = solution[k] + steps[k], now
             if np.linalg.norm(now[free]) > goals[k]:
-                solution[k], left[k] = _best(solution[k], now, tried[k], gained[k], free)
-    sizes = lengths(left, free)
+                solution[k], residual[k] = _best(solution[k], now, tried[k], gained[k], free)
+    sizes = lengths(residual, free)
     worst = int(np.argmax(sizes / goals))
     if sizes[worst] <= goals[worst]:
-        return solution, left
+        return solution, residual
     raise SolveError(
         f"sensitivity to parameter {worst}: out of balance by {sizes[worst]:.1e} after {_MOST} corrections, goal "
         f"{goals[worst]:.1e}: the tangent that is stored is far from the true one, or what acts is not smooth here"
@@ -96,16 +96,16 @@ def refine(
 
 
 def _best(
-    solution: Floats, left: Floats, tried: list[Floats], gained: list[Floats], free: Bools
+    solution: Floats, residual: Floats, tried: list[Floats], gained: list[Floats], free: Bools
 ) -> tuple[Floats, Floats]:
     """Add the combination of all directions of a right-hand side after which least is left."""
     columns = np.stack([gain[free] for gain in gained], axis=1)
     sizes = np.linalg.norm(columns, axis=0)
     sizes[sizes == 0.0] = 1.0
-    shares = np.linalg.lstsq(columns / sizes, left[free], rcond=1e-12)[0] / sizes
+    shares = np.linalg.lstsq(columns / sizes, residual[free], rcond=1e-12)[0] / sizes
     return (
         solution + np.tensordot(shares, np.array(tried), axes=1),
-        left - np.tensordot(shares, np.array(gained), axes=1),
+        residual - np.tensordot(shares, np.array(gained), axes=1),
     )
 
 
@@ -206,9 +206,9 @@ class SensitivitySolver:
             return Sensitivities(none, none, ())
         corrections = Corrections(self._solver(len(stencil)), system, self._tolerance)
         with stencil.away():
-            moved, left = self._balance(stencil, state, corrections)
+            moved, residual = self._balance(stencil, state, corrections)
         constrained = system.model.constrained
-        return Sensitivities(moved, np.where(constrained, -left, 0.0), corrections.cg_iterations)
+        return Sensitivities(moved, np.where(constrained, -residual, 0.0), corrections.cg_iterations)
 
     def _balance(self, stencil: ParameterStencil, state: Floats, corrections: Corrections) -> tuple[Floats, Floats]:
         """Derivatives of the displacement, and what is out of balance then on every component."""
@@ -224,21 +224,21 @@ class SensitivitySolver:
 
             return loaded[k] - stencil.derivative(k, internal)
 
-        left = np.array([left_of(k, moved) for k, moved in enumerate(start)])
+        residual = np.array([left_of(k, moved) for k, moved in enumerate(start)])
         # differences are exact to the rounding of forces over the step
         noise = ROUNDINGS * system.precision.epsilon * system.size_of_forces() / stencil.steps
-        goals = 2.0 * self._tolerance * lengths(left, free) + noise
+        goals = 2.0 * self._tolerance * lengths(residual, free) + noise
         # a skull's distance has fewer digits than forces have
-        met = 2.0 * goals + _MET * lengths(left, free)
+        met = 2.0 * goals + _MET * lengths(residual, free)
         moved = start
         for _ in range(_AUGMENTATIONS):
-            moved, left = refine(left_of, corrections.correct, moved, left, goals, free)
+            moved, residual = refine(left_of, corrections.correct, moved, residual, goals, free)
             if not stencil.remembers:
-                return moved, left
+                return moved, residual
             self._meet_constraints(stencil, state, moved)
-            left = np.array([left_of(k, along) for k, along in enumerate(moved)])
-            if np.all(lengths(left, free) <= met):
-                return moved, left
+            residual = np.array([left_of(k, along) for k, along in enumerate(moved)])
+            if np.all(lengths(residual, free) <= met):
+                return moved, residual
         raise SolveError(f"sensitivities: contacts are not met after {_AUGMENTATIONS} augmentations")
 
     def _meet_constraints(self, stencil: ParameterStencil, state: Floats, moved: Floats) -> None:
@@ -275,9 +275,9 @@ class Corrections:
         self.cg_iterations: tuple[int, ...] = ()
         solver.prepare()
 
-    def correct(self, left: Floats) -> Floats:
+    def correct(self, residual: Floats) -> Floats:
         """Solve for p right-hand sides (p, n, 3); zero on constrained components."""
-        solved = self._solver.solve(list(left), self._tolerance if self._first else self._rough)
+        solved = self._solver.solve(list(residual), self._tolerance if self._first else self._rough)
         results = self._solver.results()
         for k, linear in enumerate(results):
             _require_solved(linear, k)

@@ -350,9 +350,9 @@ def imposed_values(imposed: Floats, rest: float, steps: int) -> tuple[Floats, Fl
     The distance to the farther extreme is divided by `steps`; the way to the nearer one has steps no longer than that.
     """
     ends = np.array([min(float(imposed.min()), rest), max(float(imposed.max()), rest)])
-    ways = np.abs(ends - rest)
+    distances = np.abs(ends - rest)
     # a side as long as the other by all but rounding takes no step more
-    counts = np.ceil(steps * ways / max(float(ways.max()), np.finfo(float).tiny) - 1e-9).astype(int)
+    counts = np.ceil(steps * distances / max(float(distances.max()), np.finfo(float).tiny) - 1e-9).astype(int)
     below, above = (rest + (end - rest) * np.arange(1, n + 1) / n for end, n in zip(ends, counts, strict=True))
     return below, above
 

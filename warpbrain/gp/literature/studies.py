@@ -234,12 +234,12 @@ class _Entry:
             if not isinstance(table, dict):
                 self.problem(side, f"found {short(table)}, expected a table of the parameters on that side")
                 return None
-        given = list(dict.fromkeys([*common, *(key for table in tables.values() for key in table)]))
+        keys = list(dict.fromkeys([*common, *(key for table in tables.values() for key in table)]))
         known = FORMS[form].conventions
         if named and named not in known:
             self.problem("convention", f"found '{named}', not one of form '{form}'", nearest(named, known))
             return None
-        convention = named or FORMS[form].convention_of(given)
+        convention = named or FORMS[form].convention_of(keys)
         if not tables:
             both = self._parameters(form, known[convention], "", common)
             return None if both is None else (convention, both, both)
@@ -283,7 +283,9 @@ class _Entry:
         return convention.convert(**numbers)
 
     def _meant(self, form: str, name: str, keys: dict[str, Any], side: str) -> str:
-        owners = [other for other in FORMS if name in {n for c in FORMS[other].conventions.values() for n in c.names}]
+        owners = [
+            form_of for form_of in FORMS if name in {n for c in FORMS[form_of].conventions.values() for n in c.names}
+        ]
         near = nearest(name, [*keys, *(() if side else _KEYS)])
         if near.startswith("did"):
             return near
