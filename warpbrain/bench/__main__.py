@@ -33,7 +33,8 @@ def main() -> int:
     """Parse, measure, print; returns the exit status."""
     if sys.argv[1:2] and sys.argv[1] in _COMMANDS:
         # what only one of them needs is loaded for it alone
-        return int(import_module(f"warpbrain.bench.{_COMMANDS[sys.argv[1]]}").main(sys.argv[2:]))
+        module = import_module(f"warpbrain.bench.{_COMMANDS[sys.argv[1]]}")
+        return command.run(sys.argv[1], module.DESCRIPTION, module.OPTIONS, module.bench, sys.argv[2:])
     return command.run("", _DESCRIPTION, _OPTIONS, _bench, sys.argv[1:])
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,23 +35,17 @@ STEPS = 20
 REPEATS = 3
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Parse, measure, print; returns the exit status."""
-    description = "Times batches of the coarse single-tissue phantom, 20 steps from rest, over their size."
-    options: dict[str, command.Options] = {
-        "--device": command.DEVICE,
-        "--batches": {
-            "metavar": "B,...", "help": "sizes (default: 1,2,4,8 on a CPU, 1,4,16,32,64,128,256,512 on a GPU)"
-        },
-        "--precision": command.PRECISION,
-        "--processes": {"metavar": "P,...", "help": "on a CPU: also the rate of so many processes, as 1,2"},
-        "--samples": {"type": int, "default": 48, "help": "samples that the processes compute (default: 48)"},
-        "--sweep": {
-            "choices": ("single", "multi"), "help": "also the paper's sweep to rest, 17 samples or 289 pairs"
-        },
-        "--json": command.JSON,
-    }  # fmt: skip
-    return command.run("ensemble", description, options, _bench, arguments)
+#: Of the command line.
+DESCRIPTION = "Times batches of the coarse single-tissue phantom, 20 steps from rest, over their size."
+OPTIONS: dict[str, command.Options] = {
+    "--device": command.DEVICE,
+    "--batches": {"metavar": "B,...", "help": "sizes (default: 1,2,4,8 on a CPU, 1,4,16,32,64,128,256,512 on a GPU)"},
+    "--precision": command.PRECISION,
+    "--processes": {"metavar": "P,...", "help": "on a CPU: also the rate of so many processes, as 1,2"},
+    "--samples": {"type": int, "default": 48, "help": "samples that the processes compute (default: 48)"},
+    "--sweep": {"choices": ("single", "multi"), "help": "also the paper's sweep to rest, 17 samples or 289 pairs"},
+    "--json": command.JSON,
+}
 
 
 def _sizes(name: str, text: str) -> list[int]:
@@ -62,7 +56,8 @@ def _sizes(name: str, text: str) -> list[int]:
     return [int(number) for number in numbers]
 
 
-def _bench(options: argparse.Namespace) -> None:
+def bench(options: argparse.Namespace) -> None:
+    """Measure and print."""
     batches = None if options.batches is None else _sizes("batches", options.batches)
     processes = [] if options.processes is None else _sizes("processes", options.processes)
     versions, device = command.start(options), find_device(options.device)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import platform
 import time
-from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
@@ -17,30 +16,22 @@ from warpbrain.estimation.options import Listener
 from warpbrain.simulation.system import find_device
 from warpbrain.terminal.progress import Progress
 
-
-def main(arguments: Sequence[str]) -> int:
-    """Parse, measure, print; returns the exit status."""
-    description = (
-        "Times each stage of a diagnosis with every mechanism: of 0529 with 289 points, if no other case is named. The "
-        "first run also loads kernels and makes what is kept of the mesh."
-    )
-    options: dict[str, command.Options] = {
-        "--device": command.DEVICE,
-        "--case": {
-            "default": "0529", "metavar": "NAME", "help": "0529, ... or the path of a case folder (default: 0529)"
-        },
-        "--tissue": {
-            "choices": ("single", "multi"), "default": "multi", "help": "one tissue, or grey and white (default)"
-        },
-        "--runs": {"type": int, "default": 2, "help": "one after the other (default: 2)"},
-        "--out": {
-            "type": Path, "metavar": "DIR", "help": "folder for a file with every run, diagnose_DEVICE_DATE.json"
-        },
-    }  # fmt: skip
-    return command.run("diagnose", description, options, _bench, arguments)
+#: Of the command line.
+DESCRIPTION = (
+    "Times each stage of a diagnosis with every mechanism: of 0529 with 289 points, if no other case is named. The "
+    "first run also loads kernels and makes what is kept of the mesh."
+)
+OPTIONS: dict[str, command.Options] = {
+    "--device": command.DEVICE,
+    "--case": {"default": "0529", "metavar": "NAME", "help": "0529, ... or the path of a case folder (default: 0529)"},
+    "--tissue": {"choices": ("single", "multi"), "default": "multi", "help": "one tissue, or grey and white (default)"},
+    "--runs": {"type": int, "default": 2, "help": "one after the other (default: 2)"},
+    "--out": {"type": Path, "metavar": "DIR", "help": "folder for a file with every run, diagnose_DEVICE_DATE.json"},
+}
 
 
-def _bench(options: argparse.Namespace) -> None:
+def bench(options: argparse.Namespace) -> None:
+    """Measure and print."""
     versions, device, today = command.start(options), find_device(options.device), date.today().isoformat()
     case = find_case(options.case, options.tissue)
     progress = Progress("bench")

@@ -44,26 +44,27 @@ def ratio(samples: Mapping[str, Sequence[float]]) -> float:
     return median(b / a for a, b in zip(samples["plain"], samples["with"], strict=True))
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Parse, measure, print; returns the exit status."""
-    description = (
-        "Times a step and an iteration of Newton's method with each mechanism's example on the phantom under a light "
-        "load, in turns with the plain model; the plain model beside itself says how exact that is."
-    )
-    options: dict[str, command.Options] = {
-        "--device": command.DEVICE,
-        "--kinds": {"metavar": "KIND,...", "help": "mechanisms (default: all)"},
-        "--steps": {"type": int, "default": 100, "help": "time steps of each (default: 100)"},
-        "--equilibria": {"type": int, "default": 7, "help": "equilibria of each (default: 7)"},
-        "--precision": command.PRECISION,
-        "--out": {
-            "type": Path, "metavar": "DIR", "help": "folder for a file with every sample, mechanisms_DEVICE_DATE.json"
-        },
-    }  # fmt: skip
-    return command.run("mechanisms", description, options, _bench, arguments)
+#: Of the command line.
+DESCRIPTION = (
+    "Times a step and an iteration of Newton's method with each mechanism's example on the phantom under a light "
+    "load, in turns with the plain model; the plain model beside itself says how exact that is."
+)
+OPTIONS: dict[str, command.Options] = {
+    "--device": command.DEVICE,
+    "--kinds": {"metavar": "KIND,...", "help": "mechanisms (default: all)"},
+    "--steps": {"type": int, "default": 100, "help": "time steps of each (default: 100)"},
+    "--equilibria": {"type": int, "default": 7, "help": "equilibria of each (default: 7)"},
+    "--precision": command.PRECISION,
+    "--out": {
+        "type": Path,
+        "metavar": "DIR",
+        "help": "folder for a file with every sample, mechanisms_DEVICE_DATE.json",
+    },
+}
 
 
-def _bench(options: argparse.Namespace) -> None:
+def bench(options: argparse.Namespace) -> None:
+    """Measure and print."""
     known = mechanisms()
     kinds = command.chosen("--kinds", options.kinds, list(known))
     versions, device, today = command.start(options), find_device(options.device), date.today().isoformat()

@@ -28,28 +28,21 @@ COUNTS = (1, 2, 4, 8, 16)
 STEPS, TURNS = 20, 5
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Parse, measure, print; returns the exit status."""
-    description = (
-        "Times a step of the phantom's meshes and the equilibrium of 0529 on the CPU by the number of threads, in "
-        "turns; the answers must be the same to the bit."
-    )
-    options: dict[str, command.Options] = {
-        "--row": {
-            "default": "mt/fine", "metavar": "ROW", "help": "st/coarse, st/fine, mt/coarse or mt/fine (default)"
-        },
-        "--counts": {
-            "metavar": "N,...", "help": "threads (default: 1, 2, 4, 8, 16, as there are processors)"
-        },
-        "--turns": {
-            "type": int, "default": TURNS, "help": f"of {STEPS} steps and an equilibrium each (default: {TURNS})"
-        },
-        "--json": command.JSON,
-    }  # fmt: skip
-    return command.run("threads", description, options, _bench, arguments)
+#: Of the command line.
+DESCRIPTION = (
+    "Times a step of the phantom's meshes and the equilibrium of 0529 on the CPU by the number of threads, in "
+    "turns; the answers must be the same to the bit."
+)
+OPTIONS: dict[str, command.Options] = {
+    "--row": {"default": "mt/fine", "metavar": "ROW", "help": "st/coarse, st/fine, mt/coarse or mt/fine (default)"},
+    "--counts": {"metavar": "N,...", "help": "threads (default: 1, 2, 4, 8, 16, as there are processors)"},
+    "--turns": {"type": int, "default": TURNS, "help": f"of {STEPS} steps and an equilibrium each (default: {TURNS})"},
+    "--json": command.JSON,
+}
 
 
-def _bench(options: argparse.Namespace) -> None:
+def bench(options: argparse.Namespace) -> None:
+    """Measure and print."""
     if options.row not in TABLE3:
         raise InputError(f"--row {options.row}: expected one of {', '.join(TABLE3)}")
     listed = options.counts

@@ -150,14 +150,8 @@ class HierarchicalCandidate:
         moduli = [log_secant_modulus(l, study.energy(l)) for study, l in zip(studies, stretches, strict=True)]
         level = np.mean([of_study.mean() for of_study in moduli])
         weights = np.concatenate([np.full(len(of_study), 1.0 / len(of_study) / len(moduli)) for of_study in moduli])
-        return float(
-            np.mean(
-                [
-                    ndtr((level - weights @ mean) / np.sqrt(weights @ covariance @ weights))
-                    for mean, covariance in self.model.moduli_of(studies, stretches)
-                ]
-            )
-        )
+        each = ((weights @ m, np.sqrt(weights @ c @ weights)) for m, c in self.model.moduli_of(studies, stretches))
+        return float(np.mean([ndtr((level - mean) / spread) for mean, spread in each]))
 
 
 def candidates() -> tuple[Candidate, ...]:

@@ -9,9 +9,9 @@ How far studies and papers differ is itself known from few: predictions are aver
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -93,6 +93,7 @@ class Hierarchical:
     variant: str = "corrected"
     sample: tuple[Hierarchy, ...] = ()
     name = "hierarchical"
+    _structures_of: dict[tuple[Any, ...], Structures] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -173,10 +174,6 @@ class Hierarchical:
             others = None if other is at else self.places(groups, other)
             self._structures_of[key] = self._structures(self.places(groups, at), others)
         return self._structures_of[key]
-
-    @cached_property
-    def _structures_of(self) -> dict[tuple[tuple[str, ...], bytes, bytes], Structures]:
-        return {}
 
     @cached_property
     def _draws(self) -> tuple[Draws, ...]:

@@ -176,12 +176,8 @@ def write_scores(path: Path, scores: Sequence[Score], held: Sequence[str]) -> No
 def read_scores(path: Path, held: Sequence[str]) -> list[Score]:
     """Scores of a file that an interrupted comparison left; none if there is no file.
 
-    Files written before levels were scored have none, nor have their scores.
-
-    Raises
-    ------
-    InputError
-        If it is not such a file, or is of other studies.
+    Files written before levels were scored have none, nor have their scores. `InputError` if it is not such a file, or
+    is of other studies.
     """
     if not path.exists():
         return []

@@ -6,8 +6,6 @@ A draw is drawn at anchors; elsewhere it is what follows from its values there.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -64,11 +62,14 @@ def standard_normal(size: int, number: int | tuple[int, ...], seed: int) -> Floa
     return np.random.default_rng([seed, *parts]).standard_normal(size)
 
 
-@dataclass(frozen=True, eq=False)
 class Draws:
     """Draws of a normal distribution over curves, at anchors (a,) of stretch, with what many draws share."""
 
-    anchors: Floats
+    def __init__(self, anchors: Floats) -> None:
+        self.anchors = anchors
+        self._factors: dict[tuple[str, ...], Floats] = {}
+        # of the last stretches alone: many draws are at the same ones
+        self._last: dict[tuple[tuple[str, ...], bytes], tuple[Floats, Floats]] = {}
 
     def at(self, groups: tuple[str, ...], stretches: Floats, normal: Floats, moments: Moments) -> Floats:
         """The draw (groups, n) of independent standard normal numbers (groups * a,), always of the same moments.
@@ -89,12 +90,3 @@ class Draws:
         mean, cross = self._last[key]
         weights = solve_triangular(self._factors[groups], normal, lower=True, trans="T")
         return np.asarray((mean + cross @ weights).reshape(len(groups), -1))
-
-    @cached_property
-    def _factors(self) -> dict[tuple[str, ...], Floats]:
-        return {}
-
-    @cached_property
-    def _last(self) -> dict[tuple[tuple[str, ...], bytes], tuple[Floats, Floats]]:
-        """Of the last stretches alone: many draws are at the same ones."""
-        return {}

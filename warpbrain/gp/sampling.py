@@ -59,12 +59,8 @@ def usual_stretches(group: str) -> Floats:
 def law_of_curve(model: Process, group: str, k: float = 0.0, law: str = "neo-hookean") -> Fit:
     """The law of the curve `k` standard deviations from the mean, as the paper samples.
 
-    Nothing is redrawn here: `warpbrain.gp.metamodels.unstable` says what the law is worth.
-
-    Raises
-    ------
-    InputError
-        If the model has seen no study of the group, or there is no such law.
+    Nothing is redrawn here: `warpbrain.gp.metamodels.unstable` says what the law is worth. `InputError` if the model
+    has seen no study of the group, or there is no such law.
 
     Examples
     --------

@@ -67,21 +67,19 @@ def build_pattern(stencils: Sequence[NDArray[np.integer]], count: int) -> Patter
     corners = np.argsort(all_nodes, kind="stable")
     corner_first = np.searchsorted(all_nodes[corners], np.arange(count + 1))
 
-    def ints(values: NDArray[np.integer]) -> NDArray[np.int32]:
-        return np.ascontiguousarray(values, dtype=np.int32)
-
-    return Pattern(
-        offsets=ints(offsets),
-        columns=ints(columns[order]),
-        diagonal=ints(positions[i == j, 0]),
-        block_pairs=ints(block_pairs),
-        pairs=ints(np.stack([i, j], axis=1)),
-        positions=ints(positions),
-        first=ints(np.r_[first, len(key)]),
-        contributions=ints(contributions),
-        corner_first=ints(corner_first),
-        corners=ints(corners),
-    )
+    lists = {
+        "offsets": offsets,
+        "columns": columns[order],
+        "diagonal": positions[i == j, 0],
+        "block_pairs": block_pairs,
+        "pairs": np.stack([i, j], axis=1),
+        "positions": positions,
+        "first": np.r_[first, len(key)],
+        "contributions": contributions,
+        "corner_first": corner_first,
+        "corners": corners,
+    }
+    return Pattern(**{name: np.ascontiguousarray(values, dtype=np.int32) for name, values in lists.items()})
 
 
 #: Of each kind of thing made of arrays, how many are kept: patterns of a finer mesh take a tenth of a gigabyte.

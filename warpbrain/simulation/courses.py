@@ -27,10 +27,7 @@ SLOW_STEPS = 20
 class Course:
     """How far a case is followed, and how closely. Of the first three at most one, but `steps` may go with `until`.
 
-    Raises
-    ------
-    InputError
-        If they mean nothing together, or a number makes no sense.
+    `InputError` if they mean nothing together, or a number makes no sense.
     """
 
     #: follow the motion for so many time steps of 1 ms; of slow change into how many it is divided

@@ -91,16 +91,8 @@ def prolongation(ends: NDArray[np.integer], count: int) -> Any:
 
 
 def free_prolongation(prolong: Any, free: Bools, constrained: Bools) -> Any:
-    """From free components of a mesh to all of the finer one: SciPy CSR (3 n', k), zero where these are constrained.
-
-    Parameters
-    ----------
-    prolong : SciPy sparse matrix (n', n)
-        See `prolongation`.
-    free : (3 n,) bool array
-        Components of the mesh.
-    constrained : (n', 3) bool array
-        Those of the finer one.
+    """From free components (3 n,) of a mesh to all of the finer one: SciPy CSR (3 n', k), zero where these (n', 3) are
+    constrained; for `prolong` see `prolongation`.
     """
     from scipy.sparse import diags_array, eye_array, kron
 

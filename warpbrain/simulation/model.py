@@ -131,7 +131,11 @@ class Model:
     def __post_init__(self) -> None:
         if self.elements not in ELEMENTS:
             raise InputError(f"elements = {self.elements!r}: expected one of {', '.join(ELEMENTS)}")
-        self._require_quadratic()
+        for name in unaware_of_midsides(self) if self.elements in QUADRATIC else ():
+            raise InputError(
+                f"{name}: cannot act on elements '{self.elements}', whose midside nodes it does not know: expected "
+                "tet4 or tet4-averaged"
+            )
         acting = [each for each in (*self.mechanisms, *self.loads) if isinstance(each, Mechanism)]
         require_composable(acting, self.mesh)
         shape = self.node_mesh.points.shape
@@ -168,16 +172,6 @@ class Model:
         missing = sorted(set(self.mesh.labels) - set(self.materials))
         if missing:
             raise InputError(f"materials: no material for tissue {', '.join(map(str, missing))} of the mesh")
-
-    def _require_quadratic(self) -> None:
-        """Raise `InputError` if something acts that knows nothing of the midside nodes that the elements have."""
-        if self.elements not in QUADRATIC:
-            return
-        for name in unaware_of_midsides(self):
-            raise InputError(
-                f"{name}: cannot act on elements '{self.elements}', whose midside nodes it does not know: expected "
-                "tet4 or tet4-averaged"
-            )
 
     @cached_property
     def quadratic(self) -> QuadraticMesh | None:
@@ -317,13 +311,7 @@ def with_mechanisms(model: Model, mechanisms: Sequence[Mechanism]) -> Model:
 
     Those that are loads go to the loads, those that say another law or compressibility change the materials, in their
     order, and all others act in the system. With other numbers of the same mechanisms (`with_numbers`) the model is one
-    that `System.set_model` takes.
-
-    Parameters
-    ----------
-    model : Model
-        If tissue is removed, of what is left.
-    mechanisms : sequence of Mechanism
+    that `System.set_model` takes. If tissue is removed, it is of what is left.
     """
     loads = [m for m in mechanisms if isinstance(m, Load)]
     materials = all_substituted(model.materials, mechanisms)

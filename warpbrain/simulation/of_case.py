@@ -18,19 +18,10 @@ def model_of(case: Case) -> Model:
 
 
 def plain_model_of(case: Case) -> Model:
-    """The model of a case without the mechanisms that it assumes; see `warpbrain.simulation.model`.
+    """The model of a case without the mechanisms that it assumes, of the tissue that is left: a resection is done here.
 
-    Returns
-    -------
-    Model
-        Of the tissue that is left: a resection is done here. `Case.remaining` says which node of the whole mesh each of
-        its nodes is.
-
-    Raises
-    ------
-    InputError
-        If the case assumes what cannot be simulated; of a specimen, which `warpbrain.simulation.specimen` simulates
-        test by test.
+    `Case.remaining` says which node of the whole mesh each of its nodes is. `InputError` if the case assumes what
+    cannot be simulated; of a specimen, which `warpbrain.simulation.specimen` simulates test by test.
     """
     require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
     if case.specimen is not None:

@@ -39,13 +39,7 @@ from warpbrain.simulation.model import Material, Model
 
 
 def find_device(name: str | None) -> wp.Device:
-    """The Warp device of a name (``"cpu"``, ``"cuda:0"``; None for the default one).
-
-    Raises
-    ------
-    InputError
-        If there is no such device; the message lists those there are.
-    """
+    """The Warp device of a name (``"cpu"``, ``"cuda:0"``; None for the default one); `InputError` if there is none."""
     try:
         return wp.get_device(name)
     except Exception as error:  # Warp raises RuntimeError or ValueError, by version and cause
@@ -265,18 +259,7 @@ class System:
         return parameters
 
     def set_materials(self, materials: Mapping[int, Material]) -> None:
-        """Other parameters of the laws, as by `set_model`.
-
-        Parameters
-        ----------
-        materials : mapping of int to Material
-            By tissue label.
-
-        Raises
-        ------
-        InputError
-            As from `set_model`, and if a tissue has no material.
-        """
+        """Other parameters of the laws by tissue label, as by `set_model`; `InputError` if a tissue has no material."""
         self.set_model(replace(self.model, materials=dict(materials)))
 
     def set_model(self, model: Model, made: dict[int, Term] | None = None) -> None:
