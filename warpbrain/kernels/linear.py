@@ -232,30 +232,16 @@ class LinearSolver(Protocol):
 
 
 class ConjugateGradient(abc.ABC):
-    """Preconditioned CG for one symmetric matrix whose pattern does not change; nothing is allocated in a solve.
+    """Preconditioned CG for one symmetric matrix of 3 x 3 blocks whose pattern does not change, the diagonal ones at
+    the places `diagonal` (n,) in ``matrix.values``; nothing is allocated in a solve.
 
-    Parameters
-    ----------
-    matrix : warp.sparse.BsrMatrix
-        Symmetric, 3 x 3 blocks, every diagonal block present.
-    diagonal : wp.array of int, shape (n,)
-        Position of each diagonal block in ``matrix.values``.
-    right_hand_side, solution : wp.array of vec3, shape (n,)
-        `b`, and `x`: the first guess and the result.
-    precision : Precision
-    tolerance : float
-        Relative: CG ends when ``|b - A x| <= tolerance |b|``. What `solve` takes if it is given no other.
-    max_iterations : int
-    preconditioner : str
-        One of `PRECONDITIONERS`.
-    watch_curvature : bool
-        Track the smallest curvature of the search directions, to tell an indefinite matrix.
-    beyond : callable, optional
-        ``beyond(x, factor, y)`` adds to `y` a factor times the product of `x` with what belongs to `A` and is in no
-        block, whose diagonal blocks are in the matrix (and are taken off again there).
-    nodes : pair of (n, 3) array and wp.array of vec3, shape (n,), optional
-        Where the rows are [m], and 1 for free components, 0 for constrained ones: on the CPU block-Jacobi has a coarse
-        space then, if the matrix is large. `solve` cannot be captured in a graph then.
+    `solution` (n,) of vec3 is the first guess and the result. CG ends when ``|b - A x| <= tolerance |b|``, with a
+    `preconditioner` of `PRECONDITIONERS`; with `watch_curvature` it tracks the smallest curvature of the search
+    directions, to tell an indefinite matrix. ``beyond(x, factor, y)`` adds to `y` a factor times the product of `x`
+    with what belongs to `A` and is in no block, whose diagonal blocks are in the matrix (and are taken off there).
+
+    `nodes` are where the rows are [m], (n, 3), and 1 for free components, 0 for constrained ones, (n,) of vec3: on the
+    CPU block-Jacobi has a coarse space then, if the matrix is large, and `solve` cannot be captured in a graph.
     """
 
     def __init__(

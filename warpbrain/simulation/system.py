@@ -536,7 +536,7 @@ class System:
     ) -> LinearSolver:
         """A solver for ``matrix solution = load``; all are chosen here.
 
-        - Conjugate gradients in a captured loop (`warpbrain.kernels.linear`) for one system after the other.
+        - Conjugate gradients (`warpbrain.kernels.linear.conjugate_gradient`) for one system after the other.
         - MINRES (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is indefinite.
         - With what is kept from state to state (`kept_for`), which needs all of the matrix, the gradients of
           `warpbrain.simulation.factored`, or on a GPU in double precision of `warpbrain.simulation.kept_inverse`: a
