@@ -80,6 +80,10 @@ class Cluster(AbstractContextManager["Cluster"]):
         import distributed
 
         pending: dict[str, Job] = {}
+        # samples of parts that workers died of: a part that only waited at such a worker counts as one of them, so each
+        # of these samples is computed again with nothing beside it
+        suspects: list[int] = []
+        alone = False
 
         def submit(part: Job) -> Any:
             future = self._client.submit(compute_part, part, self._device, self._batch, self._prepare, pure=False)
@@ -94,14 +98,17 @@ class Cluster(AbstractContextManager["Cluster"]):
                 yield future.result()
             except distributed.KilledWorker as error:
                 numbers = [sample.number for sample in part.samples]
-                if len(numbers) > 1:
-                    ending.update([submit(part.part({number})) for number in numbers])
+                if not alone:
+                    suspects += numbers
                 else:
                     count, last = error.allowed_failures + 1, error.last_worker.address
                     reason = f"{count} workers died while they computed it, the last one {last}"
                     yield [failure(numbers[0], f"{reason}: out of memory? Their logs say more")]
             # it is written: the scheduler may forget it
             future.release()
+            if not pending and suspects:
+                alone = True
+                ending.add(submit(job.part({suspects.pop(0)})))
 
 
 def _connect(stack: ExitStack, address: str, workers: int | None) -> Any:

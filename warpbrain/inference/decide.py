@@ -118,7 +118,7 @@ def _not_physics(decision: Decision, truth: Truth, losses: Mapping[str, float]) 
     if truth.physical:
         return losses["not physics for physics"]
     if not truth.not_physics:
-        return losses["name where nothing is"]
+        return losses["not physics where nothing is"]
     return losses["name left out"] * (decision.causes[0] not in truth.not_physics)
 
 
