@@ -105,8 +105,7 @@ def _make(given: argparse.Namespace) -> int:
     count = SETS[given.which] if given.count is None else given.count
     if count < 1 or given.workers < 1:
         raise InputError("--count and --workers: expected 1 or more")
-    make_set(given.which, count, given.out, geometries, given.workers, given.seed)
-    return 0
+    return int(bool(make_set(given.which, count, given.out, geometries, given.workers, given.seed)))
 
 
 def _run(given: argparse.Namespace) -> int:

@@ -28,7 +28,7 @@ from warpbrain.terminal.quiet import start_warp_quietly
 #: Rooms of a set.
 CASES, LABELS = "cases", "labels"
 #: Draws of a case at most.
-ATTEMPTS = 30
+ATTEMPTS = 12
 #: Draws of which each effect must stand out by as much as is wanted at least.
 STRICT = 4
 #: Processor time for one draw at most [s], after which it is given up.
@@ -57,27 +57,28 @@ def make_set(which: str, count: int, out: Path, geometries: Sequence[str], worke
     Returns
     -------
     list of str
-        One line for each case, also for those of which no truth was found.
+        Why a case was not made, for each of which no truth was found.
     """
     number = seed_of(f"{which} {seed}")
     plans = planned(which, count, geometries, number)
     names = [f"{which[:3]}-{k + 1:03d}" for k in range(count)]
     missing = [k for k, name in enumerate(names) if not (out / LABELS / f"{name}.json.gz").exists()]
     missing.sort(key=lambda k: -_work(plans[k]))
-    lines = []
+    not_made = []
     # a fresh process knows nothing of the threads of this one
     with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"), initializer=single) as pool:
         jobs = [pool.submit(make_case, out, names[k], plans[k], [number, k]) for k in missing]
-        for job in as_completed(jobs):
+        for ended, job in enumerate(as_completed(jobs), 1):
             try:
-                lines.append(job.result())
+                outcome = job.result()
             except NoTruth as reason:
                 # one case without a truth must not cost those that are still being made
-                lines.append(f"NOT MADE: {reason}")
-            print(f"{len(lines)} of {len(missing)}: {lines[-1]}", flush=True)
+                outcome = f"not made: {reason}"
+                not_made.append(str(reason))
+            print(f"{ended} of {len(missing)}: {outcome}", flush=True)
     write_commitments(out / LABELS)
     shutil.copy(out / LABELS / "commitments.txt", out / "commitments.txt")
-    return lines
+    return not_made
 
 
 def _work(plan: Planned) -> float:

@@ -51,18 +51,18 @@ def score_all(
     folders: dict[str, Path] = {}
     analyses: dict[str, Analysis] = {}
     for number, each in enumerate(sets, 1):
-        before = f"{number}/" if len(sets) > 1 else ""
+        prefix = f"{number}/" if len(sets) > 1 else ""
         of_set: Mapping[str, Mapping[str, Any]] = open_labels(each.labels, each.commitments)
-        known = read_analyses(analysed / before, of_set) if analysed else {}
+        known = read_analyses(analysed / prefix, of_set) if analysed else {}
         of_set = {name: with_conditionals(label, known.get(name)) for name, label in of_set.items()}
         diagnosed, silent = read_outcomes(of_set, each.diagnoses)
         if not diagnosed:
             raise InputError(f"{each.diagnoses}: no diagnosis of any case")
-        opened |= {before + name: label for name, label in of_set.items()}
-        analyses |= {before + name: analysis for name, analysis in known.items()}
-        folders |= {before + o.name: each.cases / o.name for o in diagnosed}
-        outcomes += [replace(o, name=before + o.name) for o in diagnosed]
-        missing += [before + name for name in silent]
+        opened |= {prefix + name: label for name, label in of_set.items()}
+        analyses |= {prefix + name: analysis for name, analysis in known.items()}
+        folders |= {prefix + o.name: each.cases / o.name for o in diagnosed}
+        outcomes += [replace(o, name=prefix + o.name) for o in diagnosed]
+        missing += [prefix + name for name in silent]
     found, calibrated, measured = shares(outcomes), calibration(outcomes), amounts(outcomes)
     confused = confusion(outcomes)
     baselines = {}

@@ -72,11 +72,29 @@ def test_nothing_costs_less_than_the_truth(causes):
     assert all(loss(right, truth, LOSSES) <= loss(other, truth, LOSSES) for other in every)
 
 
+@pytest.mark.parametrize(
+    ("said", "causes"),
+    [
+        (Decision(NOTHING), ("traction",)),
+        (Decision(UNKNOWN), ("traction",)),
+        (Decision(NAMED, ("swelling",)), ("traction",)),
+        (Decision(GROUP, ("swelling", "gravity")), ("traction",)),
+        (Decision(NOT_PHYSICS, ("mesh",)), ("traction",)),
+        (Decision(NOT_PHYSICS, ("mesh",)), ()),
+        (Decision(NAMED, ("swelling",)), ()),
+        (Decision(UNKNOWN), ()),
+    ],
+)
+def test_to_say_what_is_false_costs_more_than_silence(said, causes):
+    truth = Truth.of(hypothesis(*causes))
+    assert loss(said, truth, LOSSES) > loss(Decision(CANNOT_SAY), truth, LOSSES)
+
+
 def test_a_name_needs_the_probability_that_its_losses_say():
     least = 1.0 - LOSSES["cannot say"] / LOSSES["false name"]
     others = tuple(((f"cause {k}",), 0.0) for k in range(3))
     # a little more than that: a group of two costs less than a name that is as good as any
-    for chance, named in ((least + 0.1, True), (least - 0.05, False)):
+    for chance, named in ((0.5 * (1.0 + least), True), (least - 0.05, False)):
         rest = (1.0 - chance) / len(others)
         spread = tuple((causes, rest) for causes, _ in others)
         assert (verdict((("traction",), chance), *spread).verdict == NAMED) == named

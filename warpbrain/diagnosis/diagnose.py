@@ -168,23 +168,23 @@ class Diagnosing:
             unknown=unknown,
         )
 
-    def _checked(self, search: HypothesisSearch, confirming: Confirming, significant: Decision) -> _Checked:
-        """The verdict after its further checks, and the set that it is about."""
+    def _checked(self, search: HypothesisSearch, confirming: Confirming, claimed: Decision) -> _Checked:
+        """A significant verdict after its other checks, and the set that it is about."""
         nothing, alpha = search.nothing, self.options.alpha
-        if significant.verdict not in (NAMED, NAMED_AND_REST):
-            return _Checked(significant, (), nothing, (), None)
-        best = search.fitted_with(frozenset(significant.causes))
+        if claimed.verdict not in (NAMED, NAMED_AND_REST):
+            return _Checked(claimed, (), nothing, (), None)
+        best = search.fitted_with(frozenset(claimed.causes))
         if best is None:
-            return _not_fitted(search, significant.causes)
+            return _not_fitted(search, claimed.causes)
         confirmations, p_left = confirming.confirmations(best), confirming.p_left(best)
-        decision, doubts = after_checks(significant, confirmations, p_left, alpha)
+        decision, doubts = after_checks(claimed, confirmations, p_left, alpha)
         if decision.verdict not in (NAMED, NAMED_AND_REST):
             return _Checked(decision, doubts, nothing, confirmations, p_left)
-        if set(decision.causes) != set(significant.causes):
+        if set(decision.causes) != set(claimed.causes):
             best = search.fitted_with(frozenset(decision.causes), best)
             if best is None:
                 # what the checks leave has no equilibrium
-                return _Checked(Decision(CANNOT_SAY, significant.causes), doubts, nothing, confirmations, p_left)
+                return _Checked(Decision(CANNOT_SAY, claimed.causes), doubts, nothing, confirmations, p_left)
             p_left = confirming.p_left(best)
         return _Checked(decision, doubts, best, confirmations, p_left)
 

@@ -80,8 +80,8 @@ class Cluster(AbstractContextManager["Cluster"]):
         import distributed
 
         pending: dict[str, Job] = {}
-        # samples of parts that workers died of: a part that only waited at such a worker counts as one of them, so each
-        # of these samples is computed again with nothing beside it
+        # samples that workers died of: one that only waited at such a worker counts as one of them, so each is computed
+        # again with nothing beside it before it is blamed
         suspects: list[int] = []
         alone = False
 
@@ -98,7 +98,9 @@ class Cluster(AbstractContextManager["Cluster"]):
                 yield future.result()
             except distributed.KilledWorker as error:
                 numbers = [sample.number for sample in part.samples]
-                if not alone:
+                if len(numbers) > 1:
+                    ending.update([submit(part.part({number})) for number in numbers])
+                elif not alone:
                     suspects += numbers
                 else:
                     count, last = error.allowed_failures + 1, error.last_worker.address

@@ -30,9 +30,9 @@ class Confirmation:
 
 
 def if_significant(decision: Decision, p_value: float, alpha: float) -> Decision:
-    """A verdict, or that nothing can be said where it claims something of rows that look like draws without any cause.
+    """The verdict where the rows are significant (`p_value <= alpha`), else `cannot say` about the same causes.
 
-    `p_value`: of the hypothesis that no cause acts.
+    `nothing missing` claims nothing and stays. `p_value`: of the hypothesis that no cause acts.
     """
     if p_value <= alpha or decision.verdict == NOTHING:
         return decision

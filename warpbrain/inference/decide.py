@@ -118,7 +118,8 @@ def _not_physics(decision: Decision, truth: Truth, losses: Mapping[str, float]) 
     if truth.physical:
         return losses["not physics for physics"]
     if not truth.not_physics:
-        return losses["not physics where nothing is"]
+        # no physics is missing: to take nothing for an error costs what the reverse does
+        return losses["nothing for something"]
     return losses["name left out"] * (decision.causes[0] not in truth.not_physics)
 
 

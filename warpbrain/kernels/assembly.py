@@ -1,4 +1,4 @@
-"""From elements to the system: ordered sums of element results into nodes and into the blocks of the matrix; its steps.
+"""Ordered sums of element results into nodal forces and matrix blocks, and the kernels of a step of backward Euler.
 
 Every sum is a gather, one thread for a result, over a list of contributions in a fixed order: no atomics, so the same
 bits come out of every run on a device.

@@ -101,8 +101,8 @@ class ParameterStencil:
         """Add the same to what is remembered at every place: `after - before`."""
         for remembered in self._remembered:
             for place in remembered.values():
-                for arrays, earlier, right in zip(place, before, after, strict=True):
-                    for array, a, b in zip(arrays, earlier, right, strict=True):
+                for arrays, old, new in zip(place, before, after, strict=True):
+                    for array, a, b in zip(arrays, old, new, strict=True):
                         array.assign(array.numpy() + (b.numpy() - a.numpy()))
 
     def _go(self, k: int, distance: int) -> tuple[float, Model]:

@@ -55,9 +55,10 @@ def verdict_in_words(decision: Decision, p_value: float, smallest: Mapping[str, 
 
 
 def missing_in_words(nothing: float, only_physics: bool = True) -> str:
-    """What can be said where nothing can be named: whether something is missing, by the probability that nothing is.
+    """Whether something is missing, as the beginning of a sentence that names no cause.
 
-    `only_physics`: whether nothing that is no physics is likely.
+    `nothing`: posterior probability that no cause acts. `only_physics`: False if an error of registration, mesh, loads
+    or the like is likely, too.
     """
     surely = "may be" if nothing > belief("checks.perhaps") else "is"
     return f"Something {surely} {'' if only_physics else 'wrong or '}missing"

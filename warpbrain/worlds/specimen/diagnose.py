@@ -84,11 +84,11 @@ class DiagnosingSpecimen:
             p_value = checker.p_left(base)
             chances = np.array([p for _, p in ordered])
             by_posterior, _ = decide([candidate.hypothesis for candidate, _ in ordered], chances, calibration().losses)
-            significant = if_significant(by_posterior, p_value, options.alpha)
-            best = base if significant.verdict == NOTHING else _explaining(ordered, significant)
+            claimed = if_significant(by_posterior, p_value, options.alpha)
+            best = base if claimed.verdict == NOTHING else _explaining(ordered, claimed)
             checked = checker.of(best)
             decision, doubts = after_checks(
-                significant, checked.confirmations, checked.p_left, options.alpha, *grown_errors(checked)
+                claimed, checked.confirmations, checked.p_left, options.alpha, *grown_errors(checked)
             )
         names = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
         with self.seconds.of("next measurement"):
