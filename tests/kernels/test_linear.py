@@ -33,7 +33,7 @@ def system_with(k: float, m: float, device: str, precision: Precision = DOUBLE, 
 
 def solve(system: System, preconditioner: str, **options: Any) -> tuple[np.ndarray, LinearResult]:
     options = {"tolerance": 1e-10, "max_iterations": 2000, "watch_curvature": True, **options}
-    cg = conjugate_gradient(
+    cg = conjugate_gradient(system.matrix.device, preconditioner)(
         system.matrix, system.diagonal, system.load, system.solution, system.precision,
         preconditioner=preconditioner, **options,
     )  # fmt: skip
@@ -80,7 +80,7 @@ def test_curvature_lies_among_the_eigenvalues(device: str) -> None:
 @every_preconditioner
 def test_prepare_follows_new_values(preconditioner: str, device: str) -> None:
     system = system_with(1.0, 0.0, device)
-    cg = conjugate_gradient(
+    cg = conjugate_gradient(system.matrix.device, preconditioner)(
         system.matrix, system.diagonal, system.load, system.solution, system.precision,
         tolerance=1e-10, max_iterations=2000, preconditioner=preconditioner,
     )  # fmt: skip
@@ -103,7 +103,7 @@ def test_prepare_follows_new_values(preconditioner: str, device: str) -> None:
 
 def test_multiply(precision: Precision, device: str) -> None:
     system = system_with(1.0, 0.1, device, precision)
-    cg = conjugate_gradient(
+    cg = conjugate_gradient(system.matrix.device)(
         system.matrix, system.diagonal, system.load, system.solution, system.precision,
         tolerance=1e-3, max_iterations=1,
     )  # fmt: skip
@@ -159,7 +159,7 @@ def test_a_matrix_with_nan_ends_and_is_told(preconditioner: str, device: str) ->
 def test_a_solve_can_be_repeated(device: str) -> None:
     """A solver replays what it recorded, on new values and a new right-hand side."""
     system = system_with(1.0, 0.0, device)
-    cg = conjugate_gradient(
+    cg = conjugate_gradient(system.matrix.device)(
         system.matrix, system.diagonal, system.load, system.solution, system.precision,
         tolerance=1e-10, max_iterations=2000, watch_curvature=True,
     )  # fmt: skip

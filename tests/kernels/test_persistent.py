@@ -35,7 +35,7 @@ def system_of(size: int, device: str, precision: Precision = DOUBLE) -> System:
 
 
 def solve(system: System, tolerance: float, start: float = 0.0) -> tuple[np.ndarray, LinearResult]:
-    cg = conjugate_gradient(
+    cg = conjugate_gradient(system.matrix.device)(
         system.matrix, system.diagonal, system.load, system.solution, system.precision,
         tolerance=tolerance, max_iterations=5000, watch_curvature=True,
     )  # fmt: skip

@@ -331,16 +331,17 @@ class ConjugateGradient(abc.ABC):
         return LinearResult(int(iterations), residual, goal, curvature if self._watch else math.nan)
 
 
-def conjugate_gradient(matrix: BsrMatrix, *arrays: Any, **options: Any) -> ConjugateGradient:
-    """Conjugate gradients as one launch on a GPU and as one kernel on the cores of a CPU; parameters are as there.
+def conjugate_gradient(
+    device: wp.Device, preconditioner: str = "block-jacobi", *, only_blocks: bool = True
+) -> type[ConjugateGradient]:
+    """Conjugate gradients for a device: as one launch on a GPU, as one kernel on the cores of a CPU.
 
-    Those know blocks alone, and their diagonal: for all else, and GPUs whose blocks cannot wait, there is Warp's loop.
+    Those know blocks alone, and their diagonal. For all else, and GPUs whose blocks cannot wait, there is Warp's loop.
+    `only_blocks`: no part of the matrix is in no block.
     """
-    kind: type[ConjugateGradient] = WarpGradient
-    if options.get("preconditioner") != "fsai" and options.get("beyond") is None:
-        device = matrix.device
-        kind = OneLaunchGradient if blocks_stay(device) else CoresGradient if device.is_cpu else WarpGradient
-    return kind(matrix, *arrays, **options)
+    if not only_blocks or preconditioner == "fsai":
+        return WarpGradient
+    return OneLaunchGradient if blocks_stay(device) else CoresGradient if device.is_cpu else WarpGradient
 
 
 class OneLaunchGradient(ConjugateGradient):

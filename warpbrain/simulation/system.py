@@ -555,7 +555,8 @@ class System:
             The matrix is without inertia, so that a coarse space is worth its making.
         factors : KeptFactors, optional
         """
-        plain = conjugate_gradient(
+        kind = conjugate_gradient(self.device, preconditioner, only_blocks=self.assembled)
+        plain = kind(
             self.matrix,
             self.diagonal,
             self.load,
