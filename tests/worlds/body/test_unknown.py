@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.unknown import _unit_stresses, body_forces, fields
+from warpbrain.worlds.body.unknown import _unit_stresses, body_forces, fields, pressures
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +46,26 @@ def test_a_uniform_pressure_of_it_moves_what_it_does_on_the_surface(at):
     np.testing.assert_allclose(answer, at.answers(-nodal[None])[:, 0], atol=1e-9 * np.abs(answer).max())
 
 
+def test_a_pressure_of_a_great_length_is_a_uniform_one_on_what_is_free(at):
+    """Its one mode moves the sensors as the nodal forces do of which those of a closed surface would have no sum."""
+    model, mesh = at.system.model, at.system.model.mesh
+    corners = mesh.points + at.u
+    a, b, c = corners[mesh.boundary].transpose(1, 0, 2)
+    nodal = np.zeros(corners.shape)
+    np.add.at(nodal, mesh.boundary, np.repeat(np.cross(b - a, c - a)[:, None] / 6.0, 3, axis=1))
+    assert np.linalg.norm(nodal.sum(axis=0)) < 1e-12 * np.abs(nodal).sum()
+    answer = at.answers(np.where(model.constrained, 0.0, nodal)[None])[:, 0]
+    modes = pressures(at, 1e3)
+    assert modes.shape[1] == 1
+    rows = at.sensors.is_displacement
+    size = np.sqrt(np.mean(answer[rows] ** 2))
+    same = modes[:, 0] * np.sign(modes[:, 0] @ answer)
+    np.testing.assert_allclose(same[rows], answer[rows] / size, atol=1e-6 * np.abs(same).max())
+
+
 def test_fields_are_of_one_metre(at):
     rows = at.sensors.is_displacement
     every = fields(at, [0.01, 0.024], body_forces(at, [0.01, 0.024]))
-    assert {name.split(",")[0] for name in every} == {"body force", "eigenstress", "traction"}
+    assert {name.split(",")[0] for name in every} == {"body force", "eigenstress", "pressure", "traction"}
     for columns in every.values():
         np.testing.assert_allclose(np.mean(np.sum(columns[rows] ** 2, axis=1)), 1.0)

@@ -1,8 +1,9 @@
-"""Unknown causes: smooth random fields of body force, eigenstress and traction, as columns over sensors.
+"""Unknown causes: smooth random fields of body force, eigenstress, traction and pressure, as columns over sensors.
 
 Each field is a sum of Gaussian patches with independent coefficients, a Gaussian process of that length. An eigenstress
-`s` acts within the body: its nodal forces `-V s grad N` have no net force and no moment. Columns are of 1 m root mean
-square over the recorded displacements, truncated to the modes that the sensors see.
+`s` acts within the body: its nodal forces `-V s grad N` have no net force and no moment. Fluids, and what slides along
+a surface, press on it alone: three components of a traction that are independent say little for that. Columns are of
+1 m root mean square over the recorded displacements, truncated to the modes that the sensors see.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference.beliefs import belief
-from warpbrain.mesh import node_areas
+from warpbrain.mesh import face_vectors, node_areas
 from warpbrain.physics.words import number
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -32,14 +33,21 @@ def force_patches(at: Linearisation, length: float, spacing: float | None = None
 def _patches(
     at: Linearisation, places: Floats, shares: Floats, length: float, spacing: float | None
 ) -> tuple[Floats, Floats]:
+    sites, weights = _weights(at, places, shares, length, spacing)
+    # the share on held nodes moves nothing
+    weights /= np.maximum(weights.sum(axis=0), 1e-300)
+    return sites, at.answers_of_patches(weights)
+
+
+def _weights(
+    at: Linearisation, places: Floats, shares: Floats, length: float, spacing: float | None = None
+) -> tuple[Floats, Floats]:
+    """Sites (s, 3) [m], and what nodes with these shares (N,) have of a Gaussian about each: (N, s)."""
     from scipy.spatial.distance import cdist
 
     points = at.system.model.mesh.points
     sites = places[spread_points(places, length if spacing is None else spacing, 700)]
-    weights = shares[:, None] * np.exp(-0.5 * (cdist(points, sites) / length) ** 2)
-    # the share on held nodes moves nothing
-    weights /= np.maximum(weights.sum(axis=0), 1e-300)
-    return sites, at.answers_of_patches(weights)
+    return sites, shares[:, None] * np.exp(-0.5 * (cdist(points, sites) / length) ** 2)
 
 
 def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ...]:
@@ -51,13 +59,34 @@ def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ..
 
 def tractions(at: Linearisation, length: float) -> Floats:
     """Columns (n, k) of a traction of a length [m] on all that is free of the surface; (n, 0) if nothing is."""
-    model = at.system.model
-    shares = node_areas(model.mesh.points, model.mesh.boundary)
-    free = (shares > 0.0) & ~model.constrained.reshape(-1, 3).all(axis=1)
+    mesh, free = at.system.model.mesh, _free_of_surface(at)
     if not free.any():
         return np.zeros((len(at.sensors), 0))
-    _, answers = _patches(at, model.mesh.points[free], np.where(free, shares, 0.0), length, None)
+    shares = np.where(free, node_areas(mesh.points, mesh.boundary), 0.0)
+    _, answers = _patches(at, mesh.points[free], shares, length, None)
     return _visible_modes(answers.reshape(len(answers), -1), at.sensors.is_displacement)
+
+
+def pressures(at: Linearisation, length: float) -> Floats:
+    """Columns (n, k) of a pressure of a length [m] on the same, along the normals of the deformed surface."""
+    mesh, free = at.system.model.mesh, _free_of_surface(at)
+    if not free.any():
+        return np.zeros((len(at.sensors), 0))
+    _, weights = _weights(at, mesh.points[free], free.astype(np.float64), length)
+    thirds = np.repeat(face_vectors(mesh.points + at.u, mesh.boundary) / 3.0, 3, axis=0)
+    normals = np.stack(
+        [np.bincount(mesh.boundary.ravel(), weights=along, minlength=len(mesh.points)) for along in thirds.T], axis=1
+    )
+    forces = (normals[:, :, None] * weights[:, None]).reshape(normals.size, -1)
+    return _visible_modes(at.answers_of_columns(forces), at.sensors.is_displacement)
+
+
+def _free_of_surface(at: Linearisation) -> Bools:
+    """Nodes (N,) on the surface that are not held."""
+    mesh = at.system.model.mesh
+    free = ~at.system.model.constrained.reshape(-1, 3).all(axis=1)
+    free[np.setdiff1d(np.arange(len(free)), mesh.boundary)] = False
+    return np.asarray(free)
 
 
 def eigenstresses(at: Linearisation, length: float) -> Floats:
@@ -126,6 +155,7 @@ def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]
         columns_by_name[f"body force, {size}"] = columns
         columns_by_name[f"eigenstress, {size}"] = eigenstresses(at, length)
         columns_by_name[f"traction, {size}"] = tractions(at, length)
+        columns_by_name[f"pressure, {size}"] = pressures(at, length)
     return {name: columns for name, columns in columns_by_name.items() if columns.shape[1]}
 
 
