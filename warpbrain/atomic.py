@@ -31,11 +31,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     """A temporary path beside `path` to write to; it takes the place of `path` when the block ends without error.
 
     The temporary file has the same ending, is on the same file system, and is removed if anything goes wrong.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written to.
+    `InputError` if the folder cannot be written to.
     """
     check_writable(path)
     with _told(path.parent, "cannot be written to"):
@@ -58,10 +54,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 def whole_folder(path: Path) -> Iterator[Path]:
     """A temporary folder beside `path` to fill; it becomes `path` when the block ends without error.
 
-    Raises
-    ------
-    InputError
-        If there is something at `path` other than an empty folder, or the place cannot be written to.
+    `InputError` if there is something at `path` other than an empty folder, or the place cannot be written to.
     """
     check_new_folder(path)
     # what is really written, where `path` ends in a dot or is a link

@@ -20,16 +20,10 @@ AXES = {"RAS": (1.0, 1.0, 1.0), "LPS": (-1.0, -1.0, 1.0)}
 
 @dataclass(frozen=True)
 class Frame:
-    """Unit and axes of the numbers in a file.
+    """Unit and axes of the numbers in a file."""
 
-    Parameters
-    ----------
-    unit : {"mm", "m"}
-    axes : {"RAS", "LPS"}
-    """
-
-    unit: str = "mm"
-    axes: str = "RAS"
+    unit: str = "mm"  # of `METRES`
+    axes: str = "RAS"  # of `AXES`
 
     def __post_init__(self) -> None:
         for name, value, known in (("units", self.unit, METRES), ("axes", self.axes, AXES)):

@@ -28,45 +28,20 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Key:
-    """One key.
-
-    Attributes
-    ----------
-    name : str
-    kind : str
-        What the value can be, of `KINDS`; several are joined by ``|``.
-    doc : str
-        One sentence; its full stop is left out where the default completes it.
-    unit : str
-        Of a number: a unit of SI, or ``"units"`` for the length that ``[case] units`` names.
-    needed : bool
-        Whether a table without it is wrong.
-    choices : tuple of str
-        The only texts allowed, if not empty.
-    above, below : float
-        Limits of a number, themselves not allowed.
-    hint : str
-        What to do where it is missing or out of its limits.
-    keys : tuple of Key
-        Of a table.
-    default : str or float, optional
-        What it is where it is absent.
-    si : float
-        How many of its SI unit one of these is.
-    """
+    """One key."""
 
     name: str
-    kind: str
-    doc: str
-    unit: str = ""
-    needed: bool = False
-    choices: tuple[str, ...] = ()
-    above: float = -math.inf
+    kind: str  # what the value can be, of `KINDS`; several are joined by ``|``
+    doc: str  # one sentence; its full stop is left out where the default completes it
+    unit: str = ""  # of a number: a unit of SI, or ``"units"`` for the length that ``[case] units`` names
+    needed: bool = False  # whether a table without it is wrong
+    choices: tuple[str, ...] = ()  # the only texts allowed, if not empty
+    above: float = -math.inf  # limits of a number, themselves not allowed
     below: float = math.inf
-    hint: str = ""
-    keys: tuple[Key, ...] = ()
-    default: str | float | None = None
-    si: float = 1.0
+    hint: str = ""  # what to do where it is missing or out of its limits
+    keys: tuple[Key, ...] = ()  # of a table
+    default: str | float | None = None  # what it is where it is absent
+    si: float = 1.0  # how many of its SI unit one of these is
 
     @property
     def kinds(self) -> list[str]:
@@ -169,29 +144,14 @@ def _kind_of(value: Any) -> str | None:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of `case.toml`.
-
-    Attributes
-    ----------
-    name : str
-    doc : str
-        One sentence.
-    keys : tuple of Key
-        That it may have whatever it is.
-    by : Key or None
-        The key that says which variant it is; its default is the variant where it is absent.
-    variants : mapping of str to tuple of Key
-        What each variant may have besides.
-    several : bool
-        Whether it is a list of tables, ``[[name]]``.
-    """
+    """A table of `case.toml`."""
 
     name: str
-    doc: str
-    keys: tuple[Key, ...] = ()
-    by: Key | None = None
-    variants: Mapping[str, tuple[Key, ...]] = field(default_factory=dict)
-    several: bool = False
+    doc: str  # one sentence
+    keys: tuple[Key, ...] = ()  # that it may have whatever it is
+    by: Key | None = None  # the key that says which variant it is; its default is the variant where it is absent
+    variants: Mapping[str, tuple[Key, ...]] = field(default_factory=dict)  # what each variant may have besides
+    several: bool = False  # whether it is a list of tables, ``[[name]]``
 
     def keys_of(self, variant: str) -> dict[str, Key]:
         """Keys of a variant by name, the common ones included."""

@@ -15,18 +15,9 @@ from warpbrain.errors import InputError
 
 
 def added_by_packages(group: str, known: dict[str, Any]) -> dict[str, Any]:
-    """What installed packages add to a group, by the names that they give.
+    """What installed packages add to a group, by the names that they give; the `known` ones cannot be taken.
 
-    Parameters
-    ----------
-    group : {"mechanisms", "laws", "recordings"}
-    known : dict
-        What this package has under its names: these cannot be taken.
-
-    Raises
-    ------
-    InputError
-        If what a package names cannot be loaded, or its name is taken; it tells which package.
+    `InputError`, which tells which package, if what it names cannot be loaded, or its name is taken.
     """
     added: dict[str, Any] = {}
     for point in sorted(entry_points(group=f"warpbrain.{group}"), key=lambda point: point.name):

@@ -10,23 +10,12 @@ from warpbrain.errors import InputError
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong.
-
-    Attributes
-    ----------
-    file : Path
-    place : str
-        Key, table, row or node in the file; empty if it is the file as a whole.
-    message : str
-        What was found and what was expected, on one line.
-    cure : str
-        What to do about it; may be empty where the message says it.
-    """
+    """One thing that is wrong."""
 
     file: Path
-    place: str
-    message: str
-    cure: str = ""
+    place: str  # key, table, row or node in the file; empty if it is the file as a whole
+    message: str  # what was found and what was expected, on one line
+    cure: str = ""  # what to do about it; may be empty where the message says it
 
     def __str__(self) -> str:
         head = f"{self.file}: {self.place}: " if self.place else f"{self.file}: "
@@ -43,13 +32,7 @@ def _shortened(text: str, most: int) -> str:
 
 
 class Problems:
-    """A list of problems that readers add to and go on reading.
-
-    Parameters
-    ----------
-    most : int, optional
-        From how many on a reader may stop, see `enough`.
-    """
+    """A list of problems that readers add to and go on reading; from `most` on one may stop, see `enough`."""
 
     def __init__(self, most: int | None = None) -> None:
         self._most = most
@@ -76,10 +59,6 @@ class Problems:
         """Raise `InputError` with the first problem, and the number of the others in `folder`, if there is any."""
         if not self.found:
             return
-        others = len(self.found) - 1
-        more = (
-            f"; {others} more: `warpbrain cases check {folder or self.found[0].file.parent}` lists them"
-            if others
-            else ""
-        )
-        raise InputError(f"{self.found[0]}{more}")
+        first, others = self.found[0], len(self.found) - 1
+        more = f"; {others} more: `warpbrain cases check {folder or first.file.parent}` lists them" if others else ""
+        raise InputError(f"{first}{more}")

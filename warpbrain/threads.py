@@ -67,13 +67,7 @@ def fill_columns(found: Any, work: Callable[[slice], Any], together: int) -> Non
 
 
 def beside(work: Callable[[], Made]) -> Callable[[], Made]:
-    """Begin something that is asked for later, in a thread of its own if there may be several.
-
-    Returns
-    -------
-    callable
-        Waits for it, and gives what came out or raises what went wrong.
-    """
+    """Begin something in a thread of its own, if there may be several; what is returned waits for what comes of it."""
     if thread_count() < 2 or is_part():
         return work
     pool = ThreadPoolExecutor(1, initializer=_become_part)

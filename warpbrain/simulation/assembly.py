@@ -90,22 +90,16 @@ class Assembly:
     """The elements of a mesh on a device, and what else no number of a model changes.
 
     All systems of a mesh share it: of every hypothesis, sample and sensitivity, and of specimens.
-
-    Attributes
-    ----------
-    tetrahedra : (m, 4) int array
-        Node ids, ascending: every stored block then belongs to an upper block of the matrix. Odd permutations turn an
-        element inside out, which nothing notices: gradients do not depend on the order, volumes are taken before it.
-    shape_gradients : (m, 3, 3) array
-        Inverse edge matrices; their rows are the gradients of the shape functions of nodes 1 to 3.
-    nodes : wp.array of vec4i, shape (m,)
-    inverse_edges : wp.array of mat33, shape (m,)
     """
 
     def __init__(self, mesh: TetMesh, device: wp.Device, precision: Precision) -> None:
         self._device = device
+        #: Node ids (m, 4), ascending: every stored block then belongs to an upper block of the matrix. Odd permutations
+        #: turn an element inside out, which nothing notices: gradients do not depend on the order, volumes are taken
+        #: before it.
         self.tetrahedra: NDArray[np.int32] = np.sort(mesh.tetrahedra, axis=1)
         edges = mesh.points[self.tetrahedra[:, 1:]] - mesh.points[self.tetrahedra[:, :1]]
+        #: Inverse edge matrices (m, 3, 3); their rows are the gradients of the shape functions of nodes 1 to 3.
         self.shape_gradients: Floats = np.linalg.inv(edges.transpose(0, 2, 1)).astype(np.float64, copy=False)
         self.nodes = wp.array(self.tetrahedra, dtype=wp.vec4i, device=device)
         self.inverse_edges = wp.array(self.shape_gradients, dtype=precision.mat33, device=device)

@@ -92,16 +92,9 @@ class Path:
 
 
 def derivatives(energy: Floats, logs: Floats, step: float) -> tuple[Floats, Floats]:
-    """`dPsi/dl` and `d2Psi/dl2` by sixth-order differences in `ln l`.
+    """`dPsi/dl` and `d2Psi/dl2` (..., n) at `ln l` (..., n) by sixth-order differences.
 
-    Parameters
-    ----------
-    energy : (..., n + 6) array
-        Energies at evenly spaced `ln l`, three more at each end than derivatives.
-    logs : (..., n) array
-        `ln l` of the derivatives.
-    step : float
-        Spacing of `ln l`.
+    Energies (..., n + 6) are at `ln l` that are a `step` apart, three more at each end than derivatives.
     """
     e = [energy[..., k : energy.shape[-1] - 6 + k] for k in range(7)]
     first = (e[6] - e[0] + 9 * (e[1] - e[5]) + 45 * (e[4] - e[2])) / (60 * step)

@@ -16,10 +16,7 @@ from warpbrain.plugins import added_by_packages
 def mechanisms() -> dict[str, type[Mechanism]]:
     """Mechanisms by kind, in the order of their names; those of other packages by entry points `warpbrain.mechanisms`.
 
-    Raises
-    ------
-    InputError
-        If another package names what is no mechanism, cannot be loaded, or has a name that is taken.
+    `InputError` if another package names what is no mechanism, cannot be loaded, or has a name that is taken.
     """
     kinds: dict[str, type[Mechanism]] = {}
     for module in pkgutil.iter_modules(__path__, f"{__name__}."):
