@@ -6,8 +6,8 @@ import warp as wp
 from shapes import room, sphere
 
 from warpbrain.kernels.precision import DOUBLE
-from warpbrain.physics.distance_field import DistanceField
 from warpbrain.physics.mechanism import ClosedSurface
+from warpbrain.physics.mechanisms.contact import DistanceField
 
 
 def around(surface: ClosedSurface, spacing: float, points: np.ndarray, device: str) -> tuple[np.ndarray, np.ndarray]:

@@ -101,6 +101,8 @@ class Term(abc.ABC):
     #: Whether its energy goes with the moduli of these elements (fibres, viscosity), not only with how much is left of
     #: them (a tension).
     of_moduli: bool = True
+    #: Whether it is there in full, however little of the load is.
+    in_full: ClassVar[bool] = False
     #: Its own unknowns; None if there are none.
     coupling: Coupling | None = None
     #: Names of the arrays that hold what it remembers of earlier steps and augmentations.
@@ -128,7 +130,7 @@ class Term(abc.ABC):
 
     def set_scale(self, scale: float) -> None:
         """Set the factor on what it does."""
-        self.scale.fill_(scale)
+        self.scale.fill_(1.0 if self.in_full else scale)
 
     def set_time_step(self, h: float) -> None:  # noqa: B027  (most terms have no memory)
         """Tell a term with a memory how long the coming steps are [s]; infinite in an equilibrium."""
@@ -217,6 +219,14 @@ class Term(abc.ABC):
         """An array on the body's device."""
         return wp.array(values, dtype=dtype, device=self.body.device)
 
+    def zeros(self, *shape: int, dtype: Any = None) -> wp.array:
+        """Zeros on the body's device, scalars unless another type is given."""
+        return wp.zeros(shape, dtype=dtype or self.body.precision.scalar, device=self.body.device)
+
+    def launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
+        """Launch a kernel on the body's device."""
+        launch(kernel, dim, inputs, self.body.device)
+
 
 class KernelTerm(Term):
     """A term of kernels with a thread for each stencil: for forces, for forces with blocks, and for energies."""
@@ -226,14 +236,14 @@ class KernelTerm(Term):
     ) -> None:
         super().__init__(body, stencils, ramp)
         self._kernels = kernels
-        self._energies = wp.zeros(len(stencils), dtype=body.precision.scalar, device=body.device)
+        self._energies = self.zeros(len(stencils))
 
     @abc.abstractmethod
     def _inputs(self) -> list[Any]:
         """What the kernels take before displacements [m] and outputs."""
 
     def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
-        launch(kernel, len(self.stencils), [*self._inputs(), u, *outputs], self.body.device)
+        self.launch(kernel, len(self.stencils), *self._inputs(), u, *outputs)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._launch(self._kernels[0], u, self.forces)

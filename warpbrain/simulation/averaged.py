@@ -12,7 +12,7 @@ are linear in the volumetric modulus, so the first sum is the law with another o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.kernels.averaged_gradient import averaged_kernels
-from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.physics.term import Body, Term
 from warpbrain.simulation.model import Material
@@ -70,23 +69,23 @@ class Patches:
 class AveragedTerm(Term):
     """Patches of as many nodes each, under the law of some kernels."""
 
+    in_full = True
+
     def __init__(self, body: Body, patches: Patches, kernels: ElementKernels) -> None:
         super().__init__(body, patches.nodes)
-        p, device, count = body.precision, body.device, len(patches.nodes)
+        p, count = body.precision, len(patches.nodes)
         self._law, self._kernels = kernels, averaged_kernels(p)
         self._members, self._owner, self._shares = patches.members, patches.owner, patches.shares
-        self._nodes = wp.array(self.stencils, dtype=int, device=device)
+        self._nodes = self.array(self.stencils, int)
         self._gradients = self.array(patches.gradients, p.vec3)
         self._volumes = np.zeros(count)
-        self._volume = wp.zeros(count, dtype=p.scalar, device=device)
+        self._volume, self._density = self.zeros(count), self.zeros(count)
         self._parameters: wp.array = None
         rows, columns = np.triu_indices(patches.nodes.shape[1])
         self._rows, self._columns = self.array(rows, int), self.array(columns, int)
         self._all = self.array(np.arange(count), int)
-        self._F = wp.zeros(count, dtype=p.mat33, device=device)
-        self._P = wp.zeros(count, dtype=p.mat33, device=device)
-        self._density = wp.zeros(count, dtype=p.scalar, device=device)
-        self._moduli = wp.zeros((count, 3, 3), dtype=p.mat33, device=device)
+        self._F, self._P = self.zeros(count, dtype=p.mat33), self.zeros(count, dtype=p.mat33)
+        self._moduli = self.zeros(count, 3, 3, dtype=p.mat33)
 
     def _sum(self, values: Floats) -> Floats:
         """Sum of `w_e` times values of elements over each patch."""
@@ -117,28 +116,21 @@ class AveragedTerm(Term):
         self._stress(u)
         return self._members, self._owner, self._P.numpy().astype(np.float64)
 
-    def set_scale(self, scale: float) -> None:
-        # a material is there, however little of the load is
-        super().set_scale(1.0)
-
     def _stress(self, u: wp.array) -> None:
-        device, count = self.body.device, len(self.stencils)
-        launch(self._kernels.gradient, count, [self._nodes, self._gradients, u, self._F], device)
-        inputs = [self._all, self._F, self._parameters, self._density, self._P]
-        launch(self._law.stress, count, inputs, device)
+        count = len(self.stencils)
+        self.launch(self._kernels.gradient, count, self._nodes, self._gradients, u, self._F)
+        self.launch(self._law.stress, count, self._all, self._F, self._parameters, self._density, self._P)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._stress(u)
-        inputs = [self._gradients, self._volume, self._P, self.forces]
-        launch(self._kernels.forces, self.stencils.shape, inputs, self.body.device)
+        self.launch(self._kernels.forces, self.stencils.shape, self._gradients, self._volume, self._P, self.forces)
 
     def evaluate_tangents(self, u: wp.array) -> None:
         self.evaluate_forces(u)
-        device, count = self.body.device, len(self.stencils)
-        inputs = [self._all, self._F, self._parameters, self._moduli]
-        launch(self._law.moduli, (count, 3, 3), inputs, device)
-        inputs = [self._rows, self._columns, self._gradients, self._volume, self._moduli, self.blocks]
-        launch(self._kernels.tangents, (count, len(self._rows)), inputs, device)
+        count = len(self.stencils)
+        self.launch(self._law.moduli, (count, 3, 3), self._all, self._F, self._parameters, self._moduli)
+        geometry = (self._rows, self._columns, self._gradients, self._volume)
+        self.launch(self._kernels.tangents, (count, len(self._rows)), *geometry, self._moduli, self.blocks)
 
     def energy(self, u: wp.array) -> float:
         self._stress(u)
@@ -147,22 +139,20 @@ class AveragedTerm(Term):
         return float(self._density.numpy().astype(np.float64) @ self._volumes)
 
 
-def node_patches(tetrahedra: NDArray[np.integer], kinds: NDArray[np.integer]) -> Iterator[tuple[Ints, Ints]]:
-    """Elements and nodes of every patch: around each node the elements of one kind, given the kind (m,) of each."""
-    corner_nodes = tetrahedra.ravel()
-    labels = np.repeat(kinds, 4)
-    order = np.lexsort((np.arange(len(corner_nodes)), labels, corner_nodes))
-    keys = np.stack([corner_nodes[order], labels[order]], axis=1)
-    starts = np.flatnonzero(np.r_[True, np.any(keys[1:] != keys[:-1], axis=1)])
-    for start, end in zip(starts, np.r_[starts[1:], len(order)], strict=True):
-        elements = order[start:end] // 4
-        yield elements, np.unique(tetrahedra[elements])
-
-
 def patches_of(body: Body, labels: Sequence[int], kinds: Ints) -> list[Patches]:
-    """Those of some tissues, of elements of one kind each: a family for each number of nodes."""
+    """Those of some tissues, around each node of elements of one kind each: a family for each number of nodes.
+
+    `kinds` are those of the elements (m,).
+    """
+    tetrahedra: NDArray[np.integer] = body.tetrahedra
+    corner_nodes, corner_kinds = tetrahedra.ravel(), np.repeat(kinds, 4)
+    order = np.lexsort((np.arange(len(corner_nodes)), corner_kinds, corner_nodes))
+    keys = np.stack([corner_nodes[order], corner_kinds[order]], axis=1)
+    starts = np.flatnonzero(np.any(keys[1:] != keys[:-1], axis=1)) + 1
     families: dict[int, list[tuple[Ints, Ints]]] = {}
-    for elements, nodes in node_patches(body.tetrahedra, kinds):
+    for corners in np.split(order, starts):
+        elements = corners // 4
+        nodes = np.unique(tetrahedra[elements])
         if int(body.mesh.tissue[elements[0]]) in labels:
             families.setdefault(len(nodes), []).append((nodes, elements))
     return [

@@ -27,25 +27,17 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats, Ints
-from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.nodal_volume import nodal_volume_kernels
 from warpbrain.physics.term import Body, Term
 
 
 class _PatchTerm(Term):
-    """Of the material itself: it is there, however little of the load is."""
+    """Of the material itself."""
 
-    def set_scale(self, scale: float) -> None:
-        super().set_scale(1.0)
-
-    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
-        launch(kernel, count, inputs, self.body.device)
+    in_full = True
 
     def _ints(self, values: NDArray[Any]) -> wp.array:
         return self.array(np.ascontiguousarray(values, dtype=np.int32), int)
-
-    def _zeros(self, shape: Any, dtype: Any) -> wp.array:
-        return wp.zeros(shape, dtype=dtype, device=self.body.device)
 
 
 class NodalVolumeTerm(_PatchTerm):
@@ -78,11 +70,11 @@ class NodalVolumeTerm(_PatchTerm):
         self._volumes, self._moduli = np.ones(self.count), np.zeros(self.count)
         self._volumes_on_device = self.array(self._volumes, p.scalar)
         self._moduli_on_device = self.array(self._moduli, p.scalar)
-        self._moments = self._zeros((count, 4), p.scalar)
-        self._ratio, self._p = self._zeros(self.count, p.scalar), self._zeros(self.count, p.scalar)
+        self._moments = self.zeros(count, 4)
+        self._ratio, self._p = self.zeros(self.count), self.zeros(self.count)
         #: `c_a` and what each element adds to `g_ab`, row by row.
-        self.curvature = self._zeros(self.count, p.scalar)
-        self.of_elements = self._zeros((count, 40), p.vec3)
+        self.curvature = self.zeros(self.count)
+        self.of_elements = self.zeros(count, 40, dtype=p.vec3)
 
     @property
     def patches(self) -> Ints:
@@ -109,18 +101,18 @@ class NodalVolumeTerm(_PatchTerm):
         """Find the pressures at a displacement; returns what element kernels take."""
         k, count = self._kernels, len(self.stencils)
         shape = (self.body.inverse_edges, self._volume)
-        self._launch(k.moments, count, self._nodes, *shape, u, self._moments)
-        self._launch(
+        self.launch(k.moments, count, self._nodes, *shape, u, self._moments)
+        self.launch(
             k.pressures, self.count, self._first, self._corners, self._moments, self._volumes_on_device,
             self._moduli_on_device, self._logarithmic_on_device, self._ratio, self._p, self.curvature,
         )  # fmt: skip
         return count, self._nodes, self._of_element, *shape, self._p, u
 
     def evaluate_forces(self, u: wp.array) -> None:
-        self._launch(self._kernels.forces, *self._evaluate(u), self.forces)
+        self.launch(self._kernels.forces, *self._evaluate(u), self.forces)
 
     def evaluate_tangents(self, u: wp.array) -> None:
-        self._launch(self._kernels.tangents, *self._evaluate(u), self.forces, self.blocks, self.of_elements)
+        self.launch(self._kernels.tangents, *self._evaluate(u), self.forces, self.blocks, self.of_elements)
 
     def energy(self, u: wp.array) -> float:
         self._evaluate(u)
@@ -161,8 +153,8 @@ class PatchStiffnessTerm(_PatchTerm):
         self._node_first = self._ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
         self._nodes, self._entries, self._patches = self._ints(nodes), self._ints(entries), self._ints(patches[entries])
         # in the order of patches, and in that of nodes
-        self._g, self._by_node = (self._zeros(len(starts), p.vec3) for _ in range(2))
-        self._change = self._zeros(volumes.count, p.scalar)
+        self._g, self._by_node = (self.zeros(len(starts), dtype=p.vec3) for _ in range(2))
+        self._change = self.zeros(volumes.count)
         self._one = self.array(np.ones(1), p.scalar)
 
     def evaluate_forces(self, u: wp.array) -> None:
@@ -172,8 +164,8 @@ class PatchStiffnessTerm(_PatchTerm):
         self.forces.zero_()
         k, size = self._kernels, len(self.stencils)
         of_elements = self._volumes.of_elements.flatten()
-        self._launch(k.gather, len(self._g), self._part_first, self._parts, of_elements, self._g)
-        self._launch(
+        self.launch(k.gather, len(self._g), self._part_first, self._parts, of_elements, self._g)
+        self.launch(
             k.diagonal, size, self._node_first, self._entries, self._patches, self._volumes.curvature, self._g,
             self._by_node, self.blocks,
         )  # fmt: skip
@@ -190,8 +182,8 @@ class PatchStiffnessTerm(_PatchTerm):
         """See `Term.add_stiffness`; `scale` (1,) is one more factor, which a captured graph reads."""
         k, size = self._kernels, len(self.stencils)
         inputs = (self._patch_first, self._nodes, self._volumes.curvature, self._g, columns, x, self._change)
-        self._launch(k.taken_up, self._volumes.count, *inputs)
-        self._launch(
+        self.launch(k.taken_up, self._volumes.count, *inputs)
+        self.launch(
             k.push, size, self._node_first, self._patches, self._by_node, self._change, self.blocks, columns, rows, x,
             self.body.precision.scalar(factor), self._one if scale is None else scale, y,
         )  # fmt: skip

@@ -31,12 +31,12 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats, Ints
-from warpbrain.kernels.distance_field import smooth_distance
+from warpbrain.kernels.distance_field import distance_kernels, smooth_distance
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.mesh.quality import extent
-from warpbrain.physics.distance_field import DistanceField
+from warpbrain.mesh.surface import feature_normals
 from warpbrain.physics.expectation import LogNormal
 from warpbrain.physics.mechanism import ClosedSurface, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
@@ -51,6 +51,10 @@ _SLIP = 1e-4
 _NEAR, _STUCK = 1e-5, 5e-8
 #: Part of the largest pressure by which those of friction may differ from those of the state.
 _SETTLED = 1e-3
+#: Nodes of the largest grid; a finer one is made coarser.
+LARGEST_GRID = 2_000_000
+#: Spacings that the grid goes beyond what it is made for.
+_MARGIN = 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,47 +176,48 @@ class ContactTerm(KernelTerm):
 
     memory = ("_found", "_pressing", "_directions", "_tractions")
     lasting = ("_field", "_wall")
+    in_full = True
 
     def __init__(self, body: Body, contact: Contact) -> None:
         members = np.flatnonzero(body.mesh.node_sets[contact.nodes])
         made, *kernels = _kernels(body.precision)
         super().__init__(body, members[:, None], kernels, contact.factor)
         self.mechanism = contact
-        precision, device = body.precision, body.device
+        precision = body.precision
         points, faces = contact.skull(body.mesh)
         boundary = body.mesh.boundary
         shared = np.isin(boundary, members)
         touching = boundary[shared.any(axis=1)]
         # of its own surface only differences count: the smoother, the better
         given = contact.surface is not None
-        self._field = _distance_field(body, points, faces, members, touching, given)
+
+        def make() -> DistanceField:
+            # what the body's own triangles cannot follow need not be resolved
+            spacing = min(_edge(points, faces), _edge(body.mesh.points, touching))
+            return DistanceField(points, faces, spacing, body.mesh.points[members], given, body.device, precision)
+
+        self._field = body.once("distance field", [points, faces, members, touching, np.array(given)], make)
         # a node at the rim of the set touches with what is in the set; one without a face there with all it has
         area = node_areas(body.mesh.points, boundary[shared.all(axis=1)])[members]
         area = np.where(area > 0.0, area, node_areas(body.mesh.points, boundary)[members])
         self._size = float(np.sqrt(np.median(area)))
-        self._numbers = wp.zeros(2, dtype=precision.scalar, device=device)
+        self._numbers = self.zeros(2)
         self.take_moduli()
         self._area = self.array(area, precision.scalar)
         self._nodes = self.array(members, int)
         self._movable, self._free = body.movable[members], ~body.constrained[members]
         self._points = self.array(body.mesh.points, precision.vec3)
         count = len(members)
-        self._start, self._found, self._pressing, self._gaps = (
-            wp.zeros(count, dtype=precision.scalar, device=device) for _ in range(4)
-        )
-        self._directions, self._tractions = (wp.zeros(count, dtype=precision.vec3, device=device) for _ in range(2))
+        self._start, self._found, self._pressing, self._gaps = (self.zeros(count) for _ in range(4))
+        self._directions, self._tractions = (self.zeros(count, dtype=precision.vec3) for _ in range(2))
         if not given:
             reached = self.array(body.mesh.points[members], precision.vec3)
             self._field.at(reached, self._start, wp.zeros_like(reached))
         self._wall = made()
-        for name in ("nodes", "points", "area", "start", "numbers", *(name[1:] for name in self.memory)):
-            setattr(self._wall, name, getattr(self, f"_{name}"))
+        for name in ("_nodes", "_points", "_area", "_start", "_numbers", *self.memory):
+            setattr(self._wall, name[1:], getattr(self, name))
         for name in ("coefficients", "origin", "spacing"):
             setattr(self._wall, name, getattr(self._field, name))
-
-    def set_scale(self, scale: float) -> None:
-        # a wall is there, however little of the load is
-        super().set_scale(1.0)
 
     def take_moduli(self) -> None:
         modulus = self.body.shear_moduli.max() + self.body.volumetric_moduli.max()
@@ -285,18 +290,72 @@ class ContactTerm(KernelTerm):
         self._tractions.zero_()
 
 
-def _distance_field(
-    body: Body, points: Floats, faces: NDArray[np.int32], members: Ints, touching: NDArray[np.int32], in_place: bool
-) -> DistanceField:
-    """The smoothed signed distance [m] from a surface about the nodes that touch it, made once for a mesh."""
+class DistanceField:
+    """The smoothed signed distance from a surface, on a device; see `warpbrain.kernels.distance_field`.
 
-    def make() -> DistanceField:
-        # what the body's own triangles cannot follow need not be resolved
-        spacing = min(_edge(points, faces), _edge(body.mesh.points, touching))
-        near = body.mesh.points[members]
-        return DistanceField(points, faces, spacing, near, in_place, body.device, body.precision)
+    The surface is of points (n, 3) [m] and outward triangles (k, 3); beyond an open rim it goes on as the plane of its
+    last triangle. The grid holds it and a region, points (r, 3) [m]. What is smaller than its spacing [m] is smoothed;
+    that is larger than asked for where the grid would have more than `LARGEST_GRID` nodes. Smoothing alone shifts the
+    surface by `h^2/6` times the sum of its curvatures: `in_place` takes that back, and is less smooth.
+    """
 
-    return body.once("distance field", [points, faces, members, touching, np.array(in_place)], make)
+    def __init__(
+        self,
+        points: Floats,
+        faces: NDArray[np.integer],
+        spacing: float,
+        region: Floats,
+        in_place: bool,
+        device: Any,
+        precision: Precision,
+    ) -> None:
+        self._device, self._precision = device, precision
+        used, corners = np.unique(faces, return_inverse=True)
+        corners = corners.reshape(-1, 3)
+        surface = points[used]
+        low = np.minimum(surface.min(axis=0), region.min(axis=0))
+        size = np.maximum(surface.max(axis=0), region.max(axis=0)) - low
+        self.spacing = max(spacing, float(np.prod(size + 2 * _MARGIN * spacing) / LARGEST_GRID) ** (1.0 / 3.0))
+        low = low - _MARGIN * self.spacing
+        shape = tuple(int(n) for n in np.ceil(size / self.spacing) + 2 * _MARGIN + 1)
+        self.origin = precision.vec3(*low)
+        self.coefficients = wp.zeros(shape, dtype=precision.scalar, device=device)
+        self._fill, self._evaluate = distance_kernels(precision)
+        tree = wp.Mesh(
+            points=wp.array(surface, dtype=wp.vec3f, device=device),
+            indices=wp.array(corners.ravel(), dtype=int, device=device),
+        )
+        normals, rim = feature_normals(surface, corners)
+        reach = 4.0 * float(np.linalg.norm(np.multiply(shape, self.spacing)))
+        inputs = [
+            tree.id,
+            wp.array(surface, dtype=precision.vec3, device=device),
+            wp.array(corners, dtype=wp.vec3i, device=device),
+            wp.array(normals, dtype=precision.vec3, device=device),
+            wp.array(rim, dtype=wp.bool, device=device),
+            self.origin,
+            precision.scalar(self.spacing),
+            precision.scalar(reach),
+            self.coefficients,
+        ]
+        wp.launch(self._fill, dim=shape, inputs=inputs, device=device)
+        # the tree is needed until this is done, and no longer
+        wp.synchronize_device(device)
+        if in_place:
+            # what smoothing adds is taken from the coefficients to second order (quasi-interpolation)
+            d = self.coefficients.numpy()
+            curved = np.zeros_like(d)
+            for axis in range(3):
+                inner = tuple(slice(1, -1) if a == axis else slice(None) for a in range(3))
+                curved[inner] += np.diff(d, 2, axis=axis)
+            self.coefficients.assign(d - curved / 6.0)
+
+    def at(self, points: wp.array, distances: wp.array, directions: wp.array) -> None:
+        """Write distances [m] and directions away from the surface's inside at points [m]."""
+        inputs = [
+            points, self.coefficients, self.origin, self._precision.scalar(self.spacing), distances, directions
+        ]  # fmt: skip
+        wp.launch(self._evaluate, dim=len(points), inputs=inputs, device=self._device)
 
 
 def _edge(points: Floats, faces: NDArray[np.int32]) -> float:

@@ -35,7 +35,6 @@ import warp as wp
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.minimal_residual import MinimalResidual
-from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.pore import pore_kernels
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import LogNormal, Normal
@@ -205,29 +204,22 @@ class DrainageTerm(Term):
         lumped = np.bincount(self.stencils.ravel(), np.repeat(0.25 * volumes, 4), minlength=size)
         self._lumped = self.array(lumped, scalar)
         self._place_rows(size)
-
-        def zeros(*shape: int, dtype: object = scalar) -> wp.array:
-            return wp.zeros(shape, dtype=dtype, device=body.device)
-
-        self.softness, self._storage, self._entries = zeros(count), zeros(count, 10), zeros(count, 10)
-        self._element_coupling = zeros(count, 4, dtype=vec3)
-        self._taken, self._held, self._diagonal = zeros(count), zeros(size), zeros(size)
-        self._shape = zeros(size, dtype=vec3)
-        entries = len(self._rows)
-        self.coupling = Coupling(
-            self._offsets, self._columns, zeros(entries), zeros(entries), zeros(entries, dtype=vec3),
-            zeros(entries, dtype=vec3), self._held,
-        )  # fmt: skip
+        self.softness, self._storage, self._entries = self.zeros(count), self.zeros(count, 10), self.zeros(count, 10)
+        self._element_coupling = self.zeros(count, 4, dtype=vec3)
+        self._taken, self._held, self._diagonal = self.zeros(count), self.zeros(size), self.zeros(size)
+        self._shape = self.zeros(size, dtype=vec3)
+        compliance, yielding = (self.zeros(len(self._rows)) for _ in range(2))
+        own, others = (self.zeros(len(self._rows), dtype=vec3) for _ in range(2))
+        self.coupling = Coupling(self._offsets, self._columns, compliance, yielding, own, others, self._held)
         self._h = np.inf
-        solvers = (
+        # of the pressure, which begins with the last one, and of changes of it
+        self._solver, self._change = (
             MinimalResidual(
                 size, scalar, body.precision, body.device, operator=self._multiply, preconditioner=self._precondition,
                 max_iterations=_MAX_ITERATIONS,
             )
             for _ in range(2)
         )  # fmt: skip
-        # of the pressure, which begins with the last one, and of changes of it
-        self._solver, self._change = solvers
         self._beyond = self._solver.x
         self._tolerance = max(1e-12, 20.0 * body.precision.epsilon)
         self.take_moduli()
@@ -250,9 +242,6 @@ class DrainageTerm(Term):
 
     # -- the pressure's system ------------------------------------------------------------------------------------
 
-    def _launch(self, kernel: object, dim: int, *inputs: object) -> None:
-        launch(kernel, dim, inputs, self.body.device)
-
     @property
     def _geometry(self) -> tuple[wp.array, ...]:
         return (self._elements, self.body.nodes, self.body.inverse_edges, self._volume)
@@ -260,22 +249,27 @@ class DrainageTerm(Term):
     def _multiply(self, x: wp.array, y: wp.array) -> None:
         coupling = self.coupling
         inputs = (coupling.offsets, coupling.columns, coupling.compliance)
-        self._launch(self._kernels.multiply, len(x), *inputs, x, y)
+        self.launch(self._kernels.multiply, len(x), *inputs, x, y)
 
     def _precondition(self, x: wp.array, y: wp.array) -> None:
-        self._launch(self._kernels.apply_diagonal, len(x), self._diagonal, x, y)
+        self.launch(self._kernels.apply_diagonal, len(x), self._diagonal, x, y)
 
     def _element_compliance(self, mass: float, stabilisation: float, flow: float, out: wp.array) -> None:
         scalar = self.body.precision.scalar
-        self._launch(
+        self.launch(
             self._kernels.compliance, len(self.stencils), *self._geometry, self.softness,
             scalar(self.mechanism.permeability), scalar(mass), scalar(stabilisation), scalar(flow), self._shape, out,
         )  # fmt: skip
 
     def take_moduli(self) -> None:
-        self.softness.assign(0.5 / (self.body.stiffness_factors * self.body.shear_moduli)[self._elements.numpy()])
+        body, elements = self.body, self._elements.numpy()
+        self.softness.assign(0.5 / (body.stiffness_factors * body.shear_moduli)[elements])
         self._element_compliance(self.mechanism.storage, 1.0, 0.0, self._storage)
-        self._entries.assign(self._yielding())
+        # the solid gives way to a pressure that varies over a length that is short beside the body: mass over
+        # `lam + 2 mu`, element by element
+        modulus = (body.stiffness_factors * (body.volumetric_moduli + 2.0 * body.shear_moduli))[elements]
+        pairs = [2.0 if a == b else 1.0 for a in range(4) for b in range(a, 4)]
+        self._entries.assign(np.outer(self._volume.numpy().astype(np.float64) / (20.0 * modulus), pairs))
         self._gather(self.coupling.yielding)
         self._renew()
 
@@ -289,30 +283,19 @@ class DrainageTerm(Term):
         self._element_compliance(mass, 0.0 if steady else 1.0, 1.0 if steady else self._h, self._entries)
         self._gather(self.coupling.compliance)
         inputs = (self.coupling.offsets, self.coupling.columns, self.coupling.compliance)
-        self._launch(self._kernels.invert_diagonal, len(self._diagonal), *inputs, self._diagonal)
+        self.launch(self._kernels.invert_diagonal, len(self._diagonal), *inputs, self._diagonal)
 
     def _gather(self, out: wp.array) -> None:
         """Sum entries of elements into sparse rows."""
-        self._launch(
+        self.launch(
             self._kernels.gather_compliance, len(self._rows), self._rows, self._columns, self._first,
             self._contributions, self._entries, self._closed, out,
         )  # fmt: skip
 
-    def _yielding(self) -> Floats:
-        """How the solid gives way to the pressure, element by element (k, 10): mass over `lam + 2 mu`.
-
-        So much it does to a pressure that varies over a length that is short beside the body.
-        """
-        elements = self._elements.numpy()
-        body = self.body
-        modulus = (body.stiffness_factors * (body.volumetric_moduli + 2.0 * body.shear_moduli))[elements]
-        pairs = [2.0 if a == b else 1.0 for a in range(4) for b in range(a, 4)]
-        return np.outer(self._volume.numpy().astype(np.float64) / (20.0 * modulus), pairs)
-
     def _solve(self, u: wp.array) -> None:
         """The pressure at a displacement."""
-        self._launch(self._kernels.volumes, len(self.stencils), *self._geometry, u, self._taken)
-        self._launch(
+        self.launch(self._kernels.volumes, len(self.stencils), *self._geometry, u, self._taken)
+        self.launch(
             self._kernels.supply, len(self._held), self._corner_first, self._corners, self._taken, self._held,
             self._lumped, self._closed, self._numbers, self.scale, self._solver.b,
         )  # fmt: skip
@@ -343,7 +326,7 @@ class DrainageTerm(Term):
 
     def advance(self, u: wp.array) -> None:
         self._solve(u)
-        self._launch(
+        self.launch(
             self._kernels.content, len(self._held), self._corner_first, self._corners, self._elements,
             self.body.nodes, self._taken, self._storage, self._beyond, self._numbers, self.scale, self._held,
         )  # fmt: skip
@@ -380,7 +363,7 @@ class DrainageTerm(Term):
 
     def _act(self, kernel: object, u: wp.array, *outputs: wp.array) -> None:
         inputs = (self._beyond, self._numbers, self.scale, u)
-        self._launch(kernel, len(self.stencils), *self._geometry, *inputs, *outputs)
+        self.launch(kernel, len(self.stencils), *self._geometry, *inputs, *outputs)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._solve(u)
@@ -390,7 +373,7 @@ class DrainageTerm(Term):
         self._solve(u)
         self._act(self._kernels.tangents, u, self.forces, self.blocks, self._element_coupling)
         coupling = self.coupling
-        self._launch(
+        self.launch(
             self._kernels.gather_coupling, len(self._rows), self._rows, self._columns, self._first,
             self._contributions, self._element_coupling, self._closed, coupling.own, coupling.others,
         )  # fmt: skip
@@ -400,11 +383,11 @@ class DrainageTerm(Term):
             return
         coupling, n = self.coupling, len(self._held)
         sparse = (coupling.offsets, coupling.columns)
-        self._launch(self._kernels.taken_up, n, *sparse, coupling.own, columns, x, self._change.b)
+        self.launch(self._kernels.taken_up, n, *sparse, coupling.own, columns, x, self._change.b)
         self._change.x.zero_()
         self._change.solve(self._tolerance)
         number = self.body.precision.scalar(factor)
-        self._launch(self._kernels.push, n, *sparse, coupling.others, self._change.x, number, rows, y)
+        self.launch(self._kernels.push, n, *sparse, coupling.others, self._change.x, number, rows, y)
 
     def energy(self, u: wp.array) -> float:
         self._solve(u)

@@ -28,7 +28,7 @@ are no part of it.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -107,15 +107,13 @@ class Pressure(Mechanism):
         """On every free surface."""
         if not situation.free:
             raise NotTestableError("needs a part of the surface that nothing holds")
-        usual = 400.0 * situation.stiffness
+        sd = 400.0 * situation.stiffness
         return [
-            Proposal.of_one(partial(cls._of_value, surface.name), 0.0, usual, region=surface.words, varying=(0,))
+            Proposal.of_one(
+                lambda p, at=surface.name: cls(nodes=at, value=p), 0.0, sd, region=surface.words, varying=(0,)
+            )
             for surface in situation.free
         ]
-
-    @classmethod
-    def _of_value(cls, nodes: str, value: float) -> "Pressure":
-        return cls(nodes=nodes, value=value)
 
     def bind(self, body: Body) -> "PressureTerm":
         return PressureTerm(body, self.faces(body.mesh), self.value, self.factor)
@@ -160,18 +158,14 @@ class PressureTerm(TriangleTerm):
             for sign in (1.0, -1.0):
                 moved = u.copy()
                 moved.ravel()[component] += sign * step
-                sides.append(self._nodal_forces(moved).ravel()[components])
+                self.evaluate_forces(self.array(moved, self.body.precision.vec3))
+                forces = np.zeros(u.shape)
+                np.add.at(forces, self.stencils, self.forces.numpy())
+                sides.append(forces.ravel()[components])
             columns.append((sides[0] - sides[1]) / (2.0 * step))
         skew = 0.5 * (np.column_stack(columns) - np.array(columns))
         rows, others = np.meshgrid(components, components, indexing="ij")
         return coo_matrix((skew.ravel(), (rows.ravel(), others.ravel())), shape=(u.size, u.size)).tocsr()
-
-    def _nodal_forces(self, u: Floats) -> Floats:
-        """Internal forces (n, 3) [N] at a displacement."""
-        self.evaluate_forces(self.array(u, self.body.precision.vec3))
-        forces = np.zeros(u.shape)
-        np.add.at(forces, self.stencils, self.forces.numpy())
-        return forces
 
 
 @cache

@@ -198,15 +198,12 @@ class ViscoelasticTerm(KernelTerm):
         made, *kernels = _kernels(body.precision)
         super().__init__(body, body.tetrahedra, kernels, mechanism.factor)
         self.mechanism = mechanism
-        scalar, mat33 = body.precision.scalar, body.precision.mat33
-        count, branches = len(self.stencils), len(mechanism.times)
+        mat33, count, branches = body.precision.mat33, len(self.stencils), len(mechanism.times)
         self.elements = np.arange(count)
-        self._weights = wp.zeros((count, 3), dtype=scalar, device=body.device)
+        self._weights = self.zeros(count, 3)
         self.take_moduli()
-        self._decay = wp.zeros(branches, dtype=scalar, device=body.device)
-        self._response = wp.zeros(branches, dtype=scalar, device=body.device)
-        self._q = wp.zeros((count, branches), dtype=mat33, device=body.device)
-        self._S = wp.zeros(count, dtype=mat33, device=body.device)
+        self._decay, self._response = self.zeros(branches), self.zeros(branches)
+        self._q, self._S = self.zeros(count, branches, dtype=mat33), self.zeros(count, dtype=mat33)
         self._branches = made()
         self._branches.nodes, self._branches.inverse_edges = body.nodes, body.inverse_edges
         self._branches.q, self._branches.S_before, self._branches.scale = self._q, self._S, self.scale
