@@ -31,7 +31,7 @@ FLOORS = [
     *("worlds", "diagnosis", "report", "terminal", "bench", "cli"),
 ]
 #: Modules that any floor may use, and that use none; the package's public names are everyone's.
-LEAVES = ["arrays", "errors", "atomic", "frame", "keys", "plugins", "problems", "seconds", "shown", "threads", "values"]
+LEAVES = ["arrays", "errors", "atomic", "frame", "keys", "plugins", "problems", "seconds", "shown", "threads"]
 #: Where a kind of mechanism, or a class of one, may stand outside `physics/mechanisms`, and why.
 NAMED = {
     "cases/boundary.py": "[[boundary]] kinds of case.toml",

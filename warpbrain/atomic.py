@@ -97,9 +97,9 @@ def _make_public(path: Path, rights: int) -> None:
     path.chmod(rights & ~mask)
 
 
-def _to_disk(path: Path) -> None:
+def _to_disk(path: Path, flags: int = os.O_RDWR | getattr(os, "O_BINARY", 0)) -> None:
     """Wait until what was written to a file is on the disk: a name may be there sooner than its content."""
-    descriptor = os.open(path, os.O_RDWR | getattr(os, "O_BINARY", 0))
+    descriptor = os.open(path, flags)
     try:
         os.fsync(descriptor)
     finally:
@@ -109,11 +109,7 @@ def _to_disk(path: Path) -> None:
 def _entries_to_disk(folder: Path) -> None:
     """The same of the names in a folder, where the system knows that."""
     with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        _to_disk(folder, os.O_RDONLY)
 
 
 def check_new_folder(path: Path) -> None:

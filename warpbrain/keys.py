@@ -1,4 +1,4 @@
-"""A key of `case.toml`: its type, unit, limits, default and meaning, and how its value is read and written."""
+"""A key of `case.toml`: its type, unit, limits, default and meaning, and how its value is read, written and shown."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from warpbrain.arrays import Floats
 from warpbrain.frame import Frame
-from warpbrain.values import finite, short
 
 #: Characters of a name, which stands in tables and names files.
 LONGEST_NAME = 100
@@ -76,20 +76,17 @@ class Key:
             if self.name == "name" and not (value.strip() and value.isprintable() and len(value) <= LONGEST_NAME):
                 return f"expected 1 to {LONGEST_NAME} printable characters, found {short(value)}"
         elif isinstance(value, dict):
-            return self._fault_of_table(value)
+            keys = {key.name: key for key in self.keys}
+            for name, inner in value.items():
+                if name not in keys:
+                    return f"{name}: unknown key, expected {', '.join(keys)}"
+                if fault := keys[name].fault(inner):
+                    return f"{name}: {fault}"
+            missing = [key.name for key in self.keys if key.needed and key.name not in value]
+            return f"{missing[0]}: missing, found {short(value)}" if missing else ""
         elif not isinstance(value, list) and not self.above < value < self.below:
             return f"found {value:g}, expected {self._limits()}"
         return ""
-
-    def _fault_of_table(self, value: dict[str, Any]) -> str:
-        keys = {key.name: key for key in self.keys}
-        for name, inner in value.items():
-            if name not in keys:
-                return f"{name}: unknown key, expected {', '.join(keys)}"
-            if fault := keys[name].fault(inner):
-                return f"{name}: {fault}"
-        missing = [key.name for key in self.keys if key.needed and key.name not in value]
-        return f"{missing[0]}: missing, found {short(value)}" if missing else ""
 
     def _limits(self) -> str:
         if math.isinf(self.below):
@@ -100,23 +97,38 @@ class Key:
         """A value of a file in SI units and RAS axes: a float or a tuple of them; a text as it is."""
         if isinstance(value, str):
             return value
-        if isinstance(value, int | float):
-            return (frame.metres if self.unit == "units" else self.si) * float(value)
-        if "vector" not in self.kinds:
-            return tuple((self.si * np.asarray(value, dtype=float)).tolist())
-        vector = frame.lengths(value) if self.unit == "units" else self.si * frame.directions(value)
-        return tuple(vector.tolist())
+        scaled = self._si_factor(frame) * self._in_other_axes(value, frame)
+        return float(scaled) if scaled.ndim == 0 else tuple(scaled.tolist())
 
     def in_file(self, value: Any, frame: Frame) -> Any:
         """The same back: what a file says."""
         if isinstance(value, str):
             return value
-        if isinstance(value, int | float):
-            return float(value) / (frame.metres if self.unit == "units" else self.si)
-        if "vector" not in self.kinds:
-            return (np.asarray(value, dtype=float) / self.si).tolist()
-        vector = frame.file_lengths(value) if self.unit == "units" else frame.directions(value) / self.si
-        return vector.tolist()
+        return (self._in_other_axes(value, frame) / self._si_factor(frame)).tolist()
+
+    def _si_factor(self, frame: Frame) -> float:
+        return frame.metres if self.unit == "units" else self.si
+
+    def _in_other_axes(self, value: Any, frame: Frame) -> Floats:
+        """Numbers with the signs of the other axes, if they are a vector."""
+        is_vector = "vector" in self.kinds and np.ndim(value) > 0
+        return frame.directions(value) if is_vector else np.asarray(value, dtype=np.float64)
+
+
+def finite(value: Any) -> bool:
+    """Whether it is a number of TOML that a float can hold (its integers may have any number of digits)."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def short(value: Any) -> str:
+    """A value as an error message shows it, on one line of a length that can be read."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 #: (wanted, found) pairs that fit as well: three numbers are a list of numbers, a file's name is text.

@@ -31,7 +31,7 @@ from warpbrain.gp.literature.studies import VARIANTS, Variant, read_studies
 from warpbrain.gp.literature.study import GROUPS, Study
 from warpbrain.gp.process import Process
 from warpbrain.gp.training import JITTER, Climb, train
-from warpbrain.values import finite
+from warpbrain.keys import finite
 
 Kind = Literal["hierarchical", "coregionalised"]
 #: Kinds of models, the default first.

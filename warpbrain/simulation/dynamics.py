@@ -12,7 +12,6 @@ implicit equation itself, with `K v = (A v - (1 + h m_d) M v) / (h k_d + h^2)` i
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
@@ -26,6 +25,7 @@ from warpbrain.kernels.assembly import dynamics_kernels
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.kernels.multicore import Graph, launch
 from warpbrain.kernels.precision import Precision
+from warpbrain.seconds import Seconds
 from warpbrain.simulation.system import System
 
 #: The paper's phases of a step, in order, by their names in its Table 3.
@@ -61,17 +61,16 @@ class PhaseClock:
 
     def __init__(self, device: Any) -> None:
         self._device = device
-        self.seconds: dict[str, float] = {}
+        self.seconds = Seconds()
         self.counts: dict[str, int] = {}
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
         """Time a block as part of a phase."""
         wp.synchronize_device(self._device)
-        start = time.perf_counter()
-        yield
-        wp.synchronize_device(self._device)
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+        with self.seconds.of(name):
+            yield
+            wp.synchronize_device(self._device)
         self.counts[name] = self.counts.get(name, 0) + 1
 
 
@@ -227,11 +226,6 @@ class Simulator:
         inputs = [self._u_start, s.solution, self._v_prescribed, s.free, h, self.v, s.u]
         launch(self._kernels.update, s.size, inputs, s.device)
 
-    def _begin(self) -> None:
-        if self.newton > 1:
-            wp.copy(self._v_start, self.v)
-            wp.copy(self._u_start, self.system.u)
-
     def _finish(self) -> None:
         self.time += self._h
         self._pending = True
@@ -241,7 +235,9 @@ class Simulator:
 
     def _run_phases(self, clock: PhaseClock | None = None) -> None:
         phase: Callable[[str], AbstractContextManager[Any]] = nullcontext if clock is None else clock.phase
-        self._begin()
+        if self.newton > 1:
+            wp.copy(self._v_start, self.v)
+            wp.copy(self._u_start, self.system.u)
         for iteration in range(self.newton):
             with phase(PHASES[0]):
                 self.internal_forces()

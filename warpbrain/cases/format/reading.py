@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.frame import Frame
-from warpbrain.keys import Table
+from warpbrain.keys import Table, short
 from warpbrain.mesh import TetMesh
 from warpbrain.problems import Problems
-from warpbrain.values import short
 
 #: No case.toml is as large as this [bytes]; a file that is must be something else.
 LARGEST_TOML = 4 << 20

@@ -9,8 +9,8 @@ from warpbrain.cases.case_template import DENSITY
 from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import BODY, PRIOR, PRIOR_GROUPS, TISSUE
 from warpbrain.errors import InputError
+from warpbrain.keys import short
 from warpbrain.physics.laws import LAWS, Law
-from warpbrain.values import short
 
 #: Densities [kg/m3] that a tissue, gel or foam can have: wide, and too narrow for g/cm3.
 LIGHTEST, HEAVIEST = 20.0, 30000.0

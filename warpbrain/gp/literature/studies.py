@@ -36,9 +36,9 @@ import numpy as np
 from warpbrain.errors import InputError
 from warpbrain.gp.literature.forms import FORMS, Convention, Parameter, Parameters
 from warpbrain.gp.literature.study import GROUPS, STRETCHES, Study
+from warpbrain.keys import finite, short
 from warpbrain.problems import Problems
 from warpbrain.recordings.text import read_text
-from warpbrain.values import finite, short
 
 Variant = Literal["as_published", "corrected"]
 VARIANTS: tuple[Variant, ...] = ("as_published", "corrected")
