@@ -41,25 +41,8 @@ from warpbrain.physics.laws import Law
 from warpbrain.physics.load import Ramped
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
-from warpbrain.physics.term import Following
+from warpbrain.physics.term import Following as Following
 from warpbrain.physics.words import Smallest, Values, clauses, label, number
-
-__all__ = [
-    "Emptying",
-    "Facts",
-    "Following",
-    "Growing",
-    "Mechanism",
-    "ParameterError",
-    "Reading",
-    "Relaxing",
-    "Removing",
-    "Says",
-    "Storing",
-    "Substituting",
-    "Weakening",
-    "parameter",
-]
 
 #: What the value of a parameter can be: a number, free text, the name of a node set with faces, of an element set, of
 #: an array of directions, a closed surface, a position, a vector that is no length, or numbers. Users may say a tissue

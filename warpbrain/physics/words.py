@@ -153,13 +153,6 @@ def vector_in(values: Values, name: str) -> Floats:
     return np.array([0.0 if component is None else component.value for component in components])
 
 
-def radius_in_words(values: Values) -> list[str]:
-    """Of what acts in a ball or on a patch; none where its radius is not known."""
-    if "radius" not in values:
-        return []
-    return [f"its radius is {measured(values['radius'].value, values['radius'].sd, 'mm')}"]
-
-
 def clauses(parameters: Mapping[str, Says], values: Values) -> list[str]:
     """Numbers as their parameters say what they are; places and directions are said elsewhere."""
     sentences = []

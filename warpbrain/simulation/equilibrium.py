@@ -9,11 +9,10 @@ interior can follow. Linear systems are solved inexactly while far from the solu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import warp as wp
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
@@ -297,9 +296,18 @@ class EquilibriumSolver:
             except _StepFailed as failure:
                 tried, step = step, 0.5 * step
                 exhausted = len(self._history) >= self.options.max_total_newton
-                if exhausted or step < self.options.min_load_step:
-                    raise SolveError(self._no_equilibrium(done, tried, str(failure))) from None
-                continue
+                if not exhausted and step >= self.options.min_load_step:
+                    continue
+                text = (
+                    f"no equilibrium found beyond {100.0 * done:.3g} % of the load, after {len(self._history)} Newton "
+                    f"iterations and load steps down to {100.0 * tried:.2g} %: {failure}"
+                )
+                if unstable := sum(record.indefinite for record in self._history):
+                    text += (
+                        f". The tangent stiffness was indefinite in {unstable} iterations: under this load the body "
+                        "passes unstable states, as when part of it collapses"
+                    )
+                raise SolveError(text) from None
             u, done, step = reached, load, min(2.0 * step, self.options.max_load_step)
             if done == 1.0:
                 u, energy, residual = self._augmented(u, full, target, energy, residual)
@@ -314,7 +322,11 @@ class EquilibriumSolver:
             before = self.system.remembered()
             closer = [term.augment(self.system.u) for term in self.system.terms]
             if not any(closer):
-                self._keep(before)
+                if any(before):
+                    # what the state is in equilibrium with, not what another augmentation would have
+                    self.system.recall(before)
+                    self.system.evaluate_forces()
+                    self.system.gather_forces()
                 return u, energy, residual
             try:
                 u, energy, residual = self._newton(u, 1.0, full, target)
@@ -323,27 +335,6 @@ class EquilibriumSolver:
         raise SolveError(
             f"a contact is not closed after {self.options.max_augmentations} augmentations: give it a larger penalty"
         )
-
-    def _keep(self, remembered: Sequence[tuple[wp.array, ...]]) -> None:
-        """Let terms remember what the state is in equilibrium with, not what another augmentation would have."""
-        if any(remembered):
-            self.system.recall(remembered)
-            self.system.evaluate_forces()
-            self.system.gather_forces()
-
-    def _no_equilibrium(self, done: float, step: float, why: str) -> str:
-        """The last word on a load that found no equilibrium."""
-        text = (
-            f"no equilibrium found beyond {100.0 * done:.3g} % of the load, after {len(self._history)} Newton "
-            f"iterations and load steps down to {100.0 * step:.2g} %: {why}"
-        )
-        unstable = sum(record.indefinite for record in self._history)
-        if unstable:
-            text += (
-                f". The tangent stiffness was indefinite in {unstable} iterations: under this load the body passes "
-                "unstable states, as when part of it collapses"
-            )
-        return text
 
     def _newton(self, start: Floats, load: float, external: Floats, target: Floats) -> tuple[Floats, float, float]:
         """Newton's method at one load; returns displacement, stored energy and relative residual."""

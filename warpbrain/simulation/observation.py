@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 
@@ -15,26 +14,14 @@ from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments, goes_on
 from warpbrain.errors import InputError, require_kind
-from warpbrain.mesh import TetMesh
+from warpbrain.physics.load import Ramped
 from warpbrain.recordings.comparison import Comparison, compare_force, compare_points, compare_surface, joined
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.times import compared_rows, rows_at, times_of
+from warpbrain.simulation.result import NodalState, Result
 
-
-class State(Protocol):
-    """What recordings are compared with: a `warpbrain.simulation.result.Result`, or less than that."""
-
-    @property
-    def mesh(self) -> TetMesh:
-        """The simulated mesh, undeformed."""
-
-    @property
-    def u(self) -> Floats:
-        """Displacement [m], shape (n, 3)."""
-
-    @property
-    def reactions(self) -> Floats:
-        """What holds the constrained components [N], shape (n, 3)."""
+#: What recordings are compared with.
+State = NodalState | Result
 
 
 @dataclass(frozen=True)
@@ -67,22 +54,18 @@ def observe(
     require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
     comparisons, skipped = [], []
     for recording in case.recordings:
+        state_of = partial(_state_at, case, recording, result, time, others or {})
         try:
-            comparisons.append(_compare(case, recording, result, time, others or {}))
+            groups = _rows_by_time(case, recording, time, others or {})
+            before = None if recording.reference is None else state_of(recording.reference)
+            comparisons.append(
+                joined([_compared(case, recording, state_of(at), at, before, rows) for at, rows in groups])
+            )
         except InputError as error:
             skipped.append(f"{error}")
         if isinstance(recording, ForceRecording) and recording.torque is not None:
             skipped.append(f"torque of '{recording.name}': a boundary has no axis that it could be about")
     return Observed(tuple(comparisons), tuple(skipped))
-
-
-def _compare(
-    case: Case, recording: Recording, result: State, time: float | None, states: Mapping[float, State]
-) -> Comparison:
-    groups = _rows_by_time(case, recording, time, states)
-    state_of = partial(_state_at, case, recording, result, time, states)
-    before = None if recording.reference is None else state_of(recording.reference)
-    return joined([_compared(case, recording, state_of(at), at, before, rows) for at, rows in groups])
 
 
 def _rows_by_time(
@@ -150,6 +133,5 @@ def _resultant(case: Case, recording: ForceRecording, result: State, time: float
     """Force (3,) [N] with which the recording's boundary acts on the tissue."""
     boundary = case.boundary(recording.boundary)
     if isinstance(boundary, Forced):
-        times, factors = zip(*boundary.ramp, strict=True) if boundary.ramp else ((0.0,), (1.0,))
-        return np.interp(time, times, factors) * np.array(boundary.total)
+        return Ramped(ramp=boundary.ramp).factor(time) * np.array(boundary.total)
     return np.asarray(result.reactions[result.mesh.node_sets[boundary.nodes]].sum(axis=0))

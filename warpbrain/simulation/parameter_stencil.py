@@ -57,18 +57,12 @@ class ParameterStencil:
         self.steps = system.precision.epsilon**0.2 * sizes
         self.model = models(point)
         self._made: dict[int, Term] = {}
-        self._places = [
-            {distance: self._place(models, point, k, distance) for distance in _STENCIL} for k in range(len(point))
-        ]
+        directions = np.diag(self.steps)
+        self._places = [{distance: models(point + distance * h) for distance in _STENCIL} for h in directions]
         system.set_model(self.model)
         remembered = system.remembered()
         self._remembered = [dict.fromkeys(_STENCIL, remembered) for _ in self._places]
         self._here = remembered
-
-    def _place(self, models: ModelOf, point: Floats, k: int, distance: int) -> Model:
-        shifted = point.copy()
-        shifted[k] += distance * self.steps[k]
-        return models(shifted)
 
     def __len__(self) -> int:
         return len(self._places)

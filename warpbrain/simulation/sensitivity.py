@@ -204,7 +204,10 @@ class SensitivitySolver:
         if not len(stencil):
             none = np.zeros((0, system.size, 3))
             return Sensitivities(none, none, ())
-        corrections = Corrections(self._solver(len(stencil)), system, self._tolerance)
+        count = len(stencil)
+        if count not in self._solvers:
+            self._solvers[count] = several_solver(system, count, self._tolerance, self._max_cg)
+        corrections = Corrections(self._solvers[count], system, self._tolerance)
         with stencil.away():
             moved, residual = self._balance(stencil, state, corrections)
         constrained = system.model.constrained
@@ -257,11 +260,6 @@ class SensitivitySolver:
             after = system.remembered()
         stencil.shift_memory(after, before)
 
-    def _solver(self, count: int) -> SeveralSolver:
-        if count not in self._solvers:
-            self._solvers[count] = several_solver(self.system, count, self._tolerance, self._max_cg)
-        return self._solvers[count]
-
 
 class Corrections:
     """Solves with the system's matrix as it is now, and counts what they take; the first to the tolerance, later ones
@@ -280,7 +278,17 @@ class Corrections:
         solved = self._solver.solve(list(residual), self._tolerance if self._first else self._rough)
         results = self._solver.results()
         for k, linear in enumerate(results):
-            _require_solved(linear, k)
+            if linear.indefinite:
+                raise SolveError(
+                    f"sensitivity to parameter {k}: the tangent stiffness is indefinite (curvature "
+                    f"{linear.curvature:.2e} N/m): the equilibrium is unstable, and does not change smoothly with what "
+                    "it is of"
+                )
+            if not linear.converged:
+                raise SolveError(
+                    f"sensitivity to parameter {k}: conjugate gradients did not converge in {linear.iterations} "
+                    f"iterations (residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
+                )
         before = self.cg_iterations or (0,) * len(results)
         self.cg_iterations = tuple(n + linear.iterations for n, linear in zip(before, results, strict=True))
         self._first = False
@@ -294,19 +302,6 @@ def several_solver(system: System, count: int, tolerance: float, max_cg: int = 1
     return BlockConjugateGradient(
         system.matrix, system.diagonal, count, system.precision, tolerance=tolerance, max_iterations=max_cg
     )
-
-
-def _require_solved(linear: LinearResult, parameter: int) -> None:
-    if linear.indefinite:
-        raise SolveError(
-            f"sensitivity to parameter {parameter}: the tangent stiffness is indefinite (curvature "
-            f"{linear.curvature:.2e} N/m): the equilibrium is unstable, and does not change smoothly with what it is of"
-        )
-    if not linear.converged:
-        raise SolveError(
-            f"sensitivity to parameter {parameter}: conjugate gradients did not converge in {linear.iterations} "
-            f"iterations (residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -366,22 +366,18 @@ def interpolated(imposed: Floats, response: Floats, rows: Floats) -> Floats:
     return np.asarray(PchipInterpolator(imposed, response)(rows), dtype=np.float64)
 
 
-def _inverted(recording: TestRecording, imposed: Floats, response: Floats) -> Floats:
-    """What answers the forces of a test (n,), by a curve that must rise."""
-    if len(imposed) > 1 and not (np.diff(response) > 0.0).all():
-        raise SolveError(
-            f"test '{recording.name}' ({recording.mode}): the {recording.quantities[1]} does not rise with the "
-            f"{recording.quantities[0]}: under a force the specimen is not stable"
-        )
-    return interpolated(response, imposed, recording.response)
-
-
 def _result(recording: TestRecording, states: Sequence[_State], history: History | None = None) -> TestResult:
     """States in the order of their imposed values, or of their times, at the rows of the recording."""
     imposed = np.array([state.imposed for state in states])
     response = np.array([state.response for state in states])
     if recording.force_controlled:
-        predicted = _inverted(recording, imposed, response)
+        # what answers the forces that were imposed, by a curve that must rise
+        if len(imposed) > 1 and not (np.diff(response) > 0.0).all():
+            raise SolveError(
+                f"test '{recording.name}' ({recording.mode}): the {recording.quantities[1]} does not rise with the "
+                f"{recording.quantities[0]}: under a force the specimen is not stable"
+            )
+        predicted = interpolated(response, imposed, recording.response)
     elif history is None or recording.time is None:
         predicted = interpolated(imposed, response, recording.imposed)
     else:
@@ -522,8 +518,8 @@ class SpecimenRunning:
 
         `SolveError` if a state of a test is not found.
         """
-        return SpecimenRun(self.case, self.rig, tuple(self._tested(recording, on_state) for recording in self.tests))
-
-    def _tested(self, recording: TestRecording, on_state: Callable[[float, str], None]) -> Tested:
-        result = self.rig.run(recording, on_state=lambda part: on_state(part, recording.name))
-        return Tested(recording, result, compare_test(recording, result))
+        tests = []
+        for recording in self.tests:
+            result = self.rig.run(recording, on_state=lambda part, name=recording.name: on_state(part, name))
+            tests.append(Tested(recording, result, compare_test(recording, result)))
+        return SpecimenRun(self.case, self.rig, tuple(tests))

@@ -127,6 +127,7 @@ class System:
         self.size, self.elements = len(self.node_mesh.points), len(self.mesh.tetrahedra)
         self.constrained: Bools = model.constrained
         self.movable: Bools = np.asarray(~model.constrained.all(axis=1))
+        self._averages, self._mixes = model.elements == "tet4-averaged", model.elements == "tet10-mixed"
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
         # of each element; terms ask for them
@@ -144,7 +145,13 @@ class System:
         self._volumes_at_nodes: NodalVolumeTerm | None = None
         self._beyond_blocks: PatchStiffnessTerm | None = None
         if self._mixes:
-            self._place_volumes()
+            logarithmic = {label: m.formulation == "coupled" for label, m in model.materials.items()}
+            self._volumes_at_nodes = NodalVolumeTerm(
+                self, self._by_element(logarithmic).astype(bool), model.element_kinds
+            )
+            # in this order: the second takes its numbers from the first
+            self._beyond_blocks = PatchStiffnessTerm(self._volumes_at_nodes)
+            self.terms += [self._volumes_at_nodes, self._beyond_blocks]
         self._coupled = [term for term in self.terms if term.coupling is not None]
         self._place_pattern()
         self._place_fields()
@@ -210,23 +217,6 @@ class System:
     def once(self, kind: str, arrays: Sequence[NDArray[Any]], make: Callable[[], T]) -> T:
         """See `Assembly.once`."""
         return self.assembly.once(kind, arrays, make)
-
-    @property
-    def _averages(self) -> bool:
-        return self.model.elements == "tet4-averaged"
-
-    @property
-    def _mixes(self) -> bool:
-        return self.model.elements == "tet10-mixed"
-
-    def _place_volumes(self) -> None:
-        formulations = {label: m.formulation == "coupled" for label, m in self.model.materials.items()}
-        self._volumes_at_nodes = NodalVolumeTerm(
-            self, self._by_element(formulations).astype(bool), self.model.element_kinds
-        )
-        # in this order: the second takes its numbers from the first
-        self._beyond_blocks = PatchStiffnessTerm(self._volumes_at_nodes)
-        self.terms += [self._volumes_at_nodes, self._beyond_blocks]
 
     @staticmethod
     def _grouped(model: Model) -> dict[tuple[type[Law], str], dict[int, Material]]:
@@ -488,22 +478,12 @@ class System:
         assert self._beyond_blocks is not None
         self._beyond_blocks.add_stiffness(x, factor, y, self.free, self.free, self._stiffness_factor)
 
-    def _add_all_beyond_blocks(
-        self, increment: wp.array, sign: float, k: float, coupling: float | None, columns: wp.array, rows: wp.array
-    ) -> None:
-        """Add to `load` what of `sign k K increment` is not in blocks, of couplings `coupling` times if given."""
-        for term in self.terms:
-            factor = k if term.coupling is None or coupling is None else coupling
-            if factor != 0.0:
-                term.add_stiffness(increment, sign * factor, self.load, columns, rows)
-
     def subtract_constrained_load(self, increment: wp.array, k: float, coupling: float | None = None) -> None:
         """`load -= k K increment` on the free components, for increments of the constrained ones.
 
         What unknowns of a term's own do to it counts `coupling` times, `k` times if absent.
         """
-        self._add_all_beyond_blocks(increment, -1.0, k, coupling, self._all_components, self.free)
-        self._subtract_blocks_times(increment, k, self.free)
+        self._subtract_stiffness_times(increment, k, coupling, self.free)
 
     def stiffness_times(self, increment: Floats, k: float = 1.0, coupling: float | None = None) -> Floats:
         """`k K increment` [N] on every component, constrained ones included, shape (n, 3).
@@ -512,12 +492,16 @@ class System:
         """
         self.increment.assign(increment)
         self.load.zero_()
-        self._subtract_blocks_times(self.increment, -k, self._all_components)
-        self._add_all_beyond_blocks(self.increment, 1.0, k, coupling, self._all_components, self._all_components)
+        added = None if coupling is None else -coupling
+        self._subtract_stiffness_times(self.increment, -k, added, self._all_components)
         return self.load.numpy().astype(np.float64)
 
-    def _subtract_blocks_times(self, increment: wp.array, k: float, rows: wp.array) -> None:
-        """`load -= k K increment`, of what of `K` is in blocks, on components that are 1 in `rows`."""
+    def _subtract_stiffness_times(self, increment: wp.array, k: float, coupling: float | None, rows: wp.array) -> None:
+        """`load -= k K increment`, of couplings `coupling` times if given, on components that are 1 in `rows`."""
+        for term in self.terms:
+            factor = k if term.coupling is None or coupling is None else coupling
+            if factor != 0.0:
+                term.add_stiffness(increment, -factor, self.load, self._all_components, rows)
         self._launch(
             self._kernels.constrained_load, self.size, self.matrix.offsets, self.matrix.columns, self.block_pairs,
             self.pair_first, self.contributions, self._flat_blocks, increment, rows, self.precision.scalar(k),
@@ -758,13 +742,11 @@ class System:
             cofactors = np.linalg.det(F)[:, None, None] * np.linalg.inv(F).transpose(0, 2, 1)
             total += self._volumes_at_nodes.pressures(self.u)[:, None, None] * cofactors
         for added in self.terms:
-            if added.elements is not None:
-                total[added.elements] += self._mean_stress(added, added.elements)
+            if added.elements is None:
+                continue
+            # the mean over the element: `sum_a f_a (x) X_a / V`
+            added.evaluate_forces(self.u)
+            forces, points = added.forces.numpy().astype(np.float64), self.node_mesh.points[added.stencils]
+            away = points - points.mean(axis=1, keepdims=True)
+            total[added.elements] += np.einsum("eai,eaj,e->eij", forces, away, 1.0 / self._volumes[added.elements])
         return total
-
-    def _mean_stress(self, term: Term, elements: NDArray[np.integer]) -> Floats:
-        """Mean of what a term adds to the stress of its elements [Pa], (k, 3, 3): `sum_a f_a (x) X_a / V`."""
-        term.evaluate_forces(self.u)
-        points = self.node_mesh.points[term.stencils]
-        away = points - points.mean(axis=1, keepdims=True)
-        return np.einsum("eai,eaj,e->eij", term.forces.numpy().astype(np.float64), away, 1.0 / self._volumes[elements])

@@ -83,9 +83,10 @@ class Law(abc.ABC):
         Where it has coordinates of its shape they are further arguments.
         """
 
-    @abc.abstractmethod
     def parameters(self) -> tuple[float, ...]:
-        """Parameters in the order of the device code, without the volumetric one."""
+        """Parameters in the order of the device code, without the volumetric one: those of `keys` in turn."""
+        values = (getattr(self, key) for key in self.keys)
+        return tuple(number for value in values for number in (value if isinstance(value, tuple) else (value,)))
 
     @classmethod
     def parameter_rows(cls, laws: Sequence[Law]) -> list[tuple[float, ...]]:

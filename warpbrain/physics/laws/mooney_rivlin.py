@@ -121,9 +121,6 @@ class MooneyRivlin(Law):
     def shape(self) -> tuple[float, ...]:
         return (self.C2 / (self.C1 + self.C2),)
 
-    def parameters(self) -> tuple[float, ...]:
-        return (self.C1, self.C2)
-
     def energy(self, stretches: Floats) -> Floats:
         squares = stretches**2
         I1 = np.sum(squares, axis=-1)

@@ -100,9 +100,6 @@ class NeoHookean(Law):
     def of_shear_modulus(cls, mu: float) -> "NeoHookean":
         return cls(mu)
 
-    def parameters(self) -> tuple[float, ...]:
-        return (self.mu,)
-
     def energy(self, stretches: Floats) -> Floats:
         return 0.5 * self.mu * (np.sum(stretches**2, axis=-1) - 3.0)
 

@@ -211,9 +211,6 @@ class Ogden(Law):
             raise InputError(f"{self}: has no coordinates: expected neo-Hookean, Mooney-Rivlin or Ogden with one term")
         return self.alpha
 
-    def parameters(self) -> tuple[float, ...]:
-        return self.mu + self.alpha
-
     @classmethod
     def parameter_rows(cls, laws: Sequence[Law]) -> list[tuple[float, ...]]:
         """Laws with fewer terms than another get terms of no weight."""

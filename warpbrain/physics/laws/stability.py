@@ -51,15 +51,11 @@ def total_energy(law: Law, stretches: Floats, poisson: float, formulation: str) 
     modulus = law.volumetric_modulus(poisson, formulation)
     log_J = np.log(stretches).sum(axis=-1)
     if formulation == "coupled":
-        return law.energy(stretches) + log_J * (0.5 * modulus * log_J - _slope_at_rest(law))
+        # `c = dw/dl_i` at rest [Pa]: a third of the slope along `(l, l, l)`, all three being the same
+        slope, _ = derivatives(law.energy(_NEAR_REST), np.zeros(1), _STEP)
+        return law.energy(stretches) + log_J * (0.5 * modulus * log_J - float(slope[0]) / 3.0)
     isochoric = stretches * np.exp(-log_J / 3.0)[..., None]
     return law.energy(isochoric) + 0.5 * modulus * np.expm1(log_J) ** 2
-
-
-def _slope_at_rest(law: Law) -> float:
-    """`c = dw/dl_i` at rest [Pa]: a third of the slope along `(l, l, l)`, all three being the same."""
-    slope, _ = derivatives(law.energy(_NEAR_REST), np.zeros(1), _STEP)
-    return float(slope[0]) / 3.0
 
 
 @dataclass(frozen=True)
@@ -155,33 +151,33 @@ def require_stable(law: Law, poisson: float = 0.45, formulation: str = "coupled"
             f"{whole} has lam = {volumetric:.3g} Pa: its energy falls without bound as J -> 0 (supplement Table 2); "
             "the uncoupled formulation does not"
         )
-    _require_rest(whole, law.shear_modulus, total_energy(law, _REST.stretches, poisson, formulation))
+    energy = total_energy(law, _REST.stretches, poisson, formulation)
+    # by the symmetry of the energy its three slopes are the same: one along `(l, 1, 1)` stands for the gradient
+    rest, slope = float(energy[len(energy) // 2]), float(_REST.derivatives(energy)[0][_REST.steps])
+    if abs(rest) > 1e-9 * law.shear_modulus or abs(slope) > 1e-6 * law.shear_modulus:
+        raise UnstableLawError(f"{whole} is not at rest at l = 1: energy {rest:.3g} Pa, slope {slope:.3g} Pa")
     _require_rising_and_convex(repr(law), "", _UNIAXIAL, law.energy(_UNIAXIAL.stretches))
     _require_growth(law)
     for along, path in _IN_SPACE.items():
         _require_rising_and_convex(whole, along, path, total_energy(law, path.stretches, poisson, formulation))
 
 
-def _require_rest(subject: str, shear_modulus: float, energy: Floats) -> None:
-    """By the symmetry of the energy its three slopes are the same: one along `(l, 1, 1)` stands for the gradient."""
-    slope = float(_REST.derivatives(energy)[0][_REST.steps])
-    rest = float(energy[len(energy) // 2])
-    if abs(rest) > 1e-9 * shear_modulus or abs(slope) > 1e-6 * shear_modulus:
-        raise UnstableLawError(f"{subject} is not at rest at l = 1: energy {rest:.3g} Pa, slope {slope:.3g} Pa")
-
-
 def _require_rising_and_convex(subject: str, along: str, path: Path, energy: Floats) -> None:
     with np.errstate(over="ignore", invalid="ignore"):
         slope, curvature = path.derivatives(energy)
     wrong = (slope * path.logs <= 0.0) & (path.logs != 0.0)
+
+    def nearest_to_rest(where: Bools) -> float:
+        return float(np.exp(min(path.logs[where], key=abs)))
+
     if wrong.any():
-        l = _nearest_to_rest(path, wrong)
+        l = nearest_to_rest(wrong)
         side, sign = ("compression", "negative") if l < 1.0 else ("tension", "positive")
         raise UnstableLawError(
             f"{subject} is unstable in {side}{along}: dPsi/dl at l = {l:.3g} is not {sign} (supplement Table 2)"
         )
     if (curvature <= 0.0).any():
-        l = _nearest_to_rest(path, curvature <= 0.0)
+        l = nearest_to_rest(curvature <= 0.0)
         raise UnstableLawError(
             f"{subject} is unstable at the stretch l = {l:.3g}{along}: d2Psi/dl2 is not positive (supplement Table 2)"
         )
@@ -196,8 +192,3 @@ def _require_growth(law: Law) -> None:
             # an overflow is growth; otherwise six decades must add a visible part
             if np.isfinite([near, far]).all() and far < 1.01 * near:
                 raise UnstableLawError(f"{law!r}: the {name} does not grow without bound as {end} (supplement Table 2)")
-
-
-def _nearest_to_rest(path: Path, where: Bools) -> float:
-    logs = path.logs[where]
-    return float(np.exp(logs[np.argmin(np.abs(logs))]))

@@ -216,20 +216,13 @@ class Gravity(BodyForce, Mechanism):
             return ""
         axis = ", ".join(f"{v:g}" for v in self.direction)
         text = f" Its level: {1000.0 * self.csf_level:g} mm above the lowest point; gravity along ({axis}) in RAS"
-        turned = self.degrees_turned
+        down = unit_vector("direction", self.direction)
+        imaged = down if self.imaged_direction is None else unit_vector("imaged_direction", self.imaged_direction)
+        turned = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(down, imaged)), down @ imaged)))
         if turned < 0.05:
             return f"{text}."
         tissue = f"of tissue of {self.tissue_density:g} kg/m3"
         return f"{text}, {turned:.1f} degrees from where it was while imaged, {tissue}."
-
-    @property
-    def degrees_turned(self) -> float:
-        """Angle between gravity while it acts and while the reference was imaged."""
-        if self.imaged_direction is None:
-            return 0.0
-        down = unit_vector("direction", self.direction)
-        imaged = unit_vector("imaged_direction", self.imaged_direction)
-        return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(down, imaged)), down @ imaged)))
 
     def with_body_turned(self, rotation: Floats) -> Gravity:
         """See `warpbrain.physics.mechanism.Mechanism`; levels are counted from what is the lowest point then."""

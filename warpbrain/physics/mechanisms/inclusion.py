@@ -20,7 +20,7 @@ from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
-from warpbrain.physics.words import Smallest, Values, measured, number, radius_in_words
+from warpbrain.physics.words import Smallest, Values, measured, number
 
 #: Where it is looked for: standard deviation of the logarithm of the ratio, and radii of balls over
 #: that of the body, 12 to 27 mm of a brain.
@@ -40,7 +40,9 @@ class Inclusion(Mechanism):
     )
     elements: str = parameter("Element set of it.", default="", kind="element set")
     centre: tuple[float, float, float] | None = parameter("Centre of a ball.", default=None, kind="position")
-    radius: float | None = parameter("Its radius.", default=None, unit="mm", si=1e-3, above=0.0)
+    radius: float | None = parameter(
+        "Its radius.", default=None, unit="mm", si=1e-3, above=0.0, told=("its radius is {}",)
+    )
     kind: ClassVar[str] = "inclusion"
     enters: ClassVar[Enters] = Enters("moduli", "r")
     together: ClassVar[Mapping[str, str]] = {
@@ -63,12 +65,13 @@ class Inclusion(Mechanism):
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
+        others = super().size_in_words({name: value for name, value in values.items() if name != "ratio"})
         if "ratio" not in values or not values["ratio"].value > 0.0:
-            return radius_in_words(values)
+            return others
         ratio = values["ratio"]
         times, word = (ratio.value, "stiff") if ratio.value >= 1.0 else (1.0 / ratio.value, "soft")
         spread = times * ratio.sd / ratio.value
-        return [f"it is {measured(times, spread)} times as {word} as the tissue around", *radius_in_words(values)]
+        return [f"it is {measured(times, spread)} times as {word} as the tissue around", *others]
 
     @classmethod
     def smallest_in_words(cls, smallest: Smallest) -> str:

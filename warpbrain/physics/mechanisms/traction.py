@@ -24,7 +24,7 @@ from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_with
-from warpbrain.physics.words import HARDLY, Values, measured, radius_in_words, towards, unsure, vector_in
+from warpbrain.physics.words import HARDLY, Values, measured, towards, unsure, vector_in
 
 #: Where it is looked for: radii of patches over that of the body, 9 and 14 mm of a brain, and standard deviation of
 #: each component on brain [Pa].
@@ -52,6 +52,7 @@ class Traction(Load, Mechanism):
         si=1e-3,
         above=0.0,
         expectation=Uniform(5.0, 15.0),
+        told=("its radius is {}",),
     )
     kind: ClassVar[str] = "traction"
     quadratic: ClassVar[bool] = True
@@ -84,10 +85,10 @@ class Traction(Load, Mechanism):
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:
         if "value_size" not in values:
-            return radius_in_words(values)
+            return super().size_in_words(values)
         size = values["value_size"]
         where = f"in a direction {HARDLY}" if unsure(size) else towards(vector_in(values, "value"))
-        return [f"it acts with {measured(size.value, size.sd, 'Pa')} {where}".rstrip(), *radius_in_words(values)]
+        return [f"it acts with {measured(size.value, size.sd, 'Pa')} {where}".rstrip(), *super().size_in_words(values)]
 
     @classmethod
     def _pulling(cls, situation: Situation, site: Floats, radius: float) -> Proposal:
