@@ -29,7 +29,7 @@ from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh, surface_forces, volume_forces
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.finer import FinerCase
+from warpbrain.simulation.mesh_error import FinerCase
 from warpbrain.simulation.model import ELEMENTS, Material, Model
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System

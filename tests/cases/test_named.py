@@ -20,7 +20,7 @@ from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.regions import element_directions
-from warpbrain.simulation.finer import FinerCase
+from warpbrain.simulation.mesh_error import FinerCase
 from warpbrain.simulation.of_case import model_of
 
 COUNT = len(block().tetrahedra)

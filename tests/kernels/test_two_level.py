@@ -9,7 +9,7 @@ from shapes import cube, distorted
 
 from warpbrain.kernels.two_level import TwoLevelGradient
 from warpbrain.mesh.refinement import finer_mesh
-from warpbrain.simulation.finer import free_prolongation, prolongation
+from warpbrain.simulation.mesh_error import free_prolongation, prolongation
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
 

@@ -20,8 +20,7 @@ from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, solve_equilibrium
-from warpbrain.simulation.finer import FinerCase, GivenForces, prolongation
-from warpbrain.simulation.mesh_error import estimate, mesh_error
+from warpbrain.simulation.mesh_error import FinerCase, GivenForces, estimate, mesh_error, prolongation
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.result import NodalState, result_of
 from warpbrain.simulation.system import System

@@ -11,10 +11,9 @@ from testing_machine import CUBE, case_of, recorded, simulate_test
 
 from warpbrain.cases.reading import read_case
 from warpbrain.errors import InputError
-from warpbrain.simulation.courses import Course, Watching
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.run import Running, run
+from warpbrain.simulation.run import Course, Running, Watching, run
 from warpbrain.simulation.system import System
 
 

@@ -118,8 +118,7 @@ def _run(options: argparse.Namespace) -> None:
     from warpbrain.report.run_page import write_run_page
     from warpbrain.report.state_files import read_state
     from warpbrain.report.summary import describe_prior
-    from warpbrain.simulation.courses import Course
-    from warpbrain.simulation.run import Running
+    from warpbrain.simulation.run import Course, Running
     from warpbrain.simulation.system import begin_loading_kernels, find_device, find_precision
     from warpbrain.terminal.quiet import start_warp_quietly
     from warpbrain.terminal.result_folder import choose_folder, results_in

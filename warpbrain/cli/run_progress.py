@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
-    from warpbrain.simulation.courses import Watching
     from warpbrain.simulation.equilibrium import NewtonStep
     from warpbrain.simulation.relaxation import RelaxationStep
+    from warpbrain.simulation.run import Watching
 
 #: Newton iterations that are printed one by one.
 _LONG_HISTORY = 16
@@ -24,7 +24,7 @@ _INDENT = 12 * " "
 def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[Watching]:
     """Who is told of the steps, after the head of their table is printed."""
     from warpbrain.physics.words import tabled
-    from warpbrain.simulation.courses import Watching
+    from warpbrain.simulation.run import Watching
 
     if options.until is not None:
         name, columns = "slow change", "     time [s]   Newton    CG   min J   largest [mm]"

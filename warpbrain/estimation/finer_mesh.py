@@ -43,7 +43,7 @@ from warpbrain.kernels.linear import ConjugateGradient
 from warpbrain.kernels.two_level import TwoLevelGradient
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.finer import FinerCase, free_prolongation, restricted
+from warpbrain.simulation.mesh_error import FinerCase, free_prolongation, restricted
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.simulation.sensitivity import SensitivitySolver

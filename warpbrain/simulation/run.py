@@ -1,27 +1,220 @@
-"""A case from what a user has to what is computed of it: what `warpbrain run` and `warpbrain.run` do."""
+"""A case from what a user has to what is computed of it: what `warpbrain run` and `warpbrain.run` do.
+
+From rest to the state that is asked for: an equilibrium, a motion, a motion to rest, slow change.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
+from warpbrain.cases.moments import Moments, recorded_times
 from warpbrain.cases.shipped import as_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.shown import Shown
-from warpbrain.simulation.courses import Course, Followed, Watching, follow, states_at_rest
+from warpbrain.simulation.dynamics import PhaseClock, Simulator
+from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep
 from warpbrain.simulation.locking import choose_elements
 from warpbrain.simulation.model import ELEMENTS, Model, require_held
 from warpbrain.simulation.observation import Observed, observe
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.result import Result, nodal_state_of, result_of
+from warpbrain.simulation.quasi_static import follow_slowly, growing_times
+from warpbrain.simulation.relaxation import RelaxationOptions, RelaxationStep, relax_to_rest
+from warpbrain.simulation.result import NodalState, Result, nodal_state_of, result_of
 from warpbrain.simulation.specimen import SpecimenRun, SpecimenRunning, not_transmitted, specimen_of
 from warpbrain.simulation.system import System
+
+#: Steps of slow change where nobody names a number.
+SLOW_STEPS = 20
+
+
+@dataclass(frozen=True)
+class Course:
+    """How far a case is followed, and how closely. Of the first three at most one, but `steps` may go with `until`.
+
+    `InputError` if they mean nothing together, or a number makes no sense.
+    """
+
+    #: follow the motion for so many time steps of 1 ms; of slow change into how many it is divided
+    steps: int | None = None
+    to_rest: bool = False  # follow the damped motion until it is at rest
+    until: float | None = None  # follow slow change without inertia until then [s]
+    tolerance: float = 1e-8  # out-of-balance force in the end, relative to all nodal forces; see `EquilibriumOptions`
+
+    def __post_init__(self) -> None:
+        if self.steps is not None and (not isinstance(self.steps, int) or self.steps < 1):
+            raise InputError(f"steps = {self.steps!r}: expected a whole number of at least 1")
+        if self.until is not None and not (math.isfinite(self.until) and self.until > 0.0):
+            raise InputError(f"until = {self.until:g}: expected a positive number of seconds")
+        if not 0.0 < self.tolerance < 1.0:
+            raise InputError(f"tolerance = {self.tolerance:g}: expected a number between 0 and 1")
+        if self.to_rest and (self.steps is not None or self.until is not None):
+            other = "steps" if self.until is None else "until"
+            raise InputError(f"to_rest: means nothing with {other}: leave one of them out")
+
+
+@dataclass(frozen=True)
+class Watching:
+    """Who wants to know how a simulation gets on."""
+
+    newton: Callable[[NewtonStep], None] = lambda _step: None  # called with each Newton step to an equilibrium
+    relaxation: Callable[[RelaxationStep], None] = lambda _step: None  # called with each step of a motion to rest
+    #: called with the number of each step of a motion, and what is noted of it: nine of ten times nothing
+    motion: Callable[[int, float, dict[str, Any] | None], None] = lambda _number, _time, _noted: None
+    #: called with the part that is done of slow change, and each Newton step
+    slow_newton: Callable[[float, NewtonStep], None] = lambda _part, _step: None
+    #: called with the number of a moment of slow change, how many there will be, and what is noted of it
+    slow: Callable[[int, int, dict[str, Any]], None] = lambda _number, _count, _noted: None
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What a course came to; the system has its last state."""
+
+    #: for `summary.json`: what kind of state it is, how closely it was found, and the steps to it.
+    solution: dict[str, Any]
+    time: float | None  # of the state [s]; None of one at rest
+    begun: float  # when the first step was done, of `time.perf_counter`
+    seconds: Mapping[str, float]  # by phase
+    calls: Mapping[str, int]  # by phase
+    states: Mapping[float, NodalState] = field(default_factory=dict)  # earlier ones at which something was recorded
+
+
+def follow(case: Case, system: System, course: Course, watching: Watching) -> Followed:
+    """Simulate a system of a case; `SolveError` if there is no such state, or none was found."""
+    if course.until is not None:
+        return _slowly(case, system, course.until, course, watching)
+    if course.steps is not None:
+        return _motion(system, course.steps, watching)
+    return _to_rest(system, course, watching) if course.to_rest else _equilibrium(system, course, watching)
+
+
+def _timed(watch: Callable[[Any], None]) -> tuple[list[float], Callable[[Any], None]]:
+    """A list for the times of steps, and who notes them there and watches."""
+    times: list[float] = []
+
+    def on_step(step: Any) -> None:
+        times.append(time.perf_counter())
+        watch(step)
+
+    return times, on_step
+
+
+def _equilibrium(system: System, course: Course, watching: Watching) -> Followed:
+    times, on_step = _timed(watching.newton)
+    solver = EquilibriumSolver(system, EquilibriumOptions(tolerance=course.tolerance), on_step)
+    state = solver.solve()
+    solution = {
+        "kind": "equilibrium",
+        "tolerance": solver.tolerance,
+        "relative_residual": state.residual,
+        "stored_energy_J": state.energy,
+        "iterations_with_indefinite_tangent": state.unstable_iterations,
+        "history": [vars(step) for step in state.history],
+    }
+    return Followed(solution, None, (*times, time.perf_counter())[0], solver.clock.seconds, solver.clock.counts)
+
+
+def _to_rest(system: System, course: Course, watching: Watching) -> Followed:
+    times, on_step = _timed(watching.relaxation)
+    clock = PhaseClock(system.device)
+    state = relax_to_rest(system, RelaxationOptions(tolerance=course.tolerance), on_step, clock)
+    solution = {
+        "kind": "at rest",
+        "tolerance": state.tolerance,
+        "relative_residual": state.residual,
+        "history": [vars(step) for step in state.history],
+    }
+    return Followed(solution, None, (*times, time.perf_counter())[0], clock.seconds, clock.counts)
+
+
+def _motion(system: System, steps: int, watching: Watching) -> Followed:
+    simulator = Simulator(system)
+    clock = PhaseClock(system.device)
+    every = max(1, steps // 10)
+    history: list[dict[str, Any]] = []
+    begun = 0.0
+    for step in range(1, steps + 1):
+        min_J = simulator.step_to(step / steps, clock)
+        begun = begun or time.perf_counter()
+        noted = None
+        if step % every == 0 or step == steps:
+            noted = {"time_s": simulator.time, "cg_iterations": simulator.last_solve().iterations, "min_J": min_J}
+            noted["kinetic_J"] = simulator.kinetic_energy()
+            history.append(noted)
+        watching.motion(step, simulator.time, noted)
+    solution = {
+        "kind": "motion",
+        "time_s": simulator.time,
+        "time_step_s": simulator.time / steps,
+        "damping": vars(system.model.damping),
+        "cg_tolerance": simulator.tolerance,
+        "history": history,
+    }
+    return Followed(solution, simulator.time, begun, clock.seconds, clock.counts)
+
+
+def _slowly(case: Case, system: System, until: float, course: Course, watching: Watching) -> Followed:
+    recorded = {at for at in recorded_times(case, ("fit", "check")) if at <= until}
+    times = sorted({*growing_times(until, course.steps or SLOW_STEPS), *recorded})
+    states: dict[float, NodalState] = {}
+    clock = PhaseClock(system.device)
+    taken: list[NewtonStep] = []
+    history: list[dict[str, Any]] = []
+
+    def watch(step: NewtonStep) -> None:
+        taken.append(step)
+        watching.slow_newton(len(history) / len(times), step)
+
+    noted_at, on_step = _timed(watch)
+    options = EquilibriumOptions(tolerance=course.tolerance)
+    for number, moment in enumerate(follow_slowly(system, times, options, on_step, clock), 1):
+        if moment.time in recorded:
+            states[moment.time] = nodal_state_of(system, moment.time)
+        noted = {
+            "time_s": moment.time,
+            "steps": moment.steps,
+            "newton_iterations": len(taken),
+            "cg_iterations": sum(step.cg_iterations for step in taken),
+            "min_J": moment.min_J,
+            "largest_displacement_mm": 1000.0 * moment.largest,
+            "relative_residual": moment.state.residual,
+        }
+        history.append(noted)
+        taken.clear()
+        watching.slow(number, len(times), noted)
+    solution = {"kind": "slow change", "time_s": until, "history": history}
+    return Followed(solution, until, (*noted_at, time.perf_counter())[0], clock.seconds, clock.counts, states)
+
+
+def states_at_rest(case: Case, system: System, end: NodalState, tolerance: float) -> dict[float, NodalState]:
+    """The state of each time at which something was recorded, or from which it is counted, of the case of a system.
+
+    `end` is its state long after everything; the tolerance is that of the other equilibria. `SolveError` if there is
+    none at one of the times.
+    """
+    moments = Moments.recorded(case)
+    states, near = {math.inf: end}, end.u
+    reached: dict[int, NodalState] = {}
+    if len(moments.cases) == 1 and moments.cases[0] is case:
+        reached[0] = end
+    for at, number in zip(moments.times, moments.numbers, strict=True):
+        if number not in reached:
+            model = replace(model_of(moments.cases[number]), elements=system.model.elements)
+            system_then = System(model, str(system.device), system.precision.name)
+            equilibrium = EquilibriumSolver(system_then, EquilibriumOptions(tolerance=tolerance)).solve(start=near)
+            system_then.u.assign(equilibrium.u)
+            reached[number] = nodal_state_of(system_then)
+            near = equilibrium.u
+        states[at] = reached[number]
+    return states
 
 
 @dataclass(frozen=True, eq=False)
