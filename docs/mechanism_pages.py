@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import mechanism_picture
+from mechanism_pairs import pairs
 from mechanism_picture import MAGNIFIED, PLACE
 
 from warpbrain.atomic import whole_file
 from warpbrain.bench.mechanisms import BASE, PLAIN, ratio
 from warpbrain.physics import potential
-from warpbrain.physics.composition import pairs
 from warpbrain.physics.continuous import smooth_parameters
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Mechanism

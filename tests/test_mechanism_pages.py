@@ -22,12 +22,14 @@ from mechanism_pages import (
     table,
     write_effects,
 )
+from mechanism_pairs import potential
 from mechanism_picture import write_picture
 
 from warpbrain.bench.mechanisms import BASE, PLAIN
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.shipped import find_case
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.potential import Enters
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES, FIGURES = DOCS / "mechanisms", DOCS / "figures"
@@ -63,6 +65,22 @@ def test_the_index_has_not_drifted_and_nothing_is_left_behind():
     assert {path.stem for path in PAGES.glob("*.md")} == {"index", "pairs", *mechanisms()}
     assert {path.stem for path in FIGURES.glob("mechanism-*.png")} == {f"mechanism-{kind}" for kind in mechanisms()}
     assert set(EFFECTS) == set(mechanisms())
+
+
+@pytest.mark.parametrize(
+    ("places", "formula"),
+    [
+        ({"r": "moduli", "Psi_fibres": "energy"}, "sum V r [Psi(F) + Psi_fibres(F)]"),
+        ({"g": "growth", "T": "tension"}, "sum V (1 + g) [Psi(F_e) + T(F_e)]"),
+        ({"r": "moduli", "T": "tension"}, "sum V [r Psi(F) + T(F)]"),
+    ],
+)
+def test_the_formula_of_a_total_potential(places, formula):
+    assert potential([Enters(place, symbol) for symbol, place in places.items()]) == formula
+
+
+def test_of_one_symbol_twice_each_has_a_number():
+    assert potential([Enters("load", "f"), Enters("load", "f")]) == "sum V Psi(F) - f_1 . u - f_2 . u"
 
 
 def test_the_table_of_pairs_has_not_drifted():

@@ -6,13 +6,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from mechanism_pairs import pairs
 from numpy.typing import NDArray
 from shapes import cube, distorted
 from total_potential import DENSITY, MU, POISSON, STEP, TotalPotential
 from verification_rows import Row
 
 from warpbrain.mesh import TetMesh, boundary_faces
-from warpbrain.physics.composition import CompositionError, pairs, require_composable, require_left
+from warpbrain.physics.composition import CompositionError, require_composable, require_left
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanism import Facts, Mechanism
 from warpbrain.physics.mechanisms import mechanisms

@@ -15,7 +15,6 @@ elements a patch around a node has the mean of `J_g^(1/3)` of its elements, and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 #: What a mechanism can be in the total potential: a place in the formula above.
@@ -43,43 +42,3 @@ class Enters:
 
     def __post_init__(self) -> None:
         assert self.place in PLACES, self.place
-
-
-def potential(entering: Sequence[Enters]) -> str:
-    """The total potential with some mechanisms, as a formula.
-
-    Examples
-    --------
-    >>> potential([Enters("moduli", "r"), Enters("energy", "Psi_fibres")])
-    'sum V r [Psi(F) + Psi_fibres(F)]'
-    >>> potential([Enters("growth", "g"), Enters("tension", "T")])
-    'sum V (1 + g) [Psi(F_e) + T(F_e)]'
-    >>> potential([Enters("moduli", "r"), Enters("tension", "T")])
-    'sum V [r Psi(F) + T(F)]'
-    >>> potential([Enters("load", "f"), Enters("load", "f")])
-    'sum V Psi(F) - f_1 . u - f_2 . u'
-    """
-    symbols: dict[str, list[str]] = {place: [] for place in PLACES}
-    names = [each.symbol for each in entering]
-    for number, entry in enumerate(entering):
-        twice = names.count(entry.symbol) > 1
-        symbols[entry.place].append(f"{entry.symbol}_{number + 1}" if twice else entry.symbol)
-    strain = "F_e" if symbols["growth"] else "F"
-    law = f"Psi_({', '.join(symbols['law'])})" if symbols["law"] else "Psi"
-    elastic = [f"{name}({strain})" for name in (law, *symbols["energy"])]
-    tensions = [f"{name}({strain})" for name in symbols["tension"]]
-    factors = " ".join(symbols["moduli"])
-    if tensions and factors:
-        elastic = [f"{factors} {_bracketed(elastic)}"]
-        factors = ""
-    outer = [*symbols["part"], *(f"(1 + {name})" for name in symbols["growth"]), *([factors] if factors else [])]
-    over = "".join(f" without {name}" for name in symbols["body"])
-    text = " ".join([f"sum{over} V", *outer, _bracketed([*elastic, *tensions])])
-    filled = [each.fills for each in entering if each.fills]
-    text += "".join(f" + {name}(u)" for name in (*filled, *symbols["beside"]))
-    weights = [f"{' '.join([*symbols['part'], name])}" for name in symbols["weight"]]
-    return text + "".join(f" - {name} . u" for name in (*symbols["load"], *weights))
-
-
-def _bracketed(terms: Sequence[str]) -> str:
-    return terms[0] if len(terms) == 1 else f"[{' + '.join(terms)}]"

@@ -121,6 +121,11 @@ class Equilibrium:
         """Newton iterations in which the tangent was seen to be indefinite, those of load steps cut since included."""
         return sum(step.indefinite for step in self.history)
 
+    @property
+    def min_J(self) -> float:
+        """Smallest volume ratio of an element; 1 where nothing moved."""
+        return self.history[-1].min_J if self.history else 1.0
+
 
 class _StepFailed(Exception):
     """A load step that must be cut; the message says why."""

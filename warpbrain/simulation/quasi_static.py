@@ -32,16 +32,6 @@ class Moment:
     state: Equilibrium  # its history is that of the last step alone
     steps: int  # steps since the time before; more than one where a step was halved
 
-    @property
-    def largest(self) -> float:
-        """Displacement of the node that moved farthest [m]."""
-        return float(np.linalg.norm(self.state.u, axis=1).max())
-
-    @property
-    def min_J(self) -> float:
-        """Smallest volume ratio of an element; 1 where nothing moved."""
-        return self.state.history[-1].min_J if self.state.history else 1.0
-
 
 def growing_times(end: float, count: int) -> list[float]:
     """Times [s] up to an end with steps that grow evenly: what flows or relaxes is fast at first, and slower later."""

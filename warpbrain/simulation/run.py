@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments, recorded_times
@@ -183,8 +185,8 @@ def _slowly(case: Case, system: System, until: float, course: Course, watching: 
             "steps": moment.steps,
             "newton_iterations": len(taken),
             "cg_iterations": sum(step.cg_iterations for step in taken),
-            "min_J": moment.min_J,
-            "largest_displacement_mm": 1000.0 * moment.largest,
+            "min_J": moment.state.min_J,
+            "largest_displacement_mm": 1000.0 * float(np.linalg.norm(moment.state.u, axis=1).max()),
             "relative_residual": moment.state.residual,
         }
         history.append(noted)

@@ -166,7 +166,7 @@ class Rig:
             )
 
     def run(
-        self, recording: TestRecording, steps: int = STEPS, on_state: Callable[[float], None] | None = None
+        self, recording: TestRecording, steps: int = STEPS, on_state: Callable[[float], None] = lambda _share: None
     ) -> TestResult:
         """Simulate a test at the values that were imposed in it.
 
@@ -197,7 +197,7 @@ class Rig:
             self._turned[key] = rig
         return self._turned[key]
 
-    def _simulate(self, recording: TestRecording, steps: int, on_state: Callable[[float], None] | None) -> TestResult:
+    def _simulate(self, recording: TestRecording, steps: int, on_state: Callable[[float], None]) -> TestResult:
         """A test that is possible."""
         rest = 1.0 if recording.quantities[0] == "stretch" else 0.0
         if self.follows_time(recording):
@@ -212,8 +212,7 @@ class Rig:
             for value in side.tolist():
                 last = self._equilibrium(recording, value, last)
                 states.append(last)
-                if on_state is not None:
-                    on_state((len(states) - 1) / sum(map(len, sides)))
+                on_state((len(states) - 1) / sum(map(len, sides)))
         if recording.force_controlled:
             states += self._farther(recording, states, rest, steps)
         return _result(recording, sorted(states, key=lambda state: state.imposed))
@@ -237,7 +236,7 @@ class Rig:
         return states_beyond
 
     def _through_time(
-        self, recording: TestRecording, rest: float, steps: int, on_state: Callable[[float], None] | None
+        self, recording: TestRecording, rest: float, steps: int, on_state: Callable[[float], None]
     ) -> TestResult:
         """A test whose states depend on its history: at rest long before the first row, whose value comes at once."""
         assert recording.time is not None
@@ -253,8 +252,7 @@ class Rig:
         for k in range(1, len(history.time)):
             before, time, value = (float(x) for x in (history.time[k - 1], history.time[k], history.imposed[k]))
             states.append(self._step(recording, value, states[-1].u, time - before, time))
-            if on_state is not None:
-                on_state(len(states) / len(history.time))
+            on_state(len(states) / len(history.time))
         return _result(recording, states, history)
 
     def _step(self, recording: TestRecording, value: float, start: Floats | None, h: float, time: float) -> _State:
@@ -279,8 +277,7 @@ class Rig:
         try:
             state = solve(led * self.system.model.constrained)
             response = self._response(recording, state.u, state.internal)
-            min_J = state.history[-1].min_J if state.history else 1.0
-            return _State(value, response, len(state.history), min_J, state.unstable_iterations, state.u)
+            return _State(value, response, len(state.history), state.min_J, state.unstable_iterations, state.u)
         except SolveError as error:
             factor, unit = SHOWN[recording.quantities[0]]
             raise SolveError(
