@@ -515,8 +515,9 @@ class SpecimenRunning:
 
         `SolveError` if a state of a test is not found.
         """
-        tests = []
-        for recording in self.tests:
-            result = self.rig.run(recording, on_state=lambda part, name=recording.name: on_state(part, name))
-            tests.append(Tested(recording, result, compare_test(recording, result)))
-        return SpecimenRun(self.case, self.rig, tuple(tests))
+
+        def tested(recording: TestRecording) -> Tested:
+            result = self.rig.run(recording, on_state=lambda part: on_state(part, recording.name))
+            return Tested(recording, result, compare_test(recording, result))
+
+        return SpecimenRun(self.case, self.rig, tuple(map(tested, self.tests)))
