@@ -2,76 +2,46 @@
 
 from __future__ import annotations
 
-import abc
 from dataclasses import dataclass
 
 
-class Expectation(abc.ABC):
-    """A distribution of one number, in the unit of its parameter."""
+@dataclass(frozen=True)
+class Expectation:
+    """A distribution of one number, normal or uniform in it or in its logarithm, in the unit of its parameter."""
 
-    @abc.abstractmethod
+    words: str
+    start: float
+    width: float  # of a logarithm the factor
+    is_normal: bool
+    is_logarithmic: bool = False
+
     def quantile(self, part: float) -> float:
         """The number below which a part of the distribution lies, 0 < part < 1."""
+        if self.is_normal:
+            from scipy.special import ndtri
 
-    @abc.abstractmethod
-    def __str__(self) -> str: ...
-
-
-@dataclass(frozen=True)
-class Normal(Expectation):
-    """`N(mean, sd^2)`."""
-
-    mean: float
-    sd: float
-
-    def quantile(self, part: float) -> float:
-        from scipy.special import ndtri
-
-        return self.mean + self.sd * float(ndtri(part))
+            part = float(ndtri(part))
+        return self.start * self.width**part if self.is_logarithmic else self.start + self.width * part
 
     def __str__(self) -> str:
-        return f"normal, {self.mean:g} ± {self.sd:g}"
+        return self.words
 
+    @classmethod
+    def normal(cls, mean: float, sd: float) -> Expectation:
+        """`N(mean, sd^2)`."""
+        return cls(f"normal, {mean:g} ± {sd:g}", mean, sd, True)
 
-@dataclass(frozen=True)
-class LogNormal(Expectation):
-    """A number whose logarithm is normal: two thirds of it lie within a `factor` of the `median`."""
+    @classmethod
+    def log_normal(cls, median: float, factor: float) -> Expectation:
+        """A number whose logarithm is normal: two thirds of it lie within a `factor` of the `median`."""
+        return cls(f"log-normal, {median:g} within a factor {factor:g}", median, factor, True, True)
 
-    median: float
-    factor: float
+    @classmethod
+    def uniform(cls, low: float, high: float) -> Expectation:
+        """Any number from `low` to `high` alike."""
+        return cls(f"uniform, {low:g} to {high:g}", low, high - low, False)
 
-    def quantile(self, part: float) -> float:
-        from scipy.special import ndtri
-
-        return self.median * self.factor ** float(ndtri(part))
-
-    def __str__(self) -> str:
-        return f"log-normal, {self.median:g} within a factor {self.factor:g}"
-
-
-@dataclass(frozen=True)
-class Uniform(Expectation):
-    """Any number from `low` to `high` alike."""
-
-    low: float
-    high: float
-
-    def quantile(self, part: float) -> float:
-        return self.low + part * (self.high - self.low)
-
-    def __str__(self) -> str:
-        return f"uniform, {self.low:g} to {self.high:g}"
-
-
-@dataclass(frozen=True)
-class LogUniform(Expectation):
-    """Any order of magnitude from `low` to `high` alike."""
-
-    low: float
-    high: float
-
-    def quantile(self, part: float) -> float:
-        return self.low * (self.high / self.low) ** part
-
-    def __str__(self) -> str:
-        return f"log-uniform, {self.low:g} to {self.high:g}"
+    @classmethod
+    def log_uniform(cls, low: float, high: float) -> Expectation:
+        """Any order of magnitude from `low` to `high` alike."""
+        return cls(f"log-uniform, {low:g} to {high:g}", low, high / low, False, True)

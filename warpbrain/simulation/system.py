@@ -297,10 +297,9 @@ class System:
         except InputError:
             self._model = before
             raise
-        for place, term in enumerate(self._following):
-            if place in others:
-                others[place].set_time_step(self._time_step)
-                term.adopt(others[place])
+        for place, other in others.items():
+            other.set_time_step(self._time_step)
+            self._following[place].adopt(other)
         if list(before.mechanisms) != list(model.mechanisms):
             self._scales = None if model.growing or model.weakening or model.emptying else self._scales
             self._act()

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from warpbrain.physics.expectation import Normal
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.ogden import NEO_HOOKEAN, Ogden
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
@@ -26,7 +26,7 @@ class Asymmetry(Mechanism):
 
     exponent: float = parameter(  # `alpha`
         "Ogden's exponent; 2 is the neo-Hookean law, a negative one stiffens in compression.",
-        expectation=Normal(2.0, 15.0),
+        expectation=Expectation.normal(2.0, 15.0),
         typical="-24 to -17 in specimens, -19 in vivo, -4.7 in the classic test",
         source="Budday et al. 2017; Bennion et al. 2022; Miller and Chinzei 2002 (diagnosis design, M12)",
     )

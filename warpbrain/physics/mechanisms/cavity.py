@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh, interface_faces
-from warpbrain.physics.expectation import Normal
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.mechanisms.pressure import PressureTerm
 from warpbrain.physics.potential import Enters
@@ -41,7 +41,7 @@ class Cavity(Mechanism):
         "Pressure of the fluid on the wall of the cavity, relative to that on the rest of the surface.",
         default=0.0,
         unit="Pa",
-        expectation=Normal(0.0, 200.0),
+        expectation=Expectation.normal(0.0, 200.0),
         typical="hydrostatic: 10 Pa for each mm of fluid",
         source="diagnosis design, M6",
     )

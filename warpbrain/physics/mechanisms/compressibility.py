@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from warpbrain.physics.expectation import Uniform
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
@@ -22,7 +22,7 @@ class Compressibility(Mechanism):
         "Poisson ratio at rest.",
         above=-1.0,
         below=0.5,
-        expectation=Uniform(0.35, 0.4999),
+        expectation=Expectation.uniform(0.35, 0.4999),
         typical="0.45 to 0.4999 over seconds, 0.35 to 0.49 when fluid has had time to leave",
         source="diagnosis design, M9 and M14",
     )

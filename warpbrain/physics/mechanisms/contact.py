@@ -37,7 +37,7 @@ from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.mesh.quality import extent
 from warpbrain.mesh.surface import feature_normals
-from warpbrain.physics.expectation import LogNormal
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import ClosedSurface, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
@@ -67,7 +67,7 @@ class Contact(Mechanism):
         "Coefficient of friction.",
         default=0.0,
         above=-1e-12,
-        expectation=LogNormal(0.1, 3.0),
+        expectation=Expectation.log_normal(0.1, 3.0),
         typical="normal strength of the interface 2.8 to 3.4 kPa, tangential 1.8 to 2.1 kPa (sheep)",
         source="diagnosis design, M4",
     )

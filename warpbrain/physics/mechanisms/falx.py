@@ -20,7 +20,7 @@ from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import all_faces
-from warpbrain.physics.expectation import LogNormal
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
@@ -38,7 +38,7 @@ class Falx(Mechanism):
         unit="MPa",
         si=1e6,
         above=0.0,
-        expectation=LogNormal(31.5, 2.0),
+        expectation=Expectation.log_normal(31.5, 2.0),
         typical="31.5 MPa by custom; 68.1 MPa in pooled tests of dura",
         source="diagnosis design, M5",
     )

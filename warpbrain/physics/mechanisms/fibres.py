@@ -16,7 +16,7 @@ import warp as wp
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.expectation import LogNormal, Uniform
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
@@ -105,7 +105,7 @@ class Fibres(Mechanism):
         "k1, of the fibres together.",
         unit="Pa",
         above=0.0,
-        expectation=LogNormal(300.0, 3.0),
+        expectation=Expectation.log_normal(300.0, 3.0),
         typical="anisotropy of -3 to 16 % in shear, 0.6 to 1.1 in tension",
         source="diagnosis design, M10; Gasser, Ogden and Holzapfel 2006",
         told=("their stiffness is {}",),
@@ -114,7 +114,7 @@ class Fibres(Mechanism):
         "k2, how they stiffen.",
         default=1.0,
         above=0.0,
-        expectation=LogNormal(1.0, 3.0),
+        expectation=Expectation.log_normal(1.0, 3.0),
         told=("the exponent with which they stiffen is {}",),
     )
     dispersion: float = parameter(
@@ -122,7 +122,7 @@ class Fibres(Mechanism):
         default=0.0,
         above=-1e-12,
         below=1.0 / 3.0 + 1e-12,
-        expectation=Uniform(0.0, 1.0 / 3.0),
+        expectation=Expectation.uniform(0.0, 1.0 / 3.0),
         told=("their scatter, from 0 all parallel to 1/3 no direction, is {}",),
     )
     elements: str = parameter("Element set that has them.", default="", kind="element set")

@@ -36,7 +36,7 @@ from warpbrain.mesh import (
     integrals_on_plane,
     tangents,
 )
-from warpbrain.physics.expectation import Uniform
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.load import Along, BodyForce
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
@@ -95,7 +95,7 @@ class Gravity(BodyForce, Mechanism):
         absent="needed in fluid, and nothing in air",
         unit="mm",
         si=1e-3,
-        expectation=Uniform(0.0, 160.0),
+        expectation=Expectation.uniform(0.0, 160.0),
         typical="the brain sinks by 5.7 mm in the mean, by 15 mm at most at the end of surgery",
         source="Miga et al. 1999; Davson and Segal 1996 (density of the fluid)",
     )

@@ -15,7 +15,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.expectation import LogNormal
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
@@ -34,7 +34,7 @@ class Inclusion(Mechanism):
     ratio: float = parameter(
         "Of its moduli to those of the tissue around.",
         above=0.0,
-        expectation=LogNormal(1.0, 3.3),
+        expectation=Expectation.log_normal(1.0, 3.3),
         typical="glioblastoma 0.86 in the mean, 5 of 22 stiffer; meningioma stiffest",
         source="elastography of tumours (diagnosis design, M11)",
     )

@@ -41,7 +41,7 @@ from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, rim_edges
 from warpbrain.mesh.integrals import triangle_rule
-from warpbrain.physics.expectation import Normal
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, ParameterError, Reading, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
@@ -59,7 +59,7 @@ class Pressure(Mechanism):
     value: float = parameter(
         "Pressure, relative to that on the rest of the surface; positive pushes on the tissue.",
         unit="Pa",
-        expectation=Normal(0.0, 200.0),
+        expectation=Expectation.normal(0.0, 200.0),
         typical="10 to 1000 Pa across the cerebral mantle",
         source="volunteers: 7 to 14 Pa; hydrocephalus: tens to hundreds of Pa (diagnosis design, M2)",
         told=(

@@ -15,7 +15,7 @@ import numpy as np
 import warp as wp
 
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.expectation import Normal
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
@@ -57,7 +57,7 @@ class ResidualStress(Mechanism):
     tension: float = parameter(  # `sigma`
         "Stress before anything is done; negative is compression.",
         unit="Pa",
-        expectation=Normal(0.0, 300.0),
+        expectation=Expectation.normal(0.0, 300.0),
         typical="100 to 1000 Pa along white-matter tracts of mice",
         source="Xu et al. 2009 (diagnosis design, M13)",
     )

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.expectation import Normal
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
@@ -33,7 +33,7 @@ class Swelling(Mechanism):
         si=1e-2,
         above=-90.0,
         below=400.0,
-        expectation=Normal(0.0, 3.0),
+        expectation=Expectation.normal(0.0, 3.0),
         typical="mannitol takes 5 % of the water of white matter; oedema adds up to 30 %",
         source="diagnosis design, M7",
         told=(

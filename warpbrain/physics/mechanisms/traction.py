@@ -18,7 +18,7 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import QuadraticMesh, TetMesh, patch_around, surface_forces
-from warpbrain.physics.expectation import Uniform
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
@@ -51,7 +51,7 @@ class Traction(Load, Mechanism):
         unit="mm",
         si=1e-3,
         above=0.0,
-        expectation=Uniform(5.0, 15.0),
+        expectation=Expectation.uniform(5.0, 15.0),
         told=("its radius is {}",),
     )
     kind: ClassVar[str] = "traction"

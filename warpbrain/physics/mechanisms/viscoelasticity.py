@@ -29,7 +29,7 @@ from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
-from warpbrain.physics.expectation import LogNormal, LogUniform
+from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
@@ -55,7 +55,7 @@ class Viscoelasticity(Mechanism):
     moduli: tuple[float, ...] = parameter(  # `beta_i`
         "Modulus of each branch, relative to the case's own, which is what is left in the end.",
         kind="numbers",
-        expectation=LogNormal(1.0, 2.7),
+        expectation=Expectation.log_normal(1.0, 2.7),
         adds_up=True,
         typical="0.7 kPa left and 2.0 kPa that relax in 9.7 s (cortex); 0.3 and 0.9 kPa, 14.9 s (corona radiata)",
         source="Budday et al. 2017 (diagnosis design, M8)",
@@ -64,7 +64,7 @@ class Viscoelasticity(Mechanism):
         "Relaxation time of each branch.",
         kind="numbers",
         unit="s",
-        expectation=LogUniform(1.0, 3000.0),
+        expectation=Expectation.log_uniform(1.0, 3000.0),
         typical="9.7 s (cortex), 14.9 s (corona radiata)",
         source="Budday et al. 2017 (diagnosis design, M8)",
     )
