@@ -11,7 +11,7 @@
 5. what it is taken for (`confused_with`), what must be observed to tell it apart (`needs`), an `example`, and how it
    may act where a case does not declare it (`proposals`).
 
-Its derivatives by its parameters are nobody's work: `warpbrain.simulation.parameter_stencil` differences what it does.
+Its derivatives by its parameters are nobody's work: `warpbrain.simulation.sensitivity` differences what it does.
 For that a `Following` one's term names the arrays of what it remembers (`Term.memory`), keeps solvers and rigid shapes
 as they are (`Term.lasting`) and takes the body's moduli in `Term.take_moduli`, if it has any of these.
 

@@ -255,10 +255,14 @@ class Model:
         return [load.unit_forces(self.quadratic or self.mesh) for load in self.loads]
 
     def external_forces(self, time: float = math.inf, unit_forces: Sequence[Floats] | None = None) -> Floats:
-        """Sum of the loads on the nodes [N], shape (n, 3), at a time [s], by default long after every ramp.
+        """Sum of the loads on the nodes [N], shape (n, 3); tissue that has been taken out by then weighs nothing.
 
-        Tissue that has been taken out by then weighs nothing. `unit_forces` are others in the place of those of the
-        model, such as their derivatives.
+        Parameters
+        ----------
+        time : float
+            [s]; by default long after every ramp.
+        unit_forces : sequence of arrays, optional
+            Others in the place of `unit_forces`, such as their derivatives.
         """
         total = np.zeros(self.constrained.shape)
         if unit_forces is None and not self.emptying:

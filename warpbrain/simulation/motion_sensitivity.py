@@ -7,7 +7,7 @@ A step (`warpbrain.simulation.dynamics`) ends with nothing left of
 on the free components, where the linearised step has `u* = u0` and `c = h k_d + h^2`, and the implicit one
 `u* = u0 + h v` and `c = h k_d`. Its whole derivative is one five-point difference along the way of the parameter, the
 start of the step, the velocity at its end, and what terms with a memory remember there: a history beside each
-parameter, advanced along the way after each step (`warpbrain.simulation.parameter_stencil`). So mechanisms that need
+parameter, advanced along the way after each step (`warpbrain.simulation.sensitivity`). So mechanisms that need
 times or rates are differentiated without knowing it. What is left is corrected with the matrix of the step.
 
 Steps of many seconds are a series of states that are all but at rest, as recordings over minutes have them: inertia and
@@ -28,8 +28,16 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Model
-from warpbrain.simulation.parameter_stencil import ModelOf, ParameterStencil
-from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, SeveralSolver, lengths, refine, several_solver
+from warpbrain.simulation.sensitivity import (
+    ROUNDINGS,
+    Corrections,
+    ModelOf,
+    ParameterStencil,
+    SeveralSolver,
+    lengths,
+    refine,
+    several_solver,
+)
 
 
 class MotionSensitivity:
