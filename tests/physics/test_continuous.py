@@ -5,7 +5,6 @@ import pytest
 
 from warpbrain.errors import InputError
 from warpbrain.physics.continuous import (
-    alternatives,
     continuous,
     differ_in_numbers_only,
     numbers_of,
@@ -90,11 +89,3 @@ def test_what_another_mechanism_is() -> None:
     assert not differ_in_numbers_only(Contact(nodes="a"), Contact(nodes="a", state="lifting"))
     assert differ_in_numbers_only(Contact(nodes="a"), Contact(nodes="a", penalty=10.0, friction=0.1))
     assert not differ_in_numbers_only(BRANCHES, Viscoelasticity(moduli=(1.0,), times=(3.0,)))
-
-
-def test_what_switches() -> None:
-    sliding, lifting = (Contact(nodes="a", friction=0.1, state=state) for state in ("sliding", "lifting"))
-    fixed = Contact(nodes="a", friction=0.1, state="fixed")
-    assert alternatives(sliding) == (fixed, lifting, None)
-    assert alternatives(Resection()) == alternatives(Falx(nodes="a")) == alternatives(Cavity()) == (None,)
-    assert alternatives(BALL) == ()

@@ -2,7 +2,7 @@
 
 A `parameter` of a mechanism is one such number if its kind is a number, and several if it is a position, a vector or
 numbers. A number that is none (no ball, so no radius) is left out, and so is a setting of the method (`Says.method`).
-What switches from one thing to another has no derivative: see `alternatives`.
+What switches from one thing to another has no derivative.
 """
 
 from __future__ import annotations
@@ -141,18 +141,3 @@ def differ_in_numbers_only(first: Mechanism, second: Mechanism) -> bool:
         return False
     [alike, other] = (with_numbers([mechanism], numbers_of([first]))[0] for mechanism in (first, second))
     return replace(other, ramp=first.ramp, **settings) == alike
-
-
-def alternatives(mechanism: Mechanism) -> tuple[Mechanism | None, ...]:
-    """The same mechanism with each other choice of a parameter that has choices, and None if it can be absent.
-
-    Between these is nothing: they have no derivative, but differences. A contact that is stuck can slide or lift off; a
-    falx or a resection is there or not.
-    """
-    others: list[Mechanism | None] = []
-    for name, says in mechanism.parameters().items():
-        for choice in says.choices:
-            if choice != getattr(mechanism, name):
-                values: dict[str, Any] = {name: choice}
-                others.append(replace(mechanism, **values))
-    return (*others, None) if mechanism.switches else tuple(others)
