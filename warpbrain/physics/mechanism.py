@@ -73,6 +73,7 @@ class Says:
     """What is known of a parameter."""
 
     doc: str  # one sentence
+    default: Any = dataclasses.MISSING  # SI
     kind: str = "number"  # one of `KINDS`
     unit: str = ""  # in which users give it
     si: float = 1.0  # how many of its SI unit one of these is
@@ -96,7 +97,7 @@ class Says:
 
 def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> Any:
     """A field of a mechanism that users give; see `Says`."""
-    says = Says(doc, **known)
+    says = Says(doc, default, **known)
     assert says.kind in KINDS, says.kind
     return dataclasses.field(default=default, metadata={"says": says})
 
@@ -196,11 +197,10 @@ class Mechanism(Ramped, abc.ABC):
     @classmethod
     def required(cls) -> tuple[str, ...]:
         """Names of the parameters that a case must give."""
-        parameters, defaults = cls.parameters(), {f.name: f.default for f in dataclasses.fields(cls)}
         return tuple(
             name
-            for name, says in parameters.items()
-            if says.needed or (defaults[name] is dataclasses.MISSING and not says.absent)
+            for name, says in cls.parameters().items()
+            if says.needed or (says.default is dataclasses.MISSING and not says.absent)
         )
 
     @classmethod
@@ -209,15 +209,14 @@ class Mechanism(Ramped, abc.ABC):
         says = cls.parameters()[name]
         if name in cls.required():
             return says.doc
-        default: Any = next(f.default for f in dataclasses.fields(cls) if f.name == name)
         if says.absent:
             text = says.absent
-        elif default is None or default == "":
+        elif says.default is None or says.default == "":
             text = "none"
-        elif isinstance(default, str):
-            text = f"'{default}'"
+        elif isinstance(says.default, str):
+            text = f"'{says.default}'"
         else:
-            text = ", ".join(f"{value / says.si:g}" for value in np.ravel(default))
+            text = ", ".join(f"{value / says.si:g}" for value in np.ravel(says.default))
         return f"{says.doc[:-1]}; {text} if absent."
 
     @classmethod
