@@ -8,9 +8,8 @@ from published_process import OBJECTIVE
 from scipy.stats import chi2
 
 from warpbrain.errors import SolveError
-from warpbrain.gp.likelihood import TASKS, Likelihood, Parameters, Replicates
 from warpbrain.gp.trained import trained
-from warpbrain.gp.training import JITTER, climb, start, train
+from warpbrain.gp.training import JITTER, TASKS, Likelihood, Parameters, Replicates, climb, start, train
 
 
 @pytest.fixture(scope="module")

@@ -211,7 +211,7 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
 
 def _warn(model: Model, samples: list[Sample], options: argparse.Namespace, say: Callable[..., None]) -> None:
     """Say what is likely to fail before it is computed."""
-    from warpbrain.ensemble.choosing import overloaded
+    from warpbrain.ensemble.run import overloaded
 
     device = None if options.dask is not None else options.device
     load = overloaded(model, samples, device)

@@ -76,7 +76,7 @@ def _show(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import output_folder
     from warpbrain.gp.asymmetry import asymmetries_of_papers, asymmetry
-    from warpbrain.gp.hierarchical import Hierarchical
+    from warpbrain.gp.hierarchy import Hierarchical
     from warpbrain.gp.sampling import moduli
     from warpbrain.gp.trained import trained
     from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
@@ -297,7 +297,7 @@ def _add_compare(actions: argparse._SubParsersAction[Any]) -> None:
 def _compare(options: argparse.Namespace) -> None:
     from warpbrain.atomic import check_writable
     from warpbrain.gp import leaving_out
-    from warpbrain.gp.candidates import DEFAULT, candidates
+    from warpbrain.gp.leaving_out import DEFAULT, candidates
     from warpbrain.gp.literature.studies import read_studies
 
     path = options.csv or Path(f"warpbrain-gp-{options.variant}-{options.leave}.csv")

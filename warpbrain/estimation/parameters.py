@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
-from warpbrain.gp.coordinates import coordinates, laws_from, to_coordinates
+from warpbrain.gp.prior import coordinates, laws_from, to_coordinates
 from warpbrain.physics.laws import Law, NeoHookean
 from warpbrain.physics.laws.law import MODULUS, Coordinate
 from warpbrain.physics.laws.stability import require_stable

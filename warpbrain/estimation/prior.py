@@ -20,9 +20,8 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.parameters import Gaussian, Parameters
-from warpbrain.gp.coordinates import coordinates
 from warpbrain.gp.literature.study import Study
-from warpbrain.gp.prior import Prior
+from warpbrain.gp.prior import Prior, coordinates
 from warpbrain.gp.process import Process
 from warpbrain.inference.beliefs import belief
 from warpbrain.physics.laws.law import MODULUS

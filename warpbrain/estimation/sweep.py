@@ -19,7 +19,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.estimation.prediction import compared
+from warpbrain.estimation.posterior import compared
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import law_of_curve
 from warpbrain.recordings.agreement import by_unit

@@ -14,10 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import REACH
-from warpbrain.gp.literature.study import STRETCHES, Study
-from warpbrain.gp.secant import equivalent_strain, invariant, stretch_of
+from warpbrain.gp.hierarchy import REACH, Hierarchical
+from warpbrain.gp.literature.study import STRETCHES, Study, equivalent_strain, invariant, stretch_of
 
 #: Parts of the largest strain at which both sides are compared: the middles of five equal ones.
 STRAINS = (np.arange(5) + 0.5) / 5.0

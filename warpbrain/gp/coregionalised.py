@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats, Ints
-from warpbrain.gp.kernels import KERNELS
-from warpbrain.gp.likelihood import Factored, Likelihood, Parameters, Replicates
-from warpbrain.gp.literature.study import GROUPS, Study, dataset, groups_of
-from warpbrain.gp.process import Draws, standard_normal
-from warpbrain.gp.secant import log_energy
+from warpbrain.gp.literature.study import GROUPS, Study, dataset, groups_of, log_energy
+from warpbrain.gp.process import KERNELS, Draws, standard_normal
+from warpbrain.gp.training import Factored, Likelihood, Parameters, Replicates
 
 #: Tasks (n,) and stretches (n,) of places.
 _At = tuple[Ints, Floats]

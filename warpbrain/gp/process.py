@@ -5,6 +5,7 @@ A draw is drawn at anchors; elsewhere it is what follows from its values there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -13,6 +14,44 @@ from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats
 from warpbrain.gp.literature.study import Study
+
+
+def matern12(distance: Floats, length: float) -> tuple[Floats, Floats]:
+    """`exp(-r)`, `r = d / length`."""
+    r = distance / length
+    k = np.exp(-r)
+    return k, r * k
+
+
+def matern32(distance: Floats, length: float) -> tuple[Floats, Floats]:
+    """`(1 + r) exp(-r)`, `r = sqrt(3) d / length`: the paper's kernel."""
+    r = math.sqrt(3.0) * distance / length
+    decay = np.exp(-r)
+    return (1.0 + r) * decay, r * r * decay
+
+
+def matern52(distance: Floats, length: float) -> tuple[Floats, Floats]:
+    """`(1 + r + r^2 / 3) exp(-r)`, `r = sqrt(5) d / length`."""
+    r = math.sqrt(5.0) * distance / length
+    decay = np.exp(-r)
+    return (1.0 + r + r * r / 3.0) * decay, r * r * (1.0 + r) / 3.0 * decay
+
+
+def squared_exponential(distance: Floats, length: float) -> tuple[Floats, Floats]:
+    """`exp(-r^2 / 2)`, `r = d / length`."""
+    r2 = (distance / length) ** 2
+    k = np.exp(-0.5 * r2)
+    return k, r2 * k
+
+
+#: Kernels by name; each takes distances and a length scale and returns values and derivatives.
+KERNELS = {
+    "matern12": matern12,
+    "matern32": matern32,
+    "matern52": matern52,
+    "squared-exponential": squared_exponential,
+}
+
 
 #: Added to the diagonal of the covariance of anchors, relative to its mean: they are dense enough for a smooth curve to
 #: be singular in double precision. A draw moves by its root, 1e-4 of a standard deviation.

@@ -23,14 +23,20 @@ import numpy as np
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
 from warpbrain.gp.coregionalised import Coregionalised, training_points
-from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import EFFECTS, SAMPLE, Fitted, Hierarchy, fit_hierarchy, observations, sample_hierarchies
-from warpbrain.gp.kernels import KERNELS
-from warpbrain.gp.likelihood import TASKS, Parameters
+from warpbrain.gp.hierarchy import (
+    EFFECTS,
+    SAMPLE,
+    Fitted,
+    Hierarchical,
+    Hierarchy,
+    fit_hierarchy,
+    observations,
+    sample_hierarchies,
+)
 from warpbrain.gp.literature.studies import VARIANTS, Variant, read_studies
 from warpbrain.gp.literature.study import GROUPS, Study
-from warpbrain.gp.process import Process
-from warpbrain.gp.training import JITTER, Climb, train
+from warpbrain.gp.process import KERNELS, Process
+from warpbrain.gp.training import JITTER, TASKS, Climb, Parameters, train
 from warpbrain.values import finite
 
 Kind = Literal["hierarchical", "coregionalised"]
