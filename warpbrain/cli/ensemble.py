@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.cli.options import add_to, note_case, require_poisson, require_tolerance, require_whole
-from warpbrain.ensemble.defaults import SAMPLES
+from warpbrain.ensemble import SAMPLES
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 

@@ -14,7 +14,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups, with_prior_draw
 from warpbrain.cases.shipped import as_case
-from warpbrain.ensemble.defaults import SAMPLES
+from warpbrain.ensemble import SAMPLES
 from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.results import EnsembleResult, results_of
 from warpbrain.ensemble.sample import Sample
@@ -32,7 +32,7 @@ from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
 
 #: Standard deviations from the mean curve that the paper's sweep takes, for each tissue.
-SWEEP = np.linspace(-2.0, 2.0, 17)
+SWEEP = tuple(np.linspace(-2.0, 2.0, 17).tolist())
 
 
 def drawn_samples(
@@ -69,27 +69,23 @@ def swept_samples(case: Case, process: Process) -> list[Sample]:
     require_groups(case, labels, process)
     if len(labels) > 2:
         raise InputError(f"{case.path}: the paper's sweep is over one or two tissues; this case has {len(labels)}")
-    laws = {}
-    for label in labels:
-        tissue = case.tissues[label]
-        laws[label] = [law_of_curve(process, tissue.prior, float(k), tissue.model).law() for k in SWEEP]
+    laws = {
+        (label, k): law_of_curve(process, case.tissues[label].prior, k, case.tissues[label].model).law()
+        for label in labels
+        for k in SWEEP
+    }
     samples = []
-    for number, places in enumerate(product(range(len(SWEEP)), repeat=len(labels))):
-        chosen = {label: laws[label][place] for label, place in zip(labels, places, strict=True)}
-        deviations = {label: float(SWEEP[place]) for label, place in zip(labels, places, strict=True)}
-        reason = _unstable(case, chosen)
+    for number, steps in enumerate(product(SWEEP, repeat=len(labels))):
+        deviations = dict(zip(labels, steps, strict=True))
+        chosen = {label: laws[label, k] for label, k in deviations.items()}
+        reason = ""
+        try:
+            for label, law in chosen.items():
+                require_stable(law, case.poisson, case.tissues[label].formulation)
+        except UnstableLawError as error:
+            reason = f"tissue {label}: {error}"
         samples.append(Sample(number, None if reason else _materials(case, chosen), reason, deviations))
     return samples
-
-
-def _unstable(case: Case, laws: Mapping[int, Law]) -> str:
-    """Why a law is not stable; empty if all are."""
-    for label, law in laws.items():
-        try:
-            require_stable(law, case.poisson, case.tissues[label].formulation)
-        except UnstableLawError as error:
-            return f"tissue {label}: {error}"
-    return ""
 
 
 def _materials(case: Case, laws: Mapping[int, Law]) -> dict[int, Material]:
