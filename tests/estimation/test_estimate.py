@@ -12,8 +12,8 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.estimate import estimate
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.options import EstimationOptions
+from warpbrain.estimation.parameters import prior_of
 from warpbrain.estimation.posterior import Posterior
-from warpbrain.estimation.prior import prior_of
 from warpbrain.gp.prior import Prior
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden

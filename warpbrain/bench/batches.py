@@ -16,9 +16,8 @@ import warp as wp
 from warpbrain.bench import command
 from warpbrain.cases.shipped import find_case
 from warpbrain.ensemble.course import step_batch
-from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.run import chosen_samples
-from warpbrain.ensemble.workers import Here, Processes, bytes_per_slot
+from warpbrain.ensemble.workers import Here, Job, Processes, bytes_per_slot
 from warpbrain.errors import InputError
 from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.tetrahedron import PAIRS

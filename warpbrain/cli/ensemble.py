@@ -12,17 +12,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpbrain.cli.options import add_to, note_case, require_poisson, require_tolerance, require_whole
-from warpbrain.ensemble import SAMPLES
+from warpbrain.ensemble.defaults import SAMPLES
 from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
-    from warpbrain.ensemble.job import Job
     from warpbrain.ensemble.results import EnsembleResult
     from warpbrain.ensemble.sample import Sample
     from warpbrain.ensemble.store import Store
-    from warpbrain.ensemble.workers import Workers
+    from warpbrain.ensemble.workers import Job, Workers
     from warpbrain.simulation.model import Model
     from warpbrain.terminal.record import Record
 
@@ -79,10 +78,10 @@ def _ensemble(options: argparse.Namespace) -> None:
     say = record.say
 
     from warpbrain.atomic import safe_name
-    from warpbrain.ensemble.job import Job
     from warpbrain.ensemble.results import results_of
     from warpbrain.ensemble.run import chosen_workers
     from warpbrain.ensemble.store import Store, discard
+    from warpbrain.ensemble.workers import Job
     from warpbrain.report import summary as tables
     from warpbrain.report.ensemble import describe_ensemble, ensemble_lines
     from warpbrain.report.files import fingerprints

@@ -13,10 +13,6 @@ if TYPE_CHECKING:
     from warpbrain.ensemble.results import EnsembleResult
 
 
-#: Number of samples: that of the paper's sweep. Here, for ``warpbrain ensemble --help`` must not load NumPy.
-SAMPLES = 289
-
-
 class _Callable(ModuleType):
     """This package, which is a public name of `warpbrain` as well."""
 

@@ -14,12 +14,11 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups, with_prior_draw
 from warpbrain.cases.shipped import as_case
-from warpbrain.ensemble import SAMPLES
-from warpbrain.ensemble.job import Job
+from warpbrain.ensemble.defaults import SAMPLES
 from warpbrain.ensemble.results import EnsembleResult, results_of
 from warpbrain.ensemble.sample import Sample
 from warpbrain.ensemble.store import Store
-from warpbrain.ensemble.workers import Here, Prepare, Processes, Workers, kind_of
+from warpbrain.ensemble.workers import Here, Job, Prepare, Processes, Workers, kind_of
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import law_of_curve

@@ -16,9 +16,8 @@ from warpbrain.estimation.fit import Estimate, GaussNewton
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions, Listener
-from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.parameters import Parameters, PriorMode, prior_modes, prior_of
 from warpbrain.estimation.posterior import Posterior
-from warpbrain.estimation.prior import PriorMode, prior_modes, prior_of
 from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.estimation.registration import registration_of
 from warpbrain.estimation.sampling import Chain, Importance, Proposal, Target, importance_sampling, run_chain

@@ -415,6 +415,12 @@ _ROUNDS, _LEAST = 6, 1e-3
 def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> Floats:
     """Change of recorded displacement over an edge of the element in which each point is.
 
+    A wall that was cut out of elements is a staircase, and a linear element has one gradient. Where displacement
+    changes much from place to place the mesh has a recorded point beside where it is, by a part of the edge of its
+    element, and its displacement is wrong by that part of this change (errors in variables, by effective variances:
+    Orear, Am. J. Phys. 50 (1982) 912). A finer mesh with the same wall does not show this error; taken for noise alone
+    it would look like a second force beside the first. It is that of what was recorded, whatever is thought to act.
+
     Gradients over each point and its neighbours are by least absolute deviations: a gross error is no gradient of its
     neighbours, and what changes faster than tissue can is not tissue. Points and displacement (n, 3) were recorded at
     one time [m]; `edges` (n,) are mean lengths of those of the element [m]. Returns (n, 3, 3), of each component along

@@ -161,7 +161,8 @@ def coverage(residuals: Floats, deviation: Floats, gross: Bools) -> tuple[float,
     return tuple(float(np.mean(away <= ndtri(0.5 + 0.5 * probability))) for probability in INTERVALS)
 
 
-#: Gains from which a direction is told, and below which it is hidden.
+#: Gains from which a direction is told, since the data know more of it than the prior did and the variance at least
+#: halves, and below which it is hidden: an estimate along it is the prior, and no finding.
 TOLD, HIDDEN = 1.0, 0.1
 #: Parts of a direction smaller than this, in standard deviations of the prior, are not spoken of.
 _NEGLIGIBLE = 0.1

@@ -50,7 +50,7 @@ def asymmetry(model: Hierarchical, group: str) -> Asymmetry:
     from scipy.special import ndtr
 
     strain = _largest_strain(STRETCHES[group])
-    # of a and b in `hierarchy`
+    # of a and b
     weights = 2.0 * np.array([np.tanh(STRAINS * strain / REACH).mean(), 1.0])
     everyone = [_along(weights, *each.mean_asymmetry()) for each in model.conditionals]
     sides = np.repeat([-1.0, 1.0], len(STRAINS)) / len(STRAINS)

@@ -1,7 +1,7 @@
 """Covariance of secant moduli: what studies share, level by level.
 
 With `z = ln mu(l)` of a study of method `m`, anatomy `a`, paper `q`, and `x(l) = 0.5 tanh(e(l)/0.5)` of the equivalent
-strain `e` (`secant`), which is `l - 1` near rest and of equal size for tension and compression of one I1,
+strain `e` (`literature.study`), which is `l - 1` near rest and of equal size for tension and compression of one I1,
 
     z = ln 1500 Pa + overall + method + anatomy + group + paper + study                       one modulus each
         + [curve shared by all + by anatomy + by paper + of the study](x), even, 0 at rest    hyperelastic studies only
@@ -121,8 +121,13 @@ def observations(studies: Sequence[Study]) -> Observations:
     names = papers(studies)
     rows: list[tuple[int, int, int, float, bool]] = []
     moduli = [np.empty(0)]
+    half = STRETCHES // 2
+    middle = (np.arange(half) + 0.5) / half
     for index, study in enumerate(studies):
-        grid = _stretches(study)
+        low, high = study.stretch
+        # the middles of equal parts of its range, so that neither 1 nor an end is among them
+        curved = np.concatenate([low + (1.0 - low) * middle, 1.0 + (high - 1.0) * middle])
+        grid = curved if study.hyperelastic else np.array([low, high])
         values = log_secant_modulus(grid, study.energy(grid))
         if not study.hyperelastic:
             grid, values = np.ones(1), values.mean(keepdims=True)
@@ -141,16 +146,6 @@ def places_of(rows: Sequence[tuple[int, int, int, float, bool]]) -> Places:
 def papers(studies: Sequence[Study]) -> list[str]:
     """The papers that studies are from; the place of one is its number in `Places.source`."""
     return sorted({study.paper for study in studies})
-
-
-def _stretches(study: Study) -> Floats:
-    """The middles of equal parts of its range, so that neither 1 nor an end is among them."""
-    low, high = study.stretch
-    if not study.hyperelastic:
-        return np.array([low, high])
-    half = STRETCHES // 2
-    middle = (np.arange(half) + 0.5) / half
-    return np.concatenate([low + (1.0 - low) * middle, 1.0 + (high - 1.0) * middle])
 
 
 @dataclass(frozen=True, eq=False)
@@ -419,7 +414,7 @@ class Conditional:
         return CENTRE + k.T @ self._factored[1], self.hierarchy.covariance_of(between) - k.T @ to
 
     def mean_asymmetry(self) -> tuple[Floats, Floats]:
-        """Mean (2,) and covariance (2, 2) of `a` and `b`, the asymmetry of all papers in the mean (`hierarchy`)."""
+        """Mean (2,) and covariance (2, 2) of `a` and `b`, the asymmetry of all papers in the mean."""
         prior = np.diag(np.square(self.hierarchy.mean_asymmetry))
         k = self._whitened(mean_asymmetry_of(self.seen.places) @ prior)
         return k.T @ self._factored[1], prior - k.T @ k
@@ -441,7 +436,11 @@ class Conditional:
 
 @dataclass(frozen=True, eq=False)
 class Hierarchical:
-    """The hierarchical model of a set of studies (a `warpbrain.gp.process.Process`).
+    """The hierarchical model of a set of studies (a `warpbrain.gp.process.Process`): they differ as wholes.
+
+    The paper's process takes what studies of a group differ by for noise that is independent at every stretch. A
+    hundred points of five curves then pin the group down as five hundred observations would, and a joint draw is
+    jagged. Here a study, and the paper it is from, is an effect, so the spread of a new study is one of whole curves.
 
     `hierarchy` is that of largest posterior density, `sample` was drawn from the posterior: predictions are averaged
     over it, and a draw is of one of it. Where it is empty, `hierarchy` stands for all.
@@ -488,15 +487,9 @@ class Hierarchical:
 
     def moments(self, at: Places) -> list[tuple[Floats, Floats]]:
         """Mean (n,) and covariance (n, n) of the log secant modulus at places, under each hierarchy."""
-        structures = self._structures(at)
-        return [each.moments(structures) for each in self.conditionals]
-
-    def _structures(self, at: Places, other: Places | None = None) -> Structures:
-        """Of places with other ones, without these with themselves."""
         here = Structure.of(self._seen.places, at)
-        if other is None:
-            return Structures(here, here, Structure.of(at, at))
-        return Structures(here, Structure.of(self._seen.places, other), Structure.of(at, other))
+        structures = Structures(here, here, Structure.of(at, at))
+        return [each.moments(structures) for each in self.conditionals]
 
     @staticmethod
     def places(groups: Sequence[str], stretches: ArrayLike) -> Places:
@@ -530,8 +523,11 @@ class Hierarchical:
         if key not in self._structures_of:
             if len(self._structures_of) > 1:
                 self._structures_of.clear()
-            others = None if other is at else self.places(groups, other)
-            self._structures_of[key] = self._structures(self.places(groups, at), others)
+            seen, here = self._seen.places, self.places(groups, at)
+            there = here if other is at else self.places(groups, other)
+            to = Structure.of(seen, here)
+            others = to if other is at else Structure.of(seen, there)
+            self._structures_of[key] = Structures(to, others, Structure.of(here, there))
         return self._structures_of[key]
 
     @cached_property

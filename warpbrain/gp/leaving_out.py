@@ -5,6 +5,11 @@ one study leaves its siblings in, so that score says how well a model copies sib
 model knows of the next laboratory, or the next patient. Where intervals are judged, studies or papers are counted and
 not points: the points of a curve, and the curves of a paper, stand or fall together, and thousands of them are no more
 than thirty witnesses.
+
+Every candidate predicts the log energies `y = ln(Psi + 1e-4)` of a study of a group, at any stretch, one by one. The
+coregionalised ones learn from 20 points a study here, not 100, so that each can be trained again for every study that
+is left out; each training goes on from the one on all studies. A group of which the only study is left out keeps the
+parameters that it had with it: a favour to these models, which could not predict it otherwise.
 """
 
 from __future__ import annotations
@@ -21,7 +26,7 @@ from scipy.special import logsumexp, ndtr
 from warpbrain.arrays import Floats
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
-from warpbrain.gp.coregionalised import Coregionalised, training_points
+from warpbrain.gp.coregionalised import JITTER, TASKS, Coregionalised, Likelihood, climb, start, train, training_points
 from warpbrain.gp.hierarchy import (
     CENTRE,
     MEAN_ASYMMETRY,
@@ -32,7 +37,6 @@ from warpbrain.gp.hierarchy import (
     sample_hierarchies,
 )
 from warpbrain.gp.literature.study import METHODS, OFFSET, Study, invariant, log_secant_modulus
-from warpbrain.gp.training import JITTER, TASKS, Likelihood, climb, start, train
 
 #: Name of the model that ships as the default.
 DEFAULT = "hierarchical (the default)"
@@ -109,7 +113,7 @@ class CoregionalisedCandidate:
         assert self.model is not None
         mean, spread = self.model.log_energy(study.group, stretches)
         error = np.log(study.energy(stretches) + OFFSET) - mean
-        return Prediction(_normal(error, spread), ndtr(error / spread), error)
+        return _predicted(error[None], spread[None], error)
 
     def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
         assert self.model is not None
@@ -150,9 +154,8 @@ class HierarchicalCandidate:
         errors = np.log(energy / core) - means
         # the density of y = ln(Psi + 1e-4) is that of z = ln(Psi / I) times dz/dy
         slope = np.log((energy + OFFSET) / energy)
-        density = logsumexp(_normal(errors, spreads), axis=0) - np.log(len(moments))
         away = np.log(energy + OFFSET) - np.log(core * np.exp(means.mean(axis=0)) + OFFSET)
-        return Prediction(density + slope, ndtr(errors / spreads).mean(axis=0), away)
+        return _predicted(errors, spreads, away, slope)
 
     def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
         """See `Candidate`; of log secant moduli, which differ from log energies by what is known."""
@@ -186,8 +189,11 @@ def candidates() -> tuple[Candidate, ...]:
     )
 
 
-def _normal(error: Floats, spread: Floats) -> Floats:
-    return -0.5 * (error / spread) ** 2 - np.log(spread) - 0.5 * np.log(2.0 * np.pi)
+def _predicted(errors: Floats, spreads: Floats, away: Floats, slope: Floats | float = 0.0) -> Prediction:
+    """By a mixture of normal distributions of equal weight, with errors and spreads (m, n)."""
+    densities = -0.5 * (errors / spreads) ** 2 - np.log(spreads) - 0.5 * np.log(2.0 * np.pi)
+    density = logsumexp(densities, axis=0) - np.log(len(errors))
+    return Prediction(density + slope, ndtr(errors / spreads).mean(axis=0), away)
 
 
 Fold = Literal["study", "paper"]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,13 +16,6 @@ from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import DrawnLaws, draw_many
-
-if TYPE_CHECKING:
-    from warpbrain.physics.laws import Law
-    from warpbrain.physics.laws.law import Coordinate
-import math
-from itertools import accumulate
-from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from warpbrain.physics.laws import Law
@@ -58,11 +52,12 @@ def from_coordinates(law: str, values: Sequence[float]) -> Law:
 
 def laws_from(names: Sequence[str], values: Sequence[float]) -> tuple[Law, ...]:
     """Laws by their names, of the coordinates of all of them, one after the other."""
-    ends = list(accumulate(len(coordinates(name)) for name in names))
-    return tuple(
-        from_coordinates(name, values[end - len(coordinates(name)) : end])
-        for name, end in zip(names, ends, strict=True)
-    )
+    rest, laws = list(values), []
+    for name in names:
+        count = len(coordinates(name))
+        laws.append(from_coordinates(name, rest[:count]))
+        del rest[:count]
+    return tuple(laws)
 
 
 #: Smallest width of a kernel along a bounded coordinate, relative to the box: where all samples are on one side, their

@@ -44,7 +44,8 @@ def squared_exponential(distance: Floats, length: float) -> tuple[Floats, Floats
     return k, r2 * k
 
 
-#: Kernels by name; each takes distances and a length scale and returns values and derivatives.
+#: Stationary kernels of unit variance over stretch by name; each takes distances and a length scale, and returns values
+#: and derivatives by the logarithm of that.
 KERNELS = {
     "matern12": matern12,
     "matern32": matern32,

@@ -22,7 +22,7 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
-from warpbrain.gp.coregionalised import Coregionalised, training_points
+from warpbrain.gp.coregionalised import JITTER, TASKS, Climb, Coregionalised, Parameters, train, training_points
 from warpbrain.gp.hierarchy import (
     EFFECTS,
     SAMPLE,
@@ -36,7 +36,6 @@ from warpbrain.gp.hierarchy import (
 from warpbrain.gp.literature.studies import VARIANTS, Variant, read_studies
 from warpbrain.gp.literature.study import GROUPS, Study
 from warpbrain.gp.process import KERNELS, Process
-from warpbrain.gp.training import JITTER, TASKS, Climb, Parameters, train
 from warpbrain.values import finite
 
 Kind = Literal["hierarchical", "coregionalised"]
@@ -126,9 +125,9 @@ def fit_model(
 ) -> tuple[Process, dict[str, Any]]:
     """Fit a model to the literature and to the studies of a user's file (`warpbrain.gp.literature.studies`).
 
-    For `climbs` and `progress` see `warpbrain.gp.training.train`. Returns the model and, for `write_model` and for the
-    reader, a record: objective, convergence, restarts, conditioning and seconds. `InputError` if the file of studies is
-    wrong; `SolveError` if no covariance can be factored.
+    For `climbs` and `progress` see `warpbrain.gp.coregionalised.train`. Returns the model and, for `write_model` and
+    for the reader, a record: objective, convergence, restarts, conditioning and seconds. `InputError` if the file of
+    studies is wrong; `SolveError` if no covariance can be factored.
     """
     began = time.perf_counter()
     studies = read_studies(variant, add)

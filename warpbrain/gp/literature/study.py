@@ -1,4 +1,10 @@
-"""One published strain energy, the twelve groups that such studies are of, and the points that they make."""
+"""One published strain energy, the twelve groups that such studies are of, and the points that they make.
+
+A strain energy is seen as the neo-Hookean one of the same value, too: on the path `Psi = mu I(l)` is one, with
+`I(l) = (l^2 + 2/l - 3) / 2`. Dividing any other energy by `I` leaves the secant shear modulus `mu(l)`, smooth through
+`l = 1`, where energies vanish and their logarithms do not exist. Its logarithm `z` is what the hierarchical model
+describes: constant for a neo-Hookean solid, curved for one that stiffens.
+"""
 
 from __future__ import annotations
 
