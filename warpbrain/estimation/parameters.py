@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +22,6 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
 from warpbrain.errors import InputError, SolveError
-from warpbrain.gp.literature.study import Study
 from warpbrain.gp.prior import Prior, coordinates, laws_from, to_coordinates
 from warpbrain.gp.process import Process
 from warpbrain.inference.beliefs import belief
@@ -242,22 +243,8 @@ def declared_deviations(case: Case, parameters: Parameters) -> Floats:
     return np.array(deviations)
 
 
-@dataclass(frozen=True)
-class _NoStudies:
-    """What stands for the generative model where it has seen no study of any tissue; see `warpbrain.gp.process`."""
-
-    name: str = "declared"
-    variant: str = "about the case's own laws"
-    studies: tuple[Study, ...] = ()
-    groups: tuple[str, ...] = ()
-
-    def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
-        """There is none."""
-        raise InputError(f"'{group}': the prior is about the laws that the case declares, and has no curves")
-
-    def draw(self, groups: Sequence[str], stretches: ArrayLike, number: int | tuple[int, ...], seed: int = 0) -> Floats:
-        """There is none."""
-        raise InputError("the prior is about the laws that the case declares, and has no curves")
+#: What stands for the generative model where it has seen no study of any tissue: there are no curves.
+_NO_STUDIES = SimpleNamespace(name="declared", variant="about the case's own laws", studies=(), groups=())
 
 
 def _declared_prior(case: Case, parameters: Parameters, count: int, seed: int) -> Prior:
@@ -273,7 +260,8 @@ def _declared_prior(case: Case, parameters: Parameters, count: int, seed: int) -
             draws.append(theta)
     bounds = np.zeros(len(parameters.tissues))
     laws, poisson, formulations = parameters.laws_of, parameters.poisson, parameters.formulations
-    return Prior(_NoStudies(), parameters.tissues, laws, poisson, formulations, seed, np.array(draws), attempts, bounds)
+    about = parameters.tissues, laws, poisson, formulations, seed
+    return Prior(cast(Process, _NO_STUDIES), *about, np.array(draws), attempts, bounds)
 
 
 def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed: int = 0) -> Prior:

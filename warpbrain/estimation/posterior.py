@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,8 +13,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
 from warpbrain.estimation.finer_mesh import DiscretisationError
 from warpbrain.estimation.fit import Estimate, probabilities
-from warpbrain.estimation.likelihood import Noise
-from warpbrain.estimation.observations import Observations, Sensors
+from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.registration import realigned
@@ -116,7 +115,12 @@ def predictions(
         shape = len(rows), first.size
         seen_rows, noise = after.of_rows(members), point.noise
         if role != "fit":
-            noise = _unseen(seen_rows, jacobian[members], joint, noise)
+            # of a recording that was not fitted, its gross errors beside what the estimate knows of it
+            undeclared = np.isnan(seen_rows.sigma)
+            sigmas = np.where(undeclared, 1.0 / np.sqrt(seen_rows.weights), seen_rows.sigma)
+            noise = replace(noise, rows=seen_rows, sigma=sigmas, inflation=np.ones(len(seen_rows.points)))
+            if not undeclared.any():
+                noise = noise.with_gross_errors(seen_rows.residual, jacobian[members] @ np.linalg.cholesky(joint))
         noise_rows = members if role == "fit" else members - members[0]
         known = role == "fit" or first.sigma is not None
         gross = noise.gross[[k for k, at in enumerate(noise.rows.points) if noise_rows[0] <= at[0] <= noise_rows[-1]]]
@@ -131,15 +135,6 @@ def predictions(
         about = name, first.kind, role, first.unit, rows, before.residual[members].reshape(shape), residual
         results.append(Prediction(*about, sigma, deviation, gross, within, run[name], fitted[name]))
     return tuple(results)
-
-
-def _unseen(rows: Sensors, jacobian: Floats, joint: Floats, fitted: Noise) -> Noise:
-    """The noise of a recording that was not fitted, its gross errors beside what the estimate knows of it."""
-    sigma = np.where(np.isnan(rows.sigma), 1.0 / np.sqrt(rows.weights), rows.sigma)
-    noise = Noise(rows, sigma, fitted.scale, np.ones(len(rows.points)), fitted.outliers, fitted.unresolved)
-    if np.isnan(rows.sigma).any():
-        return noise
-    return noise.with_gross_errors(rows.residual, jacobian @ np.linalg.cholesky(joint))
 
 
 def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapping[str, Comparison]:

@@ -29,6 +29,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -184,49 +185,41 @@ class Likelihood:
 
     def value_gradient_and_information(self, parameters: Parameters) -> tuple[float, Floats, Floats]:
         """As `value`, with its derivative (37,) and the average information (37, 37) in the vector of parameters."""
-        factored = self.factor(parameters)
-        _, k, dk = self.covariance(parameters)
-        B = parameters.coregionalisation[np.ix_(self.data.task, self.data.task)]
-        gradient = self._gradient(parameters, factored, k, B * dk)
-        return self._value(parameters, factored), gradient, self._information(parameters, factored, k, B * dk)
-
-    def _gradient(self, parameters: Parameters, factored: Factored, k: Floats, by_length: Floats) -> Floats:
+        from scipy.linalg import solve_triangular
         from scipy.linalg.lapack import dpotri
 
-        data, noise = self.data, parameters.noise
+        factored = self.factor(parameters)
+        data, w, noise, a = self.data, parameters.w, parameters.noise, factored.weights
+        _, k, dk = self.covariance(parameters)
+        by_length = parameters.coregionalisation[np.ix_(data.task, data.task)] * dk
         inverse, info = dpotri(factored.cholesky, lower=1)
         assert info == 0
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
-        G = 0.5 * (inverse - np.outer(factored.weights, factored.weights))
+        G = 0.5 * (inverse - np.outer(a, a))
         by_B = self._blocks(G * k)
         by_noise = np.bincount(data.task, weights=np.diag(G) / data.count, minlength=TASKS)
         extra = np.bincount(data.task, weights=data.count - 1, minlength=TASKS) / noise - self._scatter / noise**2
-        return np.concatenate(
-            [
-                [float(np.sum(G * by_length))],
-                2.0 * by_B @ parameters.w,
-                np.diag(by_B) * parameters.kappa,
-                (by_noise + 0.5 * extra) * noise,
-            ]
-        )
-
-    def _information(self, parameters: Parameters, factored: Factored, k: Floats, by_length: Floats) -> Floats:
-        from scipy.linalg import solve_triangular
-
-        data, w, a = self.data, parameters.w, factored.weights
+        slopes = [
+            [float(np.sum(G * by_length))],
+            2.0 * by_B @ w,
+            np.diag(by_B) * parameters.kappa,
+            (by_noise + 0.5 * extra) * noise,
+        ]
         members = np.zeros((data.size, TASKS))
         members[np.arange(data.size), data.task] = 1.0
         by_task = k @ (members * a[:, None])
-        # columns K_i a
-        by_w = w[data.task, None] * by_task + members * (by_task @ w)[:, None]
-        by_kappa = parameters.kappa * members * by_task
-        by_noise = parameters.noise * members * (a / data.count)[:, None]
-        columns = np.concatenate([(by_length @ a)[:, None], by_w, by_kappa, by_noise], axis=1)
-        half = solve_triangular(factored.cholesky, columns, lower=True, check_finite=False)
+        # columns K_i a, of the length scale, w, kappa and the noise
+        columns = [
+            (by_length @ a)[:, None],
+            w[data.task, None] * by_task + members * (by_task @ w)[:, None],
+            parameters.kappa * members * by_task,
+            noise * members * (a / data.count)[:, None],
+        ]
+        half = solve_triangular(factored.cholesky, np.concatenate(columns, axis=1), lower=True, check_finite=False)
         information = 0.5 * half.T @ half
         at = np.arange(1 + 2 * TASKS, 1 + 3 * TASKS)
-        information[at, at] += 0.5 * self._scatter / parameters.noise
-        return information
+        information[at, at] += 0.5 * self._scatter / noise
+        return self._value(parameters, factored), np.concatenate(slopes), information
 
     def _blocks(self, matrix: Floats) -> Floats:
         """Sums (12, 12) of a matrix (m, m) over pairs of tasks."""
@@ -261,6 +254,10 @@ class Climb:
     gain: float  # what the last iteration lowered the value by
     gradient: float  # largest derivative by a free parameter
     condition: float  # of the covariance
+
+    def described(self) -> dict[str, Any]:
+        """All but the parameters, for the record of a fit."""
+        return {name: value for name, value in vars(self).items() if name != "parameters"}
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.gp.literature import forms
 
@@ -261,7 +261,10 @@ def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> 
     )
     held = (result.active_mask < 0) | (result.active_mask > 0) & bounded
     sizes = np.where(held, np.where(result.active_mask > 0, farthest, nearest), np.exp(result.x))
-    stationary = _is_stationary(result.jac, result.fun, held)
+    # the residual stands upright on every direction that is not held at a bound
+    least = max(_STATIONARY * float(np.linalg.norm(result.fun)), _EXACT * np.sqrt(len(y)))
+    upright = np.abs(result.fun @ result.jac) <= least * np.linalg.norm(result.jac, axis=0)
+    stationary = bool(np.all(upright | held))
     return Fit(
         model,
         tuple(float(value) for value in signs * sizes),
@@ -272,12 +275,6 @@ def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> 
         int(result.nfev),
         tuple(name for name, at in zip(model.parameter_names, held, strict=True) if at),
     )
-
-
-def _is_stationary(jacobian: Floats, residual: Floats, held: Bools) -> bool:
-    """Whether the residual stands upright on every direction that is not held at a bound."""
-    size = max(_STATIONARY * float(np.linalg.norm(residual)), _EXACT * np.sqrt(len(residual)))
-    return bool(np.all((np.abs(residual @ jacobian) <= size * np.linalg.norm(jacobian, axis=0)) | held))
 
 
 def unstable(fit: Fit, poisson: float = 0.45, formulation: str = "coupled") -> str:

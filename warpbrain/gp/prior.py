@@ -244,23 +244,20 @@ class FoldedDensity:
         points = np.atleast_2d(np.asarray(at, dtype=np.float64))
         count, size = self.samples.shape
         centres = solve_triangular(self._factor, self.samples.T, lower=True).T
+        # the points and their mirror images in all sides; a kernel is narrow: images of images are of no weight
+        by_column = [
+            [column, *(2.0 * side - column for side in sides if np.isfinite(side))]
+            for column, *sides in zip(points.T, self.low, self.high, strict=True)
+        ]
         terms = []
-        for image in self._images(points):
-            away = solve_triangular(self._factor, image.T, lower=True).T
+        for image in product(*by_column):
+            away = solve_triangular(self._factor, np.stack(image), lower=True).T
             squares = np.sum(away**2, axis=1)[:, None] - 2.0 * away @ centres.T + np.sum(centres**2, axis=1)
             terms.append(logsumexp(-0.5 * squares, axis=1))
         density: Floats = logsumexp(terms, axis=0)
         density -= np.log(count) + 0.5 * size * np.log(2.0 * np.pi) + np.log(np.diag(self._factor)).sum()
         inside = np.all((points >= self.low) & (points <= self.high), axis=1)
         return np.where(inside, density, -np.inf)
-
-    def _images(self, points: Floats) -> list[Floats]:
-        """The points and their mirror images in all sides; a kernel is narrow, so images of images are of no weight."""
-        by_column = []
-        for column, low, high in zip(points.T, self.low, self.high, strict=True):
-            sides = [side for side in (low, high) if np.isfinite(side)]
-            by_column.append([column, *(2.0 * side - column for side in sides)])
-        return [np.stack(columns, axis=1) for columns in product(*by_column)]
 
     @cached_property
     def _factor(self) -> Floats:

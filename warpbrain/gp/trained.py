@@ -22,7 +22,7 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
-from warpbrain.gp.coregionalised import JITTER, TASKS, Climb, Coregionalised, Parameters, train, training_points
+from warpbrain.gp.coregionalised import JITTER, TASKS, Coregionalised, Parameters, train, training_points
 from warpbrain.gp.hierarchy import (
     EFFECTS,
     SAMPLE,
@@ -105,7 +105,12 @@ def read_model(folder: Path) -> Process:
         sample = table.get("sample")
         if not isinstance(sample, list) or not all(isinstance(drawn, dict) for drawn in sample):
             raise InputError(f"{path}: sample: expected tables of parameters")
-        best, *others = (_hierarchy(path, each, kernel) for each in (numbers, *sample))
+        best, *others = (
+            Hierarchy(
+                {name: _positive(path, each, name) for name in EFFECTS}, _positive(path, each, "length scale"), kernel
+            )
+            for each in (numbers, *sample)
+        )
         return Hierarchical(studies, best, variant, tuple(others))
     arrays = {name: _numbers(path, numbers, name) for name in ("w", "kappa", "noise")}
     try:
@@ -147,21 +152,15 @@ def fit_model(
             "means of replicates": data.size,
             "jitter": JITTER,
             "negative log likelihood": training.best.value,
-            "climbs": [_climb_table(climb) for climb in training.climbs],
+            "climbs": [climb.described() for climb in training.climbs],
             "starts": [
                 {"apart": None if start.apart is None else GROUPS[start.apart], "every": training.step}
-                | _climb_table(start.climb)
+                | start.climb.described()
                 for start in training.starts
             ],
         }
     record["seconds"] = time.perf_counter() - began
     return model, record
-
-
-def _climb_table(climb: Climb) -> dict[str, Any]:
-    table = asdict(climb)
-    del table["parameters"]
-    return table
 
 
 def fitted_hierarchical(
@@ -200,11 +199,6 @@ def write_model(folder: Path, model: Process, record: dict[str, Any], added: Pat
             path.write_text(text, encoding="utf-8")
     with whole_file(folder / MODEL) as path:
         path.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
-
-
-def _hierarchy(path: Path, numbers: dict[str, Any], kernel: str) -> Hierarchy:
-    spread = {name: _positive(path, numbers, name) for name in EFFECTS}
-    return Hierarchy(spread, _positive(path, numbers, "length scale"), kernel)
 
 
 def _described(hierarchy: Hierarchy) -> dict[str, Any]:
