@@ -260,8 +260,7 @@ def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
 
 
 def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
-    from warpbrain.gp.metamodels import unstable
-    from warpbrain.gp.sampling import law_of_curve
+    from warpbrain.gp.sampling import law_of_curve, unstable
     from warpbrain.report.generative_text import LawRow
 
     places = [-2.0 + 4.0 * i / (options.sweep - 1) for i in range(options.sweep)]

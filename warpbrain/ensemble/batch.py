@@ -246,12 +246,20 @@ class Batch:
         """One pass: slots `start` begin a step from an evaluated state, the states of `marked` are to be evaluated."""
         self._unsolved[start] = True
         stepping = np.flatnonzero(self._unsolved)
-        self._write_list(self._start, start)
-        self._write_list(self._solve, stepping)
-        self._write_flags(self._marked, marked)
-        self._write_flags(self._stepping, stepping)
+        for (slots, size), members in ((self._start, start), (self._solve, stepping)):
+            slots.assign(np.pad(members.astype(np.int32), (0, self.slots - len(members))))
+            size.assign(np.array([len(members)], dtype=np.int32))
+        for flags, members in ((self._marked, marked), (self._stepping, stepping)):
+            flags.assign(np.isin(np.arange(self.slots), members).astype(np.int32))
         self._linger_count.assign(np.array([int(self._linger * len(stepping))], dtype=np.int32))
-        self._write_coefficients()
+        h, damping = self.time_step, self.system.model.damping
+        self._h.assign(h)
+        self._k.assign(h * damping.stiffness + h * h)
+        self._m.assign(1.0 + h * damping.mass)
+        if len(self.load_factors):
+            self._factors.assign(self.load_factors)
+        if len(self.amounts):
+            self._amounts.assign(self.amounts)
         if self._graph is None:
             self._capture()
         wp.capture_launch(self._graph)
@@ -261,27 +269,6 @@ class Batch:
         unbalanced, internal = np.sqrt(self._totals.numpy().astype(np.float64))
         min_J = self._min_J.numpy()[0].astype(np.float64)
         return States(ready, min_J, unbalanced, internal, iterations, residual, goal)
-
-    def _write_list(self, listed: tuple[wp.array, wp.array], values: NDArray[np.intp]) -> None:
-        padded = np.zeros(self.slots, dtype=np.int32)
-        padded[: len(values)] = values
-        listed[0].assign(padded)
-        listed[1].assign(np.array([len(values)], dtype=np.int32))
-
-    def _write_flags(self, flags: wp.array, slots: NDArray[np.intp]) -> None:
-        values = np.zeros(self.slots, dtype=np.int32)
-        values[slots] = 1
-        flags.assign(values)
-
-    def _write_coefficients(self) -> None:
-        h, damping = self.time_step, self.system.model.damping
-        self._h.assign(h)
-        self._k.assign(h * damping.stiffness + h * h)
-        self._m.assign(1.0 + h * damping.mass)
-        if len(self.load_factors):
-            self._factors.assign(self.load_factors)
-        if len(self.amounts):
-            self._amounts.assign(self.amounts)
 
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
         # small blocks: those whose lanes have all ended make room at once

@@ -34,29 +34,6 @@ from warpbrain.simulation.system import System
 SWEEP = tuple(np.linspace(-2.0, 2.0, 17).tolist())
 
 
-def drawn_samples(
-    case: Case, count: int, seed: int, process: Process, on_sample: Callable[[int], None] | None = None
-) -> list[Sample]:
-    """Draws 0 to `count` - 1 of the joint prior of a case's tissues.
-
-    A draw of which no stable law is found is a sample without materials. `InputError` if a tissue has no group, or one
-    that the process has seen no study of.
-    """
-    require_groups(case, tuple(sorted(case.tissues)), process)
-    samples = []
-    for number in range(count):
-        try:
-            drawn = with_prior_draw(case, number, seed, process)
-        except SolveError as error:
-            samples.append(Sample(number, None, str(error).removeprefix(f"{case.path}: ")))
-        else:
-            laws = {label: tissue.known_law for label, tissue in drawn.case.tissues.items()}
-            samples.append(Sample(number, _materials(case, laws)))
-        if on_sample is not None:
-            on_sample(number)
-    return samples
-
-
 def swept_samples(case: Case, process: Process) -> list[Sample]:
     """The paper's sweep: the laws of the curves `k` standard deviations from the mean, 17 `k` in [-2, 2] a tissue.
 
@@ -150,14 +127,29 @@ def chosen_samples(
     samples: int | str,
     seed: int = 0,
     process: Process | None = None,
-    on_sample: Callable[[int], None] | None = None,
+    on_sample: Callable[[int], None] = lambda _number: None,
 ) -> list[Sample]:
-    """So many draws of the tissues' joint prior, or the paper's sweep (``"grid"``); `InputError` if there is none."""
+    """So many draws of the tissues' joint prior, from 0 on, or the paper's sweep (``"grid"``).
+
+    A draw of which no stable law is found is a sample without materials. `InputError` if there is no such number of
+    samples, or a tissue has no group or one that the process has seen no study of.
+    """
     if samples == "grid":
         return swept_samples(case, process or find_model("coregionalised", "as_published"))
     if not isinstance(samples, int) or samples < 1:
         raise InputError(f"samples = {samples!r}: expected a whole number of at least 1 or 'grid', the paper's sweep")
-    return drawn_samples(case, samples, seed, process or find_model("hierarchical"), on_sample)
+    process = process or find_model("hierarchical")
+    require_groups(case, tuple(sorted(case.tissues)), process)
+    chosen = []
+    for number in range(samples):
+        try:
+            drawn = with_prior_draw(case, number, seed, process)
+            laws = {label: tissue.known_law for label, tissue in drawn.case.tissues.items()}
+            chosen.append(Sample(number, _materials(case, laws)))
+        except SolveError as error:
+            chosen.append(Sample(number, None, str(error).removeprefix(f"{case.path}: ")))
+        on_sample(number)
+    return chosen
 
 
 @contextmanager

@@ -82,9 +82,10 @@ class Job:
             raise InputError(f"a worker has {_versions()}, the job was made with {self.versions}")
         return System(self.model, device, self.precision)
 
-    def outcomes(self, system: System, slots: int) -> Iterator[list[Outcome]]:
-        """Compute the samples, `slots` at a time, on the device of a system of this job's model."""
-        return step_samples(system, self.course(), self.samples, slots)
+    def outcomes(self, device: str | None, batch: int | None) -> Iterator[list[Outcome]]:
+        """Compute the samples on a device, so many at a time, or as many as its memory holds and pay."""
+        system = self.system(device)
+        return step_samples(system, self.course(), self.samples, batch_size(system, batch))
 
     def fingerprint(self, kind: str) -> str:
         """A hash of all that decides the outcomes' bits; `kind` is that of the devices, ``"cpu"`` or ``"cuda"``."""
@@ -181,8 +182,7 @@ class Here:
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
         """See `Workers`."""
-        system = job.system(self._device.alias)
-        yield from job.outcomes(system, batch_size(system, self._batch))
+        return job.outcomes(self._device.alias, self._batch)
 
 
 class Processes:
@@ -219,8 +219,7 @@ def kind_of(device: str | None) -> str:
 def compute_part(job: Job, device: str | None, batch: int | None, prepare: Prepare) -> list[Outcome]:
     """All outcomes of a job: what a worker does."""
     prepare()
-    system = job.system(device)
-    return [outcome for ended in job.outcomes(system, batch_size(system, batch)) for outcome in ended]
+    return [outcome for ended in job.outcomes(device, batch) for outcome in ended]
 
 
 def parts_of(job: Job, workers: int, least: int) -> list[Job]:

@@ -283,8 +283,17 @@ def _observations(case: Case, recording: Recording, moments: Moments) -> Iterato
     start = -1 if recording.reference is None else moments.number(recording.reference)
     for number in np.unique(states).tolist():
         members, weights, size, positions, edges, at = make(case, recording, rows[states == number])
-        sigma, change = _sigma(recording, members, weights), np.zeros((len(members), size, 3))
-        about = sigma, weights, size, positions, edges, change, times[members], recording.reference or 0.0
+        sigma, sigmas = recording.sigma, getattr(recording, "sigmas", None)
+        # of each row, or None: it is to be estimated
+        declared = None
+        if sigmas is not None or sigma is not None:
+            declared = np.full(len(members), sigma, dtype=np.float64) if sigmas is None else np.asarray(sigmas)[members]
+            for value in declared.tolist():
+                if not (math.isfinite(value) and value > 0.0):
+                    raise InputError(f"recording '{recording.name}': sigma = {value:g}: expected a positive number")
+            declared = declared / np.sqrt(weights)
+        change = np.zeros((len(members), size, 3))
+        about = declared, weights, size, positions, edges, change, times[members], recording.reference or 0.0
         yield Observation(recording.name, recording.kind, unit, members, *about, number, start, at)
 
 
@@ -393,18 +402,6 @@ def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observ
         for (number, row), change in zip(members, change_over_element(points, moved, edges), strict=True):
             changes[number][row] = change
     return tuple(replace(seen, over_element=change) for (_, seen), change in zip(each, changes, strict=True))
-
-
-def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:
-    """Standard deviation of each row, None if it is to be estimated."""
-    sigmas = getattr(recording, "sigmas", None)
-    if sigmas is None and recording.sigma is None:
-        return None
-    sigma = np.full(len(rows), recording.sigma, dtype=np.float64) if sigmas is None else np.asarray(sigmas)[rows]
-    for value in sigma.tolist():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"recording '{recording.name}': sigma = {value:g}: expected a positive number")
-    return sigma / np.sqrt(weights)
 
 
 #: Rounds of weighted least squares that come to least absolute deviations, and the least of these, relative to the
