@@ -277,12 +277,12 @@ class Batch:
     def _capture(self) -> None:
         """Capture a pass in a graph: one launch from the host instead of hundreds."""
         lists = (self._start[1], self._solve[1], self._marked, self._stepping)
-        kept = [wp.clone(values) for values in lists]
+        contents = [wp.clone(values) for values in lists]
         for values in lists:
             values.zero_()
         # a pass over empty lists loads every module
         self._record()
-        for values, content in zip(lists, kept, strict=True):
+        for values, content in zip(lists, contents, strict=True):
             wp.copy(values, content)
         with wp.ScopedCapture(device=self._device) as capture:
             self._record()

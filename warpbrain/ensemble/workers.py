@@ -143,16 +143,16 @@ def free_bytes(system: System) -> int:
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
 
 
-def batch_size(system: System, asked: int | None = None) -> int:
+def batch_size(system: System, samples: int | None = None) -> int:
     """Samples of a batch: as many as are asked for, or as many as the memory holds and pay; `InputError` if not one."""
     each = bytes_per_slot(system)
     room = int(SHARE * free_bytes(system)) // each
-    if room < (asked or 1):
+    if room < (samples or 1):
         raise InputError(
-            f"--batch {asked or 'auto'}: a sample takes {each / 1e6:.0f} MB, and {system.device.alias} has room for "
+            f"--batch {samples or 'auto'}: a sample takes {each / 1e6:.0f} MB, and {system.device.alias} has room for "
             f"{room}"
         )
-    return asked or min(room, ENOUGH["cuda" if system.device.is_cuda else "cpu"])
+    return samples or min(room, ENOUGH["cuda" if system.device.is_cuda else "cpu"])
 
 
 #: Parts that each worker gets: the more, the less the others wait for the last.

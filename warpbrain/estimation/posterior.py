@@ -95,6 +95,8 @@ def predictions(
 
     `joint` (p + q, p + q) is the covariance of parameters and nuisances.
     """
+    from scipy.special import ndtri
+
     if not observations.recordings:
         return ()
     problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised
@@ -126,11 +128,10 @@ def predictions(
         gross = noise.gross[[k for k, at in enumerate(noise.rows.points) if noise_rows[0] <= at[0] <= noise_rows[-1]]]
         gross = gross if len(gross) else np.zeros(len(rows), dtype=bool)
         residual, deviation = seen_rows.residual.reshape(shape), deviations[members].reshape(shape)
-        within = (
-            coverage(residual, np.hypot(deviation, noise.deviation[noise_rows].reshape(shape)), gross)
-            if known
-            else None
-        )
+        within = None
+        if known and not gross.all():
+            away = (np.abs(residual) / np.hypot(deviation, noise.deviation[noise_rows].reshape(shape)))[~gross]
+            within = tuple(float(np.mean(away <= ndtri(0.5 + 0.5 * probability))) for probability in INTERVALS)
         sigma = (noise.scale * noise.sigma)[noise_rows].reshape(shape)[:, 0] if known else None
         about = name, first.kind, role, first.unit, rows, before.residual[members].reshape(shape), residual
         results.append(Prediction(*about, sigma, deviation, gross, within, run[name], fitted[name]))
@@ -144,16 +145,6 @@ def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapp
     states = [NodalState(case.remaining[0], *state) for state in pairs]
     others = {time: states[number] for time, number in zip(moments.times, moments.numbers, strict=True)}
     return {comparison.name: comparison for comparison in observe(case, states[-1], others=others).comparisons}
-
-
-def coverage(residuals: Floats, deviation: Floats, gross: Bools) -> tuple[float, ...] | None:
-    """Part of the components (n, d) in their normal intervals; None if all rows are gross errors."""
-    from scipy.special import ndtri
-
-    if gross.all():
-        return None
-    away = (np.abs(residuals) / deviation)[~gross]
-    return tuple(float(np.mean(away <= ndtri(0.5 + 0.5 * probability))) for probability in INTERVALS)
 
 
 #: Gains from which a direction is told, since the data know more of it than the prior did and the variance at least
@@ -212,7 +203,7 @@ def identifiability(estimate: Estimate) -> Identifiability:
     """What the data of an estimate inform."""
     posterior = estimate.laplace
     parameters, gains = tuple(posterior.parameters), posterior.gains
-    told, hidden = gains >= TOLD, gains < HIDDEN
+    informed, hidden = gains >= TOLD, gains < HIDDEN
     # one prior standard deviation of a parameter is the unit in which changes of different kinds compare
     unit = posterior.prior.standard_deviations
     # a factor on all moduli moves nothing if displacements do it all, and everything under a weight or a force
@@ -224,8 +215,8 @@ def identifiability(estimate: Estimate) -> Identifiability:
         return tuple(in_words(parameters, row / unit, _COMBINATION) for row in _reduced(rows * unit))
 
     return Identifiability(
-        combinations(posterior.combinations[told]),
-        combinations(posterior.combinations[~told & ~hidden]),
+        combinations(posterior.combinations[informed]),
+        combinations(posterior.combinations[~informed & ~hidden]),
         tuple(in_words(parameters, row * unit, _CHANGE) for row in _reduced(posterior.directions[hidden] / unit)),
         known < HIDDEN and bool(moved <= _UNMOVED * np.linalg.norm(estimate.point.state.u)),
     )

@@ -170,11 +170,9 @@ class Likelihood:
         reciprocal, _ = dpocon(L, norm, uplo="L")
         return Factored(L, weights, 1.0 / float(reciprocal) if reciprocal else float("inf"))
 
-    def value(self, parameters: Parameters) -> float:
-        """Negative log marginal likelihood of all observations."""
-        return self._value(parameters, self.factor(parameters))
-
-    def _value(self, parameters: Parameters, factored: Factored) -> float:
+    def value(self, parameters: Parameters, factored: Factored | None = None) -> float:
+        """Negative log marginal likelihood of all observations; `factored` is their covariance where it is known."""
+        factored = factored or self.factor(parameters)
         data = self.data
         noise = parameters.noise[data.task]
         of_replicates = 0.5 * (data.count - 1) * np.log(2.0 * math.pi * noise) + 0.5 * np.log(data.count)
@@ -200,7 +198,7 @@ class Likelihood:
         by_noise = np.bincount(data.task, weights=np.diag(G) / data.count, minlength=TASKS)
         extra = np.bincount(data.task, weights=data.count - 1, minlength=TASKS) / noise - self._scatter / noise**2
         slopes = [
-            [float(np.sum(G * by_length))],
+            np.array([np.sum(G * by_length)]),
             2.0 * by_B @ w,
             np.diag(by_B) * parameters.kappa,
             (by_noise + 0.5 * extra) * noise,
@@ -219,7 +217,7 @@ class Likelihood:
         information = 0.5 * half.T @ half
         at = np.arange(1 + 2 * TASKS, 1 + 3 * TASKS)
         information[at, at] += 0.5 * self._scatter / noise
-        return self._value(parameters, factored), np.concatenate(slopes), information
+        return self.value(parameters, factored), np.concatenate(slopes), information
 
     def _blocks(self, matrix: Floats) -> Floats:
         """Sums (12, 12) of a matrix (m, m) over pairs of tasks."""
@@ -293,7 +291,7 @@ def train(
     climbs: int = 1,
     step: int = 5,
     gain: float = 1e-2,
-    progress: Callable[[float, str], None] = lambda part, said: None,
+    progress: Callable[[float, str], None] = lambda part, text: None,
 ) -> Training:
     """Train on the means of replicates; `SolveError` if the covariance cannot be factored at any start.
 

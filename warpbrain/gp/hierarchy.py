@@ -342,7 +342,7 @@ def fit_hierarchy(
     return hierarchy, Fitted(float(end.fun), bool(end.success), str(end.message), int(end.nit), condition)
 
 
-def sample_hierarchies(best: Hierarchy, seen: Observations, count: int, seed: int = 0) -> tuple[Hierarchy, ...]:
+def sample_hierarchies(best: Hierarchy, seen: Observations, count: int) -> tuple[Hierarchy, ...]:
     """Hierarchies that the data allow, drawn by Laplace's approximation of the posterior of their logarithms.
 
     Thirty papers do not say how far papers differ to more than some tens of per cent, and of some effects hardly
@@ -362,7 +362,7 @@ def sample_hierarchies(best: Hierarchy, seen: Observations, count: int, seed: in
     values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T)[np.ix_(free, free)])
     # the posterior is no wider than the prior along any direction
     root = vectors / np.sqrt(np.maximum(values, 1.0 / spread.max() ** 2))
-    normal = np.random.default_rng(seed).standard_normal(((count + 1) // 2, len(values)))
+    normal = np.random.default_rng(0).standard_normal(((count + 1) // 2, len(values)))
     vectors = np.tile(centre, (count, 1))
     vectors[:, free] += np.concatenate([normal, -normal])[:count] @ root.T
     return tuple(Hierarchy.from_vector(vector, best.kernel, best.mean_asymmetry) for vector in vectors)

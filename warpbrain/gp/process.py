@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,26 +15,19 @@ from numpy.typing import ArrayLike
 from warpbrain.arrays import Floats
 from warpbrain.gp.literature.study import Study
 
-
-def matern12(distance: Floats, length: float) -> tuple[Floats, Floats]:
-    """`exp(-r)`, `r = d / length`."""
-    r = distance / length
-    k = np.exp(-r)
-    return k, r * k
+#: A kernel takes distances and a length scale, and returns values and derivatives by the logarithm of that.
+Kernel = Callable[[Floats, float], tuple[Floats, Floats]]
 
 
-def matern32(distance: Floats, length: float) -> tuple[Floats, Floats]:
-    """`(1 + r) exp(-r)`, `r = sqrt(3) d / length`: the paper's kernel."""
-    r = math.sqrt(3.0) * distance / length
-    decay = np.exp(-r)
-    return (1.0 + r) * decay, r * r * decay
+def _matern(root: float, value: Callable[[Any], Any], slope: Callable[[Any], Any]) -> Kernel:
+    """Polynomials times `exp(-r)`, `r = root d / length`: of the value and of the derivative."""
 
+    def kernel(distance: Floats, length: float) -> tuple[Floats, Floats]:
+        r = root * distance / length
+        decay = np.exp(-r)
+        return value(r) * decay, slope(r) * decay
 
-def matern52(distance: Floats, length: float) -> tuple[Floats, Floats]:
-    """`(1 + r + r^2 / 3) exp(-r)`, `r = sqrt(5) d / length`."""
-    r = math.sqrt(5.0) * distance / length
-    decay = np.exp(-r)
-    return (1.0 + r + r * r / 3.0) * decay, r * r * (1.0 + r) / 3.0 * decay
+    return kernel
 
 
 def squared_exponential(distance: Floats, length: float) -> tuple[Floats, Floats]:
@@ -44,12 +37,11 @@ def squared_exponential(distance: Floats, length: float) -> tuple[Floats, Floats
     return k, r2 * k
 
 
-#: Stationary kernels of unit variance over stretch by name; each takes distances and a length scale, and returns values
-#: and derivatives by the logarithm of that.
-KERNELS = {
-    "matern12": matern12,
-    "matern32": matern32,
-    "matern52": matern52,
+#: Stationary kernels of unit variance over stretch by name; Matern 3/2 is the paper's.
+KERNELS: dict[str, Kernel] = {
+    "matern12": _matern(1.0, lambda _r: 1.0, lambda r: r),
+    "matern32": _matern(math.sqrt(3.0), lambda r: 1.0 + r, lambda r: r * r),
+    "matern52": _matern(math.sqrt(5.0), lambda r: 1.0 + r + r * r / 3.0, lambda r: r * r * (1.0 + r) / 3.0),
     "squared-exponential": squared_exponential,
 }
 

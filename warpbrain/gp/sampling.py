@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.literature import forms
-from warpbrain.gp.literature.study import OFFSET, STRETCHES
+from warpbrain.gp.literature.study import OFFSET, STRETCHES, invariant
 from warpbrain.gp.process import Process
 
 if TYPE_CHECKING:
@@ -143,15 +143,11 @@ class _Ogden(MetaModel):
         return 0.5 * float(mu) * float(alpha)
 
 
-def _neo_hookean(stretches: Floats) -> Floats:
-    return 0.5 * forms.first(stretches)
-
-
 #: Meta-models by the name of their law.
 METAMODELS: dict[str, MetaModel] = {
     model.name: model
     for model in (
-        MetaModel("neo-hookean", ("mu",), ("Pa",), (_neo_hookean,), (1.0,), least=1e-3),
+        MetaModel("neo-hookean", ("mu",), ("Pa",), (invariant,), (1.0,), least=1e-3),
         MetaModel("mooney-rivlin", ("C1", "C2"), ("Pa", "Pa"), (forms.first, forms.second), (2.0, 2.0)),
         _Ogden("ogden", ("mu", "alpha"), ("Pa", "")),
     )

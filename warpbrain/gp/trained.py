@@ -126,7 +126,7 @@ def fit_model(
     add: Path | None = None,
     *,
     climbs: int = 1,
-    progress: Callable[[float, str], None] = lambda part, said: None,
+    progress: Callable[[float, str], None] = lambda part, text: None,
 ) -> tuple[Process, dict[str, Any]]:
     """Fit a model to the literature and to the studies of a user's file (`warpbrain.gp.literature.studies`).
 
