@@ -20,7 +20,7 @@ from warpbrain.errors import SolveError
 from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.options import EstimationOptions
-from warpbrain.estimation.prior import prior_of
+from warpbrain.estimation.parameters import prior_of
 from warpbrain.estimation.problem import Nuisances
 from warpbrain.estimation.sweep import sweep
 from warpbrain.gp.trained import trained

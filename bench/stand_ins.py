@@ -19,7 +19,7 @@ from warpbrain.errors import SolveError
 from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.likelihood import Likelihood
 from warpbrain.estimation.options import EstimationOptions
-from warpbrain.estimation.prior import prior_of
+from warpbrain.estimation.parameters import prior_of
 
 #: What is believed of gross errors: the default, and that there are none, which is nearest to least squares.
 NOISE = {"robust": Likelihood(), "normal": Likelihood(None)}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warpbrain.gp.likelihood import Parameters
+from warpbrain.gp.coregionalised import Parameters
 
 #: Noise that the log of the paper's code adds to every observation (GPy's exact inference).
 ADDED = 1e-8

@@ -124,7 +124,7 @@ class Truths:
         self._middle = prior(setting.tissues).mean
         self._forward = Forward(fine, self._middle, "cpu", elements="tet10" if setting.other_elements else "tet4")
         self.middle = self._forward.solve(self._middle)
-        self.mesh = self._forward.system.model.node_mesh
+        self.mesh = self._forward.states[-1].system.model.node_mesh
         self._drawn = iter(prior(setting.tissues).samples(count, 10_000 + seed))
 
     def next(self) -> State:

@@ -9,7 +9,7 @@ from verification_rows import Row
 
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
-from warpbrain.estimation.prior import declared
+from warpbrain.estimation.parameters import declared
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.cavity import Cavity
 from warpbrain.physics.mechanisms.drainage import Drainage

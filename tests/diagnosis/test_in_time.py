@@ -10,7 +10,7 @@ from warpbrain.arrays import Floats
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, onset_of
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.estimation.prior import declared
+from warpbrain.estimation.parameters import declared
 from warpbrain.physics.mechanisms.drainage import Drainage
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.report.diagnosis.text import when_in_words

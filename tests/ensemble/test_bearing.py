@@ -6,7 +6,7 @@ import pytest
 from folders import write_folder
 
 from warpbrain.cases.reading import read_case
-from warpbrain.ensemble.choosing import Overload, least_stretch, overloaded
+from warpbrain.ensemble.run import Overload, least_stretch, overloaded
 from warpbrain.ensemble.sample import Sample
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material

@@ -15,8 +15,8 @@ from many_samples import computed, samples_of, shaken_block
 from material_point import LAWS
 
 from warpbrain.ensemble.cluster import Cluster, local_workers
-from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.sample import Outcome
+from warpbrain.ensemble.workers import Job
 from warpbrain.errors import InputError
 from warpbrain.terminal.quiet import start_warp_quietly
 

@@ -8,7 +8,7 @@ import pytest
 from many_samples import computed, samples_of, shaken_block
 
 from warpbrain.ensemble.course import Resting
-from warpbrain.ensemble.job import Job, acts_before_all
+from warpbrain.ensemble.workers import Job, acts_before_all
 from warpbrain.errors import InputError
 from warpbrain.kernels.precision import PRECISIONS
 from warpbrain.physics.laws import NeoHookean

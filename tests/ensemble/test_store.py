@@ -8,9 +8,9 @@ import pytest
 from many_samples import computed, samples_of, shaken_block
 from material_point import LAWS
 
-from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.sample import Sample, failure
 from warpbrain.ensemble.store import Store
+from warpbrain.ensemble.workers import Job
 from warpbrain.errors import InputError
 from warpbrain.physics.laws import NeoHookean
 

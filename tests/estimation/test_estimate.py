@@ -12,8 +12,8 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.estimate import estimate
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.options import EstimationOptions
+from warpbrain.estimation.parameters import prior_of
 from warpbrain.estimation.posterior import Posterior
-from warpbrain.estimation.prior import prior_of
 from warpbrain.gp.prior import Prior
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
@@ -187,7 +187,7 @@ def test_the_error_of_the_mesh_is_no_stiffness() -> None:
     theta = np.log([1000.0])
     finer = Forward(replace(case, mesh=refined(case.mesh)[0]), theta, "cpu", elements="tet10")
     u = finer.solve(theta).u
-    recording = beads_of(finer.system.model.node_mesh, u, count=200, noise=4e-4, sigma=4e-4)
+    recording = beads_of(finer.states[-1].system.model.node_mesh, u, count=200, noise=4e-4, sigma=4e-4)
     seen = replace(case, recordings=(recording,))
     corrected, taken_for_exact = found(seen, WITH_ERROR_OF_MESH), found(seen)
     # the mesh is far too coarse for its error to be known, and that is said; half of it is left, for neighbours share

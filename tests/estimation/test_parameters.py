@@ -7,8 +7,7 @@ import pytest
 from synthetic import GREY, WHITE, beads, block, truth
 
 from warpbrain.errors import InputError, SolveError
-from warpbrain.estimation.parameters import Parameters
-from warpbrain.estimation.prior import prior_modes, prior_of
+from warpbrain.estimation.parameters import Parameters, prior_modes, prior_of
 from warpbrain.estimation.sweep import VALUES, sweep
 from warpbrain.gp.sampling import law_of_curve
 from warpbrain.gp.trained import trained

@@ -13,8 +13,7 @@ from warpbrain.estimation.finer_mesh import NAMES, Discretisation, FinerMesh, di
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.likelihood import Likelihood, Noise
 from warpbrain.estimation.observations import Observations, Sensors
-from warpbrain.estimation.parameters import Gaussian
-from warpbrain.estimation.prior import PriorMode
+from warpbrain.estimation.parameters import Gaussian, PriorMode
 from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.inference.noise import outliers
 from warpbrain.mesh import TetMesh

@@ -16,8 +16,7 @@ from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.likelihood import Likelihood, Noise
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
-from warpbrain.estimation.parameters import Gaussian
-from warpbrain.estimation.prior import PriorMode
+from warpbrain.estimation.parameters import Gaussian, PriorMode
 from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.estimation.registration import moved_back, moved_back_columns, realigned, rigid_columns
 from warpbrain.recordings.registration import Registration

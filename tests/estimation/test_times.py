@@ -15,8 +15,7 @@ from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.likelihood import Likelihood
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
-from warpbrain.estimation.parameters import Gaussian
-from warpbrain.estimation.prior import PriorMode
+from warpbrain.estimation.parameters import Gaussian, PriorMode
 from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.trained import trained

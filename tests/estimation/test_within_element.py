@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from warpbrain.estimation.within_element import change_over_element
+from warpbrain.estimation.observations import change_over_element
 from warpbrain.inference.noise import noise_covariance
 
 RANDOM = np.random.default_rng(4)

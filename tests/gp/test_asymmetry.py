@@ -11,12 +11,13 @@ from warpbrain.gp.asymmetry import (
     asymmetry,
     asymmetry_of,
 )
-from warpbrain.gp.hierarchical import Conditional, Hierarchical
 from warpbrain.gp.hierarchy import (
     CENTRE,
     EFFECTS,
     MEAN_ASYMMETRY,
     REST,
+    Conditional,
+    Hierarchical,
     Hierarchy,
     Observations,
     Places,
@@ -28,8 +29,7 @@ from warpbrain.gp.hierarchy import (
 )
 from warpbrain.gp.literature.forms import FORMS
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.literature.study import GROUPS, OFFSET, STRETCHES, Study
-from warpbrain.gp.secant import equivalent_strain, invariant, stretch_of
+from warpbrain.gp.literature.study import GROUPS, OFFSET, STRETCHES, Study, equivalent_strain, invariant, stretch_of
 from warpbrain.gp.trained import trained
 
 HYPERELASTIC = [f"hyperelastic/{anatomy}" for anatomy in ("grey matter", "white matter", "brain")]

@@ -7,7 +7,7 @@ from published_process import FITS, STORED
 from warpbrain.gp.coregionalised import Coregionalised, prior_mean, training_points
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import GROUPS, STRETCHES
-from warpbrain.gp.metamodels import METAMODELS, fit
+from warpbrain.gp.sampling import METAMODELS, fit
 from warpbrain.gp.trained import trained
 
 

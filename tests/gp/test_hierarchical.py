@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from warpbrain.gp.hierarchical import Hierarchical
 from warpbrain.gp.hierarchy import (
     CENTRE,
     EFFECTS,
+    Hierarchical,
     Hierarchy,
     Places,
     Structure,
@@ -16,8 +16,7 @@ from warpbrain.gp.hierarchy import (
     prior,
 )
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.literature.study import STRETCHES, Study
-from warpbrain.gp.secant import invariant, log_energy, log_secant_modulus
+from warpbrain.gp.literature.study import STRETCHES, Study, invariant, log_energy, log_secant_modulus
 from warpbrain.gp.trained import trained
 
 GREY, WHITE = "hyperelastic/grey matter", "hyperelastic/white matter"

@@ -7,9 +7,19 @@ import pytest
 from scipy.stats import norm
 
 from warpbrain.errors import InputError
-from warpbrain.gp.candidates import OF_CURVES, CoregionalisedCandidate, HierarchicalCandidate, Prediction, candidates
 from warpbrain.gp.hierarchy import EFFECTS
-from warpbrain.gp.leaving_out import folds, leave_out, read_scores, score_lines, write_scores
+from warpbrain.gp.leaving_out import (
+    OF_CURVES,
+    CoregionalisedCandidate,
+    HierarchicalCandidate,
+    Prediction,
+    candidates,
+    folds,
+    leave_out,
+    read_scores,
+    score_lines,
+    write_scores,
+)
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import Study
 

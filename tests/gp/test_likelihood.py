@@ -8,10 +8,10 @@ from published_process import STORED
 from scipy.stats import multivariate_normal
 
 from warpbrain.errors import InputError, SolveError
-from warpbrain.gp.kernels import KERNELS
-from warpbrain.gp.likelihood import TASKS, Likelihood, Parameters, Replicates
+from warpbrain.gp.coregionalised import TASKS, Likelihood, Parameters, Replicates
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import dataset
+from warpbrain.gp.process import KERNELS
 
 
 def some(seed=0):

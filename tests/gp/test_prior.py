@@ -5,8 +5,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from warpbrain.errors import InputError
-from warpbrain.gp.coordinates import coordinates, from_coordinates, to_coordinates
-from warpbrain.gp.prior import Prior
+from warpbrain.gp.prior import Prior, coordinates, from_coordinates, to_coordinates
 from warpbrain.gp.sampling import draw_laws
 from warpbrain.gp.trained import trained
 from warpbrain.physics.laws import LAWS, MooneyRivlin, NeoHookean, Ogden

@@ -7,8 +7,16 @@ import pytest
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp import sampling
-from warpbrain.gp.metamodels import METAMODELS, unstable
-from warpbrain.gp.sampling import draw_laws, draw_many, law_of_curve, middle_law, rejection_rate, usual_stretches
+from warpbrain.gp.sampling import (
+    METAMODELS,
+    draw_laws,
+    draw_many,
+    law_of_curve,
+    middle_law,
+    rejection_rate,
+    unstable,
+    usual_stretches,
+)
 from warpbrain.gp.trained import KINDS, trained
 
 GREY, WHITE, BRAIN = (f"hyperelastic/{anatomy}" for anatomy in ("grey matter", "white matter", "brain"))

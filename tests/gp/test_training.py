@@ -8,9 +8,8 @@ from published_process import OBJECTIVE
 from scipy.stats import chi2
 
 from warpbrain.errors import SolveError
-from warpbrain.gp.likelihood import TASKS, Likelihood, Parameters, Replicates
+from warpbrain.gp.coregionalised import JITTER, TASKS, Likelihood, Parameters, Replicates, climb, start, train
 from warpbrain.gp.trained import trained
-from warpbrain.gp.training import JITTER, climb, start, train
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +57,7 @@ def test_a_climb_goes_down_only(drawn):
 
 
 def test_that_nothing_can_be_factored_is_said(monkeypatch):
-    monkeypatch.setattr("warpbrain.gp.training.JITTER", -1.0)
+    monkeypatch.setattr("warpbrain.gp.coregionalised.JITTER", -1.0)
     x = np.linspace(0.9, 1.1, 50)
     data = Replicates.of(np.zeros(50, dtype=int), x, np.zeros(50))
     with pytest.raises(SolveError, match="not positive definite in double precision"):

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from warpbrain.gp.hierarchical import Hierarchical
+from warpbrain.gp.hierarchy import Hierarchical
 from warpbrain.gp.literature.study import GROUPS, Study
 from warpbrain.gp.trained import trained
 from warpbrain.report import generative_pictures as page

@@ -12,7 +12,7 @@ from shapes import box
 from verification_rows import Row
 
 from warpbrain.errors import InputError, SolveError
-from warpbrain.gp.coordinates import from_coordinates, to_coordinates
+from warpbrain.gp.prior import from_coordinates, to_coordinates
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import FORMULATIONS, Law, MooneyRivlin, NeoHookean, Ogden
 from warpbrain.physics.load import NodalForce

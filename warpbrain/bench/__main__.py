@@ -73,48 +73,44 @@ def _bench(options: argparse.Namespace) -> None:
             results.append(measured)
             print(*_lines(measured), sep="\n")
         print("", *_table(results[-len(names) :]), sep="\n")
-    command.write(options.json, {"versions": versions, "host": where, "rows": [_json(r) for r in results]})
+    command.write(options.json, {"versions": versions, "host": where, "rows": results})
 
 
-def _columns(measured: Any) -> dict[str, tuple[list[float], tuple[float, float | None]]]:
+def _columns(measured: dict[str, Any]) -> dict[str, tuple[list[float], tuple[float, float | None]]]:
     """Samples beside the paper's mean and sd [ms], by what they are of."""
+    from warpbrain.bench.measure import PREPROCESSING, STEP
     from warpbrain.bench.table3 import MAIN_LOOP
 
-    row = measured.row
-    return {
-        "pre-processing": (measured.preprocessing, (row.preprocessing, None)),
-        **{name: (samples, row.phases[name]) for name, samples in measured.phases.items()},
-        "step without instruments": (measured.step, row.phases[MAIN_LOOP]),
-    }
+    ours, paper = measured["milliseconds"], measured["paper_milliseconds"]
+    theirs = {**paper, PREPROCESSING: (paper[PREPROCESSING], None), STEP: paper[MAIN_LOOP]}
+    return {name: (samples, theirs[name]) for name, samples in ours.items() if name in theirs}
 
 
-def _lines(measured: Any) -> list[str]:
-    row = measured.row
-    cg = statistics.median(measured.cg_iterations)
+def _lines(measured: dict[str, Any]) -> list[str]:
+    cg = statistics.median(measured["cg_iterations"])
     lines = [
         "",
-        f"{row.name}: {measured.nodes} nodes, {measured.tetrahedra} tetrahedra, {measured.blocks} blocks of 3 x 3, "
-        f"{cg:g} CG iterations (median)",
+        "{row}: {nodes} nodes, {tetrahedra} tetrahedra, {blocks} blocks of 3 x 3, ".format(**measured)
+        + f"{cg:g} CG iterations (median)",
         f"  {'':<28}{'warpbrain':>18}{'paper':>18}{'x faster':>10}",
     ]
-    # a body's first step is replayed once it is captured: both stand between a mesh in memory and that step
-    both = [made + captured for made, captured in zip(measured.preprocessing, measured.capture, strict=True)]
     first, *others = _columns(measured).items()
+    # a body's first step is replayed once it is captured: both stand between a mesh in memory and that step
+    both = [sum(pair) for pair in zip(first[1][0], measured["milliseconds"]["capture"], strict=True)]
     for label, (samples, paper) in (first, ("and capture of the step", (both, first[1][1])), *others):
         mean, sd = statistics.fmean(samples), statistics.pstdev(samples)
         theirs = f"{paper[0]:.2f}" + ("" if paper[1] is None else f" ({paper[1]:.1f})")
         lines.append(f"  {label:<28}{f'{mean:.3f} ({sd:.3f})':>18}{theirs:>18}{paper[0] / mean:>10.1f}")
-    median = statistics.median(measured.step)
-    bandwidth = measured.bytes_per_step / median / 1e6
-    each = 1000.0 * median / measured.launches_per_step
+    # of the last column, the step as users get it
+    median, moved, launches = statistics.median(samples), measured["bytes_per_step"], measured["launches_per_step"]
     lines.append(
-        f"  its median {median:.3f} ms; {measured.bytes_per_step / 1e6:.1f} MB moved and "
-        f"{measured.launches_per_step} launches a step: {bandwidth:.1f} GB/s, {each:.1f} us a launch"
+        f"  its median {median:.3f} ms; {moved / 1e6:.1f} MB moved and {launches} launches a step: "
+        f"{moved / median / 1e6:.1f} GB/s, {1000.0 * median / launches:.1f} us a launch"
     )
     return lines
 
 
-def _table(results: list[Any]) -> list[str]:
+def _table(results: list[dict[str, Any]]) -> list[str]:
     """The paper's table again: a line for each row, each cell our mean (sd) | the paper's mean = how often faster."""
     heads = (f"{label.removeprefix('step '):<30}" for label in _columns(results[0]))
     lines = [f"{'row':<10} {'nodes':>6} {'tets':>6} {'CG':>5}  " + "  ".join(heads).rstrip()]
@@ -123,25 +119,10 @@ def _table(results: list[Any]) -> list[str]:
         for samples, (paper, _) in _columns(measured).values():
             mean = statistics.fmean(samples)
             cells.append(f"{mean:.3g} ({statistics.pstdev(samples):.2g}) | {paper:g} = {paper / mean:.3g}x".ljust(30))
-        cg = statistics.median(measured.cg_iterations)
-        sizes = f"{measured.row.name:<10} {measured.nodes:>6} {measured.tetrahedra:>6} {cg:>5g}  "
+        cg = statistics.median(measured["cg_iterations"])
+        sizes = "{row:<10} {nodes:>6} {tetrahedra:>6} ".format(**measured) + f"{cg:>5g}  "
         lines.append(sizes + "  ".join(cells).rstrip())
     return lines
-
-
-def _json(measured: Any) -> dict[str, Any]:
-    plain = ("device", "precision", "tolerance", "nodes", "tetrahedra", "blocks", "cg_iterations", "bytes_per_step")
-    return {
-        "row": measured.row.name,
-        **{name: getattr(measured, name) for name in (*plain, "launches_per_step")},
-        "milliseconds": {
-            "pre-processing": measured.preprocessing,
-            "capture": measured.capture,
-            **measured.phases,
-            "step without instruments": measured.step,
-        },
-        "paper_milliseconds": {"pre-processing": measured.row.preprocessing, **measured.row.phases},
-    }
 
 
 raise SystemExit(main())

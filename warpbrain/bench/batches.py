@@ -8,19 +8,17 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import warp as wp
 
 from warpbrain.bench import command
 from warpbrain.cases.shipped import find_case
-from warpbrain.ensemble.choosing import drawn_samples, swept_samples
 from warpbrain.ensemble.course import step_batch
-from warpbrain.ensemble.job import Job
-from warpbrain.ensemble.workers import Here, Prepare, Processes, bytes_per_slot
+from warpbrain.ensemble.run import chosen_samples
+from warpbrain.ensemble.workers import Here, Job, Processes, bytes_per_slot
 from warpbrain.errors import InputError
-from warpbrain.gp.trained import trained
 from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.tetrahedron import PAIRS
 from warpbrain.simulation.dynamics import Simulator
@@ -76,19 +74,19 @@ def bench(options: argparse.Namespace) -> None:
     print(" batch  ms a step and sample  x single     CG  MB a step    GB/s  GB held")
     written |= {"single_milliseconds": single, "batches": []}
     for measured in measure_batches(batches, device.alias, options.precision):
+        best, moved = min(measured["milliseconds"]), measured["bytes_per_step"]
         print(
-            f"{measured.slots:>6} {measured.best:>21.4f} {single / measured.best:>9.1f} {measured.cg_iterations:>6.1f} "
-            f"{measured.bytes_per_step / 1e6:>10.1f} {measured.bandwidth:>7.0f} {measured.memory / 1e9:>8.2f}"
-            + (f"   {measured.failed} failed" if measured.failed else ""),
+            f"{measured['slots']:>6} {best:>21.4f} {single / best:>9.1f} {measured['cg_iterations']:>6.1f} "
+            f"{moved / 1e6:>10.1f} {moved / best / 1e6:>7.0f} {measured['memory'] / 1e9:>8.2f}"
+            + (f"   {measured['failed']} failed" if measured["failed"] else ""),
             flush=True,
         )
-        written["batches"].append(vars(measured))
+        written["batches"].append(measured)
     rates: dict[str, float] = {}
     for count in processes:
         progress.show(0.5, f"{count} processes")
-        rates[str(count)] = measure_processes(count, options.samples, options.precision, start_warp_quietly)
+        rates[str(count)] = rate = measure_processes(count, options.samples, options.precision)
         progress.clear()
-        rate = rates[str(count)]
         print(
             f"{count} processes: {rate:.2f} samples a second, {rate / next(iter(rates.values())):.2f} times the first"
         )
@@ -103,38 +101,19 @@ def bench(options: argparse.Namespace) -> None:
     command.write(options.json, written)
 
 
-@dataclass(frozen=True)
-class MeasuredBatch:
-    """Times of one size of batch."""
-
-    slots: int
-    samples: int  # in a motion
-    failed: int  # how many of them had no answer
-    milliseconds: list[float]  # a step and sample, for each motion
-    cg_iterations: float  # mean over all steps
-    bytes_per_step: int  # of a step and sample, each array counted once a kernel
-    memory: int  # of the batch [bytes]
-
-    @property
-    def best(self) -> float:
-        """Least time of a step and sample [ms]."""
-        return min(self.milliseconds)
-
-    @property
-    def bandwidth(self) -> float:
-        """[GB/s]"""
-        return self.bytes_per_step / self.best / 1e6
-
-
 def phantom_job(count: int, precision: str) -> Job:
     """Motions of the coarse phantom of one tissue, with the laws of the first draws of its prior."""
     case = find_case("phantom", "single")
-    samples = drawn_samples(case, count, 0, trained())
+    samples = chosen_samples(case, count)
     return Job(model_of(case), tuple(samples), steps=STEPS, precision=precision)
 
 
-def measure_batches(sizes: list[int], device: str, precision: str) -> Iterator[MeasuredBatch]:
-    """Measure motions of as many samples as a batch has slots."""
+def measure_batches(sizes: list[int], device: str, precision: str) -> Iterator[dict[str, Any]]:
+    """Measure motions of as many samples as a batch has slots, for each size.
+
+    `milliseconds` are of a step and sample, for each motion, `cg_iterations` the mean over all steps; `bytes_per_step`
+    are of a step and sample, each array counted once a kernel, and `memory` [bytes] of the batch.
+    """
     job = phantom_job(max(sizes), precision)
     system = job.system(device)
     for slots in sizes:
@@ -153,15 +132,15 @@ def measure_batches(sizes: list[int], device: str, precision: str) -> Iterator[M
             steps = sum(outcome.steps for outcome in outcomes)
             times.append(1000.0 * seconds / steps)
         iterations = sum(outcome.cg_iterations for outcome in outcomes) / steps
-        yield MeasuredBatch(
-            slots=slots,
-            samples=len(outcomes),
-            failed=sum(outcome.failed for outcome in outcomes),
-            milliseconds=times,
-            cg_iterations=iterations,
-            bytes_per_step=count_bytes(system, iterations),
-            memory=slots * bytes_per_slot(system),
-        )
+        yield {
+            "slots": slots,
+            "samples": len(outcomes),
+            "failed": sum(outcome.failed for outcome in outcomes),
+            "milliseconds": times,
+            "cg_iterations": iterations,
+            "bytes_per_step": count_bytes(system, iterations),
+            "memory": slots * bytes_per_slot(system),
+        }
         del batch, course
 
 
@@ -183,12 +162,11 @@ def measure_single(device: str, precision: str) -> float:
     return sum(best) / len(best)
 
 
-def measure_processes(count: int, samples: int, precision: str, prepare: Prepare) -> float:
+def measure_processes(count: int, samples: int, precision: str) -> float:
     """Samples a second that `count` processes on the CPU compute, from the first results to the last."""
     job = phantom_job(samples, precision)
-    workers = Processes(count, None, prepare)
     done, first, start = 0, 0, 0.0
-    for ended in workers.outcomes(job):
+    for ended in Processes(count, None, start_warp_quietly).outcomes(job):
         done += len(ended)
         if not first:
             # processes have started and loaded their kernels
@@ -199,9 +177,7 @@ def measure_processes(count: int, samples: int, precision: str, prepare: Prepare
 def measure_sweep(tissue: str, device: str, precision: str) -> tuple[float, int, int, int]:
     """The paper's sweep on the coarse phantom, to rest: seconds, samples, how many failed, and CG iterations."""
     case = find_case("phantom", tissue)
-    job = Job(
-        model_of(case), tuple(swept_samples(case, trained("coregionalised", "as_published"))), precision=precision
-    )
+    job = Job(model_of(case), tuple(chosen_samples(case, "grid")), precision=precision)
     start = time.perf_counter()
     outcomes = [outcome for ended in Here(device, None).outcomes(job) for outcome in ended]
     seconds = time.perf_counter() - start

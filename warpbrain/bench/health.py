@@ -13,7 +13,6 @@ import platform
 import re
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
@@ -46,7 +45,7 @@ def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, An
     for device in wp.get_devices():
         memory = {"total": device.total_memory / _GIB, "free": device.free_memory / _GIB} if device.is_cuda else {}
         devices.append({"alias": device.alias, "name": device.name, "arch": device.arch, "memory_GiB": memory})
-    tests: list[SelfTest] = []
+    tests = []
     for device in devices:
         on_test(device["alias"])
         tests.append(self_test(device["alias"]))
@@ -61,7 +60,7 @@ def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, An
         "cuda": {"driver": _joined(wp.get_cuda_driver_version), "toolkit": _joined(wp.get_cuda_toolkit_version)},
         "kernels": _kernels(Path(wp.config.kernel_cache_dir)),
         "pictures": _pictures(),
-        "self_test": [asdict(test) for test in tests],
+        "self_test": tests,
     }
 
 
@@ -159,20 +158,13 @@ TOLERANCE = 1e-6
 _GRADIENT = np.array([[1.10, 0.05, 0.0], [0.0, 0.97, 0.0], [0.0, 0.02, 1.0]])
 
 
-@dataclass(frozen=True)
-class SelfTest:
-    """What came of it on one device, by its alias."""
+def self_test(device: str) -> dict[str, Any]:
+    """Run the test on a device, by its alias.
 
-    device: str
-    nodes: int  # that had to find their place
-    error: float  # largest, of the largest displacement; NaN if there was no equilibrium
-    kernels_s: float  # for loading (the first time compiling) the kernels
-    solve_s: float  # for all the rest
-    problem: str = ""  # empty if it passed
-
-
-def self_test(device: str) -> SelfTest:
-    """Run the test on a device, by its alias."""
+    `nodes` had to find their place; the largest `error` of one is relative to the largest displacement, NaN if there is
+    no equilibrium; `kernels_s` went into loading (the first time compiling) kernels, `solve_s` into the rest; `problem`
+    is empty if it passed.
+    """
     begun = time.perf_counter()
     mesh = find_case("beam-gravity").mesh
     surface = nodes_of(boundary_faces(mesh.tetrahedra), len(mesh.points))
@@ -195,4 +187,6 @@ def self_test(device: str) -> SelfTest:
         if not error <= TOLERANCE:
             problem = f"displacements are wrong by {error:.1e} of the largest; expected {TOLERANCE:.0e} at most"
     seconds = time.perf_counter() - begun - kernels
-    return SelfTest(device, int(np.count_nonzero(~surface)), error, kernels, seconds, problem)
+    nodes = int(np.count_nonzero(~surface))
+    times = {"kernels_s": kernels, "solve_s": seconds}
+    return {"device": device, "nodes": nodes, "error": error, **times, "problem": problem}

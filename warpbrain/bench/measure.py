@@ -23,7 +23,7 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,36 +45,17 @@ from warpbrain.simulation.system import System
 RESTART = 20
 #: Bodies of which the pre-processing is measured, each on a mesh of its own.
 BODIES = 10
+#: Names of times beside those of the phases.
+PREPROCESSING, STEP = "pre-processing", "step without instruments"
 
 
-@dataclass(frozen=True)
-class Measured:
-    """Samples of one row on one device [ms], and what they were measured on."""
-
-    row: Row
-    device: str
-    precision: str
-    tolerance: float
-    nodes: int
-    tetrahedra: int
-    blocks: int
-    #: Of the same fresh bodies: from a mesh in memory to a simulator, and capturing the step that it replays. Their sum
-    #: is what stands between a mesh and the first step.
-    preprocessing: list[float]
-    capture: list[float]
-    #: By `PHASES` and `MAIN_LOOP`, with the clock stopped between them.
-    phases: dict[str, list[float]]
-    #: A step as users get it.
-    step: list[float]
-    cg_iterations: list[int]
-    bytes_per_step: int
-    launches_per_step: int
-
-
-def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, tolerance: float) -> Measured:
+def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, tolerance: float) -> dict[str, Any]:
     """Measure a row: so many samples of each kind after steps that also load every kernel.
 
-    `tolerance` is that of the linear solves, relative.
+    `tolerance` is that of the linear solves, relative. Returns plain values: what was measured on what, and beside the
+    paper's times [ms], by the same names, ours: of `BODIES` fresh bodies `pre-processing`, from a mesh in memory to a
+    simulator, and `capture` of the step that it replays; the phases of a step with the clock stopped between them; and
+    a step as users get it (`STEP`).
     """
     case = find_case(row.case, row.tissue)
     # loads every kernel, which is done once in a process and not for a mesh
@@ -117,22 +98,20 @@ def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, 
     system = simulator.system
     cg = sorted(iterations)[len(iterations) // 2]
     moved, launches = count(system, cg)
-    return Measured(
-        row=row,
-        device=f"{system.device.name} ({system.device.alias})",
-        precision=precision,
-        tolerance=simulator.tolerance,
-        nodes=system.size,
-        tetrahedra=system.elements,
-        blocks=system.matrix.nnz,
-        preprocessing=preprocessing,
-        capture=capture,
-        phases=phases,
-        step=step,
-        cg_iterations=iterations,
-        bytes_per_step=moved,
-        launches_per_step=launches,
-    )
+    return {
+        "row": row.name,
+        "device": f"{system.device.name} ({system.device.alias})",
+        "precision": precision,
+        "tolerance": simulator.tolerance,
+        "nodes": system.size,
+        "tetrahedra": system.elements,
+        "blocks": system.matrix.nnz,
+        "cg_iterations": iterations,
+        "bytes_per_step": moved,
+        "launches_per_step": launches,
+        "milliseconds": {PREPROCESSING: preprocessing, "capture": capture, **phases, STEP: step},
+        "paper_milliseconds": {PREPROCESSING: row.preprocessing, **row.phases},
+    }
 
 
 def preprocess(case: Case, arrays: Mapping[str, Any], device: str, precision: str, tolerance: float) -> Simulator:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
 from statistics import median
@@ -81,7 +80,7 @@ def bench(options: argparse.Namespace) -> None:
         example = "" if kind == PLAIN else known[kind].example
         cost = measure_cost(case, kind, example, device.alias, options.precision, options.steps, options.equilibria)
         progress.clear()
-        rows.append(asdict(cost))
+        rows.append(cost)
         print(_line(rows[-1]), flush=True)
     short = "cpu" if device.is_cpu else safe_name(device.name.lower().removeprefix("nvidia "))
     name = command.processor() if device.is_cpu else device.name
@@ -101,20 +100,13 @@ def _line(row: dict[str, Any]) -> str:
     )
 
 
-@dataclass(frozen=True)
-class Cost:
-    """Samples of a mechanism beside the plain model, by `SIDES`; those of one index are neighbours in time."""
-
-    kind: str
-    example: str  # of the mechanism; none for the plain model beside itself
-    step: dict[str, list[float]]  # time of a time step, captured in a graph [ms]
-    newton: dict[str, list[float]]  # of an iteration of Newton's method, mean over an equilibrium [ms]
-    cg_iterations: dict[str, list[int]]  # of each time step
-    newton_iterations: dict[str, list[int]]  # of each equilibrium
-
-
-def measure_cost(case: Case, kind: str, example: str, device: str, precision: str, steps: int, equilibria: int) -> Cost:
+def measure_cost(
+    case: Case, kind: str, example: str, device: str, precision: str, steps: int, equilibria: int
+) -> dict[str, Any]:
     """Measure a mechanism beside a case without it, so many samples of each; no example is the plain model once more.
+
+    Returns samples by `SIDES`, those of one index neighbours in time: of `step`, a time step captured in a graph [ms],
+    and of `newton`, an iteration of Newton's method in the mean over an equilibrium [ms]; and the iterations of each.
 
     `SolveError` if a step or an equilibrium has no solution: there is no cost of that.
     """
@@ -138,7 +130,8 @@ def measure_cost(case: Case, kind: str, example: str, device: str, precision: st
 
     step, cg = _in_turns(systems, WARMUP, steps, taken)
     newton, iterations = _in_turns(systems, 1, equilibria, solved)
-    return Cost(kind, example, step, newton, cg, iterations)
+    costs = {"step": step, "newton": newton, "cg_iterations": cg, "newton_iterations": iterations}
+    return {"kind": kind, "example": example, **costs}
 
 
 def _in_turns(

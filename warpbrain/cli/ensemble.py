@@ -18,11 +18,10 @@ from warpbrain.terminal.progress import Progress
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
-    from warpbrain.ensemble.job import Job
     from warpbrain.ensemble.results import EnsembleResult
     from warpbrain.ensemble.sample import Sample
     from warpbrain.ensemble.store import Store
-    from warpbrain.ensemble.workers import Workers
+    from warpbrain.ensemble.workers import Job, Workers
     from warpbrain.simulation.model import Model
     from warpbrain.terminal.record import Record
 
@@ -79,10 +78,10 @@ def _ensemble(options: argparse.Namespace) -> None:
     say = record.say
 
     from warpbrain.atomic import safe_name
-    from warpbrain.ensemble.job import Job
     from warpbrain.ensemble.results import results_of
     from warpbrain.ensemble.run import chosen_workers
     from warpbrain.ensemble.store import Store, discard
+    from warpbrain.ensemble.workers import Job
     from warpbrain.report import summary as tables
     from warpbrain.report.ensemble import describe_ensemble, ensemble_lines
     from warpbrain.report.files import fingerprints
@@ -211,7 +210,7 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
 
 def _warn(model: Model, samples: list[Sample], options: argparse.Namespace, say: Callable[..., None]) -> None:
     """Say what is likely to fail before it is computed."""
-    from warpbrain.ensemble.choosing import overloaded
+    from warpbrain.ensemble.run import overloaded
 
     device = None if options.dask is not None else options.device
     load = overloaded(model, samples, device)

@@ -76,7 +76,7 @@ def _show(options: argparse.Namespace) -> None:
 
     from warpbrain.atomic import output_folder
     from warpbrain.gp.asymmetry import asymmetries_of_papers, asymmetry
-    from warpbrain.gp.hierarchical import Hierarchical
+    from warpbrain.gp.hierarchy import Hierarchical
     from warpbrain.gp.sampling import moduli
     from warpbrain.gp.trained import trained
     from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
@@ -260,8 +260,7 @@ def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
 
 
 def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
-    from warpbrain.gp.metamodels import unstable
-    from warpbrain.gp.sampling import law_of_curve
+    from warpbrain.gp.sampling import law_of_curve, unstable
     from warpbrain.report.generative_text import LawRow
 
     places = [-2.0 + 4.0 * i / (options.sweep - 1) for i in range(options.sweep)]
@@ -297,7 +296,7 @@ def _add_compare(actions: argparse._SubParsersAction[Any]) -> None:
 def _compare(options: argparse.Namespace) -> None:
     from warpbrain.atomic import check_writable
     from warpbrain.gp import leaving_out
-    from warpbrain.gp.candidates import DEFAULT, candidates
+    from warpbrain.gp.leaving_out import DEFAULT, candidates
     from warpbrain.gp.literature.studies import read_studies
 
     path = options.csv or Path(f"warpbrain-gp-{options.variant}-{options.leave}.csv")

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -88,14 +89,12 @@ class BatchMaterials:
         tissue = system.model.mesh.tissue
         members = np.flatnonzero(np.isin(tissue, labels))
 
-        def array(values: Any, dtype: Any) -> wp.array:
-            return wp.array(values, dtype=dtype, device=system.device)
-
+        array = partial(wp.array, device=system.device)
         return BatchGroup(
             batched_element_kernels(law_type.device_law(formulation), p),
-            array(members, int),
-            array(np.searchsorted(labels, tissue[members]), int),
-            array(rows.reshape(-1, rows.shape[2]), p.scalar),
+            array(members, dtype=int),
+            array(np.searchsorted(labels, tissue[members]), dtype=int),
+            array(rows.reshape(-1, rows.shape[2]), dtype=p.scalar),
             rows,
             dict(zip(samples, table, strict=True)),
         )
@@ -153,10 +152,36 @@ class Batch:
         self._motion = batched_motion_kernels(system.precision)
         self._sums_kernels = batched_solve_kernels(system.precision)
         self.shapes = np.zeros((0, system.size, 3)) if shapes is None else shapes
-        self._place_state()
-        self._place_lists()
-        self._place_coefficients()
-        self._place_sums()
+        model, p, n, m, b = system.model, system.precision, system.size, system.elements, slots
+        self._u, self._v, self._dv = (self._zeros(n, 3, b) for _ in range(3))
+        self._u_start, self._v_start = self._zeros(n, 3, b), self._zeros(n, 3, b)
+        self._prescribed, self._internal = self._zeros(n, 3, b), self._zeros(n, 3, b)
+        self._element_forces, self._element_J = self._zeros(4 * m, 3, b), self._zeros(m, b)
+        self._element_blocks = self._zeros(len(PAIRS) * m, 9, b)
+        self._values = self._zeros(len(system.pairs), 9, b)
+        # slots, and how many of them are in the list
+        self._all = self._array(np.arange(b), int), self._array([b], int)
+        lists = ((self._zeros(b, dtype=int), self._zeros(1, dtype=int)) for _ in range(3))
+        self._start, self._solve, self._fresh = lists
+        self._marked, self._stepping, self._ready = (self._zeros(b, dtype=int) for _ in range(3))
+        self._linger_count = self._zeros(1, dtype=int)
+        self._unsolved = np.zeros(b, dtype=bool)
+        # of the step that each slot begins next: `h` [s]; factors of loads and amounts of shapes at its end
+        self.time_step = np.ones(b)
+        self.load_factors = np.zeros((len(model.loads), b))
+        self.amounts = np.zeros((len(self.shapes), b))
+        self._h, self._k, self._m = self._zeros(b), self._zeros(b), self._zeros(b)
+        # no load is one load of nothing: a launch takes no array without rows
+        forces = [load.nodal_forces(model.mesh) for load in model.loads] or [np.zeros((n, 3))]
+        self._loads, self._factors = self._array(np.array(forces), p.vec3), self._zeros(len(forces), b)
+        self._final = self._array(model.external_forces(), p.vec3)
+        self._shapes = self._array(self.shapes, p.vec3) if len(self.shapes) else None
+        self._amounts = self._zeros(max(1, len(self.shapes)), b)
+        self._chunks, self._groups = stages(n)
+        self._shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._groups, b)
+        self._totals, self._min_J = self._zeros(2, b), self._zeros(1, b)
+        self._J_share = int(np.ceil(np.sqrt(m)))
+        self._least_J = self._zeros(-(-m // self._J_share), b)
         positions = system.pair_positions.numpy()
         blocks = np.empty(system.matrix.nnz, dtype=np.int32)
         blocks[positions[:, 0]] = blocks[positions[:, 1]] = np.arange(len(positions))
@@ -172,58 +197,11 @@ class Batch:
         )
         self._graph: Any = None
 
-    # -- arrays ---------------------------------------------------------------------------------------------------
-
     def _array(self, values: Any, dtype: Any) -> wp.array:
         return wp.array(values, dtype=dtype, device=self._device)
 
     def _zeros(self, *shape: int, dtype: Any = None) -> wp.array:
         return wp.zeros(shape, dtype=dtype or self._precision.scalar, device=self._device)
-
-    def _place_state(self) -> None:
-        s, n, b = self.system, self.system.size, self.slots
-        self._u, self._v, self._dv = (self._zeros(n, 3, b) for _ in range(3))
-        self._u_start, self._v_start = self._zeros(n, 3, b), self._zeros(n, 3, b)
-        self._prescribed, self._internal = self._zeros(n, 3, b), self._zeros(n, 3, b)
-        self._element_forces = self._zeros(4 * s.elements, 3, b)
-        self._element_blocks = self._zeros(len(PAIRS) * s.elements, 9, b)
-        self._element_J = self._zeros(s.elements, b)
-        self._values = self._zeros(len(s.pairs), 9, b)
-
-    def _place_lists(self) -> None:
-        b = self.slots
-        self._all = self._array(np.arange(b), int), self._array([b], int)
-        # slots, and how many of them are in the list
-        self._start, self._solve, self._fresh = (
-            (self._zeros(b, dtype=int), self._zeros(1, dtype=int)) for _ in range(3)
-        )
-        self._marked, self._stepping, self._ready = (self._zeros(b, dtype=int) for _ in range(3))
-        self._linger_count = self._zeros(1, dtype=int)
-        self._unsolved = np.zeros(b, dtype=bool)
-
-    def _place_coefficients(self) -> None:
-        model, p, b = self.system.model, self._precision, self.slots
-        # of the step that each slot begins next: `h` [s]; factors of loads and amounts of shapes at its end
-        self.time_step = np.ones(b)
-        self.load_factors = np.zeros((len(model.loads), b))
-        self.amounts = np.zeros((len(self.shapes), b))
-        self._h, self._k, self._m = self._zeros(b), self._zeros(b), self._zeros(b)
-        forces = [load.nodal_forces(model.mesh) for load in model.loads]
-        # no load is one load of nothing: a launch takes no array without rows
-        self._loads = self._array(np.array(forces) if forces else np.zeros((1, self.system.size, 3)), p.vec3)
-        self._factors = self._zeros(max(1, len(forces)), b)
-        self._final = self._array(model.external_forces(), p.vec3)
-        self._shapes = self._array(self.shapes, p.vec3) if len(self.shapes) else None
-        self._amounts = self._zeros(max(1, len(self.shapes)), b)
-
-    def _place_sums(self) -> None:
-        b, m = self.slots, self.system.elements
-        self._chunks, self._groups = stages(self.system.size)
-        self._shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._groups, b)
-        self._totals = self._zeros(2, b)
-        self._J_share = int(np.ceil(np.sqrt(m)))
-        self._least_J = self._zeros(-(-m // self._J_share), b)
-        self._min_J = self._zeros(1, b)
 
     # -- samples in slots -----------------------------------------------------------------------------------------
 
@@ -268,12 +246,20 @@ class Batch:
         """One pass: slots `start` begin a step from an evaluated state, the states of `marked` are to be evaluated."""
         self._unsolved[start] = True
         stepping = np.flatnonzero(self._unsolved)
-        self._write_list(self._start, start)
-        self._write_list(self._solve, stepping)
-        self._write_flags(self._marked, marked)
-        self._write_flags(self._stepping, stepping)
+        for (slots, size), members in ((self._start, start), (self._solve, stepping)):
+            slots.assign(np.pad(members.astype(np.int32), (0, self.slots - len(members))))
+            size.assign(np.array([len(members)], dtype=np.int32))
+        for flags, members in ((self._marked, marked), (self._stepping, stepping)):
+            flags.assign(np.isin(np.arange(self.slots), members).astype(np.int32))
         self._linger_count.assign(np.array([int(self._linger * len(stepping))], dtype=np.int32))
-        self._write_coefficients()
+        h, damping = self.time_step, self.system.model.damping
+        self._h.assign(h)
+        self._k.assign(h * damping.stiffness + h * h)
+        self._m.assign(1.0 + h * damping.mass)
+        if len(self.load_factors):
+            self._factors.assign(self.load_factors)
+        if len(self.amounts):
+            self._amounts.assign(self.amounts)
         if self._graph is None:
             self._capture()
         wp.capture_launch(self._graph)
@@ -284,27 +270,6 @@ class Batch:
         min_J = self._min_J.numpy()[0].astype(np.float64)
         return States(ready, min_J, unbalanced, internal, iterations, residual, goal)
 
-    def _write_list(self, listed: tuple[wp.array, wp.array], values: NDArray[np.intp]) -> None:
-        padded = np.zeros(self.slots, dtype=np.int32)
-        padded[: len(values)] = values
-        listed[0].assign(padded)
-        listed[1].assign(np.array([len(values)], dtype=np.int32))
-
-    def _write_flags(self, flags: wp.array, slots: NDArray[np.intp]) -> None:
-        values = np.zeros(self.slots, dtype=np.int32)
-        values[slots] = 1
-        flags.assign(values)
-
-    def _write_coefficients(self) -> None:
-        h, damping = self.time_step, self.system.model.damping
-        self._h.assign(h)
-        self._k.assign(h * damping.stiffness + h * h)
-        self._m.assign(1.0 + h * damping.mass)
-        if len(self.load_factors):
-            self._factors.assign(self.load_factors)
-        if len(self.amounts):
-            self._amounts.assign(self.amounts)
-
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
         # small blocks: those whose lanes have all ended make room at once
         wp.launch(kernel, dim=dim, inputs=list(inputs), device=self._device, block_dim=128)
@@ -312,12 +277,12 @@ class Batch:
     def _capture(self) -> None:
         """Capture a pass in a graph: one launch from the host instead of hundreds."""
         lists = (self._start[1], self._solve[1], self._marked, self._stepping)
-        kept = [wp.clone(values) for values in lists]
+        contents = [wp.clone(values) for values in lists]
         for values in lists:
             values.zero_()
         # a pass over empty lists loads every module
         self._record()
-        for values, content in zip(lists, kept, strict=True):
+        for values, content in zip(lists, contents, strict=True):
             wp.copy(values, content)
         with wp.ScopedCapture(device=self._device) as capture:
             self._record()

@@ -13,9 +13,8 @@ from contextlib import AbstractContextManager, ExitStack
 from importlib.util import find_spec
 from typing import Any
 
-from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.sample import Outcome, failure
-from warpbrain.ensemble.workers import ENOUGH, Prepare, compute_part, kind_of, parts_of
+from warpbrain.ensemble.workers import ENOUGH, Job, Prepare, compute_part, kind_of, parts_of
 from warpbrain.errors import InputError
 
 #: Seconds to wait for a scheduler to answer, and for its first worker.

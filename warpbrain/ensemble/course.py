@@ -244,7 +244,14 @@ def step_batch(batch: Batch, course: Course, numbers: Sequence[int]) -> Iterator
         states = batch.advance(go, np.concatenate([back, free]))
         verdict = course.judge(states)
         batch.restore(verdict.back.tolist())
-        ended = _answers(batch, course, verdict.done.tolist(), number_in, states.min_J)
+        ended, done = [], verdict.done.tolist()
+        # of samples that have their answer
+        fields = (batch.displacements(done), batch.internal_forces(done)) if done else ((), ())
+        for slot, u, internal in zip(done, *fields, strict=True):
+            number, steps, iterations = (int(of[slot]) for of in (number_in, course.steps, course.cg_iterations))
+            time, residual, least = (float(of[slot]) for of in (course.time, course.residual, states.min_J))
+            reactions = course.model.reactions(internal, course.model.external_forces(time))
+            ended.append(Outcome(number, "", steps, iterations, time, residual, least, u, reactions))
         for slot, reason in verdict.failed.items():
             taken = int(course.steps[slot]), int(course.cg_iterations[slot]), float(course.time[slot])
             ended.append(failure(int(number_in[slot]), reason, *taken))
@@ -253,19 +260,3 @@ def step_batch(batch: Batch, course: Course, numbers: Sequence[int]) -> Iterator
         go, back = verdict.go, verdict.back
         if ended:
             yield sorted(ended, key=lambda outcome: outcome.number)
-
-
-def _answers(
-    batch: Batch, course: Course, slots: list[int], number_in: NDArray[np.int_], min_J: Floats
-) -> list[Outcome]:
-    """Outcomes of the samples in some slots, which have their answer."""
-    if not slots:
-        return []
-    model = course.model
-    outcomes = []
-    for slot, u, internal in zip(slots, batch.displacements(slots), batch.internal_forces(slots), strict=True):
-        number, steps, iterations = (int(of[slot]) for of in (number_in, course.steps, course.cg_iterations))
-        time, residual, least = (float(of[slot]) for of in (course.time, course.residual, min_J))
-        reactions = model.reactions(internal, model.external_forces(time))
-        outcomes.append(Outcome(number, "", steps, iterations, time, residual, least, u, reactions))
-    return outcomes

@@ -2,23 +2,124 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
+import numpy as np
+
 from warpbrain.cases.case import Case
+from warpbrain.cases.drawn import require_groups, with_prior_draw
 from warpbrain.cases.shipped import as_case
-from warpbrain.ensemble.choosing import drawn_samples, swept_samples
 from warpbrain.ensemble.defaults import SAMPLES
-from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.results import EnsembleResult, results_of
 from warpbrain.ensemble.sample import Sample
 from warpbrain.ensemble.store import Store
-from warpbrain.ensemble.workers import Here, Prepare, Processes, Workers, kind_of
-from warpbrain.errors import InputError, require_kind
+from warpbrain.ensemble.workers import Here, Job, Prepare, Processes, Workers, kind_of
+from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.gp.process import Process
+from warpbrain.gp.sampling import law_of_curve
 from warpbrain.gp.trained import find_model
+from warpbrain.physics.laws import Law
+from warpbrain.physics.laws.stability import UnstableLawError, require_stable
+from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.system import System
+
+#: Standard deviations from the mean curve that the paper's sweep takes, for each tissue.
+SWEEP = tuple(np.linspace(-2.0, 2.0, 17).tolist())
+
+
+def swept_samples(case: Case, process: Process) -> list[Sample]:
+    """The paper's sweep: the laws of the curves `k` standard deviations from the mean, 17 `k` in [-2, 2] a tissue.
+
+    One tissue makes 17 samples, two make the 289 pairs, the last tissue fastest. A law that is not stable is a sample
+    without materials. `InputError` if a tissue has no group, or one that the process has seen no study of; for more
+    than two tissues.
+    """
+    labels = tuple(sorted(case.tissues))
+    require_groups(case, labels, process)
+    if len(labels) > 2:
+        raise InputError(f"{case.path}: the paper's sweep is over one or two tissues; this case has {len(labels)}")
+    laws = {
+        (label, k): law_of_curve(process, case.tissues[label].prior, k, case.tissues[label].model).law()
+        for label in labels
+        for k in SWEEP
+    }
+    samples = []
+    for number, steps in enumerate(product(SWEEP, repeat=len(labels))):
+        deviations = dict(zip(labels, steps, strict=True))
+        chosen = {label: laws[label, k] for label, k in deviations.items()}
+        reason = ""
+        try:
+            for label, law in chosen.items():
+                require_stable(law, case.poisson, case.tissues[label].formulation)
+        except UnstableLawError as error:
+            reason = f"tissue {label}: {error}"
+        samples.append(Sample(number, None if reason else _materials(case, chosen), reason, deviations))
+    return samples
+
+
+def _materials(case: Case, laws: Mapping[int, Law]) -> dict[int, Material]:
+    return {label: Material(law, case.poisson, case.tissues[label].formulation) for label, law in laws.items()}
+
+
+#: How exact the estimate has to be: it decides on a sign.
+_TOLERANCE = 1e-2
+
+
+def least_stretch(model: Model, device: str | None = None) -> float:
+    """The least principal stretch of any element in linear elasticity; below zero no tissue is left of one.
+
+    ``min eig(I + (H + H^T) / 2)`` with the displacement gradient H of the body under its full load, with the stiffness
+    that it has at rest. A body stiffens as it is compressed, so it may bear what this says it does not. Errors are
+    those of `EquilibriumSolver.linear_estimate`.
+    """
+    system = System(model, device)
+    solver = EquilibriumSolver(system, EquilibriumOptions(cg_tolerance=_TOLERANCE))
+    system.u.assign(solver.linear_estimate())
+    F = system.deformation_gradients()
+    return float(np.linalg.eigvalsh(0.5 * (F + F.transpose(0, 2, 1))).min())
+
+
+@dataclass(frozen=True)
+class Overload:
+    """Samples that are too soft for the load, by `least_stretch`."""
+
+    numbers: tuple[int, ...]
+    #: Part of the load that leaves some tissue of every element of the softest one, in that estimate; 1 if none is too
+    #: soft, nan if it has no linear estimate
+    share: float
+
+
+def overloaded(model: Model, samples: Sequence[Sample], device: str | None = None) -> Overload:
+    """Samples that are too soft for the load, and what part of it all of them bear.
+
+    Samples are taken in the order of their stiffness and the first that bears the load is found by bisection: a few
+    linear solves, however many samples there are. `InputError` as of `least_stretch`.
+    """
+
+    def stiffness(sample: Sample) -> float:
+        """Mean logarithm of the shear moduli [Pa]."""
+        return float(np.mean([np.log(material.law.shear_modulus) for material in (sample.materials or {}).values()]))
+
+    ordered = sorted((sample for sample in samples if sample.materials is not None), key=stiffness)
+
+    def stretch_of(sample: Sample) -> float:
+        assert sample.materials is not None
+        try:
+            return least_stretch(replace(model, materials=sample.materials), device)
+        except SolveError:
+            return float("nan")
+
+    first = bisect_left(ordered, True, key=lambda sample: stretch_of(sample) > 0.0)
+    # the stretch is one less what grows with the load
+    share = 1.0 / (1.0 - stretch_of(ordered[0])) if first else 1.0
+    return Overload(tuple(sorted(sample.number for sample in ordered[:first])), share)
 
 
 def chosen_samples(
@@ -26,14 +127,29 @@ def chosen_samples(
     samples: int | str,
     seed: int = 0,
     process: Process | None = None,
-    on_sample: Callable[[int], None] | None = None,
+    on_sample: Callable[[int], None] = lambda _number: None,
 ) -> list[Sample]:
-    """So many draws of the tissues' joint prior, or the paper's sweep (``"grid"``); `InputError` if there is none."""
+    """So many draws of the tissues' joint prior, from 0 on, or the paper's sweep (``"grid"``).
+
+    A draw of which no stable law is found is a sample without materials. `InputError` if there is no such number of
+    samples, or a tissue has no group or one that the process has seen no study of.
+    """
     if samples == "grid":
         return swept_samples(case, process or find_model("coregionalised", "as_published"))
     if not isinstance(samples, int) or samples < 1:
         raise InputError(f"samples = {samples!r}: expected a whole number of at least 1 or 'grid', the paper's sweep")
-    return drawn_samples(case, samples, seed, process or find_model("hierarchical"), on_sample)
+    process = process or find_model("hierarchical")
+    require_groups(case, tuple(sorted(case.tissues)), process)
+    chosen = []
+    for number in range(samples):
+        try:
+            drawn = with_prior_draw(case, number, seed, process)
+            laws = {label: tissue.known_law for label, tissue in drawn.case.tissues.items()}
+            chosen.append(Sample(number, _materials(case, laws)))
+        except SolveError as error:
+            chosen.append(Sample(number, None, str(error).removeprefix(f"{case.path}: ")))
+        on_sample(number)
+    return chosen
 
 
 @contextmanager

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.atomic import output_folder, remove_leftovers, whole_file
-from warpbrain.ensemble.job import Job
 from warpbrain.ensemble.sample import Outcome
+from warpbrain.ensemble.workers import Job
 from warpbrain.errors import InputError
 
 #: Names in the folder.

@@ -1,4 +1,5 @@
-"""Who computes a job: this process, or processes of this machine (a cluster of others is in its own file).
+"""A job, everything that decides the outcomes of an ensemble as plain data, and who computes it: this process, or
+processes of this machine (a cluster of others is in its own file).
 
 A part of a job is a pure function of what it is given, and every sample has the same bits wherever it is computed: who
 computes which part decides nothing. Warp's kernels on the CPU run on one thread, so there a process for each processor.
@@ -6,24 +7,109 @@ computes which part decides nothing. Warp's kernels on the CPU run on one thread
 
 from __future__ import annotations
 
+import hashlib
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
 from multiprocessing import get_context
 from multiprocessing.synchronize import Event
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
-from warpbrain.ensemble.job import Job
-from warpbrain.ensemble.sample import Outcome
+import numpy as np
+
+from warpbrain import __version__
+from warpbrain.ensemble.course import Course, Moving, Resting, step_samples
+from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.batched.persistent import kept_bytes
 from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.tetrahedron import PAIRS
-from warpbrain.simulation.system import System, find_device
+from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.relaxation import RelaxationOptions
+from warpbrain.simulation.system import System, find_device, find_precision
+
+
+def _versions() -> dict[str, str]:
+    return {"warpbrain": __version__, "warp-lang": version("warp-lang")}
+
+
+@dataclass(frozen=True)
+class Job:
+    """Samples of a model and the course that they take."""
+
+    model: Model  # its own materials are not used
+    samples: tuple[Sample, ...]
+    steps: int | None = None  # time steps; None: to rest
+    time_step: float = 0.001  # of a motion [s]
+    tolerance: float = 1e-8  # of rest; see `warpbrain.simulation.relaxation.RelaxationOptions`
+    precision: str = "double"  # ``"double"`` or ``"single"``
+    #: Of this machine's packages; a worker must have the same
+    versions: dict[str, str] = field(default_factory=_versions)
+
+    def __post_init__(self) -> None:
+        if self.model.mechanisms:
+            kinds = ", ".join(dict.fromkeys(mechanism.kind for mechanism in self.model.mechanisms))
+            alike = ", ".join(kind for kind, known in mechanisms().items() if acts_before_all(known))
+            raise InputError(
+                f"an ensemble cannot have the mechanism {kinds} yet: only what is the same forces, or the same tissue "
+                f"left, for every sample ({alike})"
+            )
+        if self.model.elements != "tet4":
+            raise InputError(f"an ensemble cannot have elements '{self.model.elements}' yet: expected tet4")
+
+    def part(self, numbers: Collection[int]) -> Job:
+        """The same job for some of its samples, by number."""
+        return replace(self, samples=tuple(sample for sample in self.samples if sample.number in numbers))
+
+    def course(self) -> Course:
+        """A new course for a batch of these samples."""
+        if self.steps is not None:
+            return Moving(self.model, self.steps, self.time_step)
+        return Resting(self.model, RelaxationOptions(tolerance=self.tolerance), find_precision(self.precision))
+
+    def system(self, device: str | None) -> System:
+        """The model on a device; `InputError` on a machine of other versions than the job's: bits would be others."""
+        if self.versions != _versions():
+            raise InputError(f"a worker has {_versions()}, the job was made with {self.versions}")
+        return System(self.model, device, self.precision)
+
+    def outcomes(self, device: str | None, batch: int | None) -> Iterator[list[Outcome]]:
+        """Compute the samples on a device, so many at a time, or as many as its memory holds and pay."""
+        system = self.system(device)
+        return step_samples(system, self.course(), self.samples, batch_size(system, batch))
+
+    def fingerprint(self, kind: str) -> str:
+        """A hash of all that decides the outcomes' bits; `kind` is that of the devices, ``"cpu"`` or ``"cuda"``."""
+        model = self.model
+        digest = hashlib.sha256()
+        parts: list[Any] = [model.mesh.points, model.mesh.tetrahedra, model.mesh.tissue, model.constrained]
+        parts += [model.prescribed, model.external_forces(), model.density, model.damping, list(model.loads)]
+        parts += [(motion.nodes, motion.times, motion.values) for motion in model.motions]
+        parts += [(s.number, s.reason, sorted((s.materials or {}).items())) for s in self.samples]
+        parts += [self.steps, self.time_step, self.tolerance, self.precision, sorted(self.versions.items()), kind]
+        for part in parts:
+            for item in part if isinstance(part, tuple) else (part,):
+                digest.update(np.ascontiguousarray(item).tobytes() if isinstance(item, np.ndarray) else _text(item))
+        return digest.hexdigest()
+
+
+def acts_before_all(mechanism: type[Mechanism]) -> bool:
+    """Whether a mechanism is done with once loads and mesh are made, whatever the laws and the deformation are."""
+    return issubclass(mechanism, Load) or hasattr(mechanism, "remaining")
+
+
+def _text(value: Any) -> bytes:
+    return f"{value!r};".encode()
+
 
 #: Samples beyond which a batch is no faster a sample, by kind of device; docs/ensembles.md has the times. On a CPU a
 #: few at a time are as fast as one, and more only take room in its cache.
@@ -57,16 +143,16 @@ def free_bytes(system: System) -> int:
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
 
 
-def batch_size(system: System, asked: int | None = None) -> int:
+def batch_size(system: System, samples: int | None = None) -> int:
     """Samples of a batch: as many as are asked for, or as many as the memory holds and pay; `InputError` if not one."""
     each = bytes_per_slot(system)
     room = int(SHARE * free_bytes(system)) // each
-    if room < (asked or 1):
+    if room < (samples or 1):
         raise InputError(
-            f"--batch {asked or 'auto'}: a sample takes {each / 1e6:.0f} MB, and {system.device.alias} has room for "
+            f"--batch {samples or 'auto'}: a sample takes {each / 1e6:.0f} MB, and {system.device.alias} has room for "
             f"{room}"
         )
-    return asked or min(room, ENOUGH["cuda" if system.device.is_cuda else "cpu"])
+    return samples or min(room, ENOUGH["cuda" if system.device.is_cuda else "cpu"])
 
 
 #: Parts that each worker gets: the more, the less the others wait for the last.
@@ -96,8 +182,7 @@ class Here:
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
         """See `Workers`."""
-        system = job.system(self._device.alias)
-        yield from job.outcomes(system, batch_size(system, self._batch))
+        return job.outcomes(self._device.alias, self._batch)
 
 
 class Processes:
@@ -134,8 +219,7 @@ def kind_of(device: str | None) -> str:
 def compute_part(job: Job, device: str | None, batch: int | None, prepare: Prepare) -> list[Outcome]:
     """All outcomes of a job: what a worker does."""
     prepare()
-    system = job.system(device)
-    return [outcome for ended in job.outcomes(system, batch_size(system, batch)) for outcome in ended]
+    return [outcome for ended in job.outcomes(device, batch) for outcome in ended]
 
 
 def parts_of(job: Job, workers: int, least: int) -> list[Job]:

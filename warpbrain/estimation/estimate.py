@@ -16,12 +16,11 @@ from warpbrain.estimation.fit import Estimate, GaussNewton
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions, Listener
-from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.parameters import Parameters, PriorMode, prior_modes, prior_of
 from warpbrain.estimation.posterior import Posterior
-from warpbrain.estimation.prior import PriorMode, prior_modes, prior_of
 from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.estimation.registration import registration_of
-from warpbrain.estimation.sampling import Chain, Importance, Proposal, Target, importance_sampling, run_chain
+from warpbrain.estimation.sampling import Proposal, Target, importance_sampling, run_chain
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
 from warpbrain.recordings.agreement import root_mean_square
@@ -124,7 +123,11 @@ class Estimation:
         doubts, chain = importance.doubts(modes[0].laplace), None
         if doubts:
             with self._counted("chain"):
-                chain = self._sample(target, proposal, importance)
+                solves, rng = self.options.chain, np.random.default_rng([self.options.seed, 1])
+                self.listener.stage(f"Laplace's approximation fails: a chain of {solves} equilibria instead")
+                best = int(np.argmax(importance.log_densities))
+                begin = importance.theta[best] if np.isfinite(importance.log_densities[best]) else modes[0].theta
+                chain = run_chain(target, proposal, begin, solves, rng, lambda n: self.listener.progress(n / solves))
         about = self.case, self.options, self.prior, modes, tuple(self._remarks), tuple(errors)
         return Posterior(*about, importance, doubts, chain, self._solves, self.seconds)
 
@@ -197,15 +200,6 @@ class Estimation:
             )
         self._solves["on elements of half the size"] = sum(mesh.solves for mesh in finer)
         return modes
-
-    def _sample(self, target: Target, proposal: Proposal, importance: Importance) -> Chain:
-        solves = self.options.chain
-        self.listener.stage(f"Laplace's approximation fails: a chain of {solves} equilibria instead")
-        best = int(np.argmax(importance.log_densities))
-        solved = np.isfinite(importance.log_densities[best])
-        start = importance.theta[best] if solved else target.modes[0].theta
-        rng = np.random.default_rng([self.options.seed, 1])
-        return run_chain(target, proposal, start, solves, rng, lambda n: self.listener.progress(n / solves))
 
 
 def _where(parameters: Parameters, mode: PriorMode) -> str:

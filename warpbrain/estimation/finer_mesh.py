@@ -30,6 +30,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -62,12 +63,7 @@ _WHOLE = 0.8
 #: Names of the numbers: `b`, and `B_ij` by what it is multiplied with, all without a unit.
 NAMES = (
     "amount of the mesh's error",
-    *(
-        f"shape of the mesh's error {i}{j} {by}"
-        for by in ("even", "by x", "by y", "by z")
-        for i in "xyz"
-        for j in "xyz"
-    ),
+    *(f"shape of the mesh's error {i}{j} {by}" for by, i, j in product(("even", "by x", "by y", "by z"), "xyz", "xyz")),
 )
 
 

@@ -204,7 +204,14 @@ class GaussNewton:
         values = problem.nuisances.prior.mean if nuisances is None else nuisances
         self._history = []
         if start is None:
-            point, linearised = self._roughly(*self._first(values))
+            point, linearised = self._first(values)
+            # downhill with noise as large as what is left each time
+            for _ in range(_ROUNDS):
+                last = point.noise
+                point, linearised, _ = self._descend(point, linearised, _ROUGHLY)
+                point = problem.at(point.state, point.nuisances)
+                if np.abs(np.log(point.noise.sigma / last.sigma)).max() < _SETTLED:
+                    break
         else:
             point = problem.at(start, values)
             linearised = problem.linearise(point)
@@ -234,16 +241,6 @@ class GaussNewton:
             except SolveError as error:
                 why = str(error)
         raise SolveError(f"in the middle of the prior, and up to {math.exp(_STIFFER):.0f} times stiffer: {why}")
-
-    def _roughly(self, point: Point, linearised: Linearised) -> tuple[Point, Linearised]:
-        """Downhill with noise as large as what is left each time."""
-        for _ in range(_ROUNDS):
-            last = point.noise
-            point, linearised, _ = self._descend(point, linearised, _ROUGHLY)
-            point = self.problem.at(point.state, point.nuisances)
-            if np.abs(np.log(point.noise.sigma / last.sigma)).max() < _SETTLED:
-                break
-        return point, linearised
 
     def _descend(self, point: Point, linearised: Linearised, tolerance: float) -> tuple[Point, Linearised, float]:
         """Downhill with one noise to where a step is no longer worth it; and how long it is.

@@ -62,11 +62,6 @@ class Forward:
         #: Equilibria that were asked for.
         self.solves = 0
 
-    @property
-    def system(self) -> System:
-        """Of the last state."""
-        return self.states[-1].system
-
     def solve(self, theta: Floats, start: Floats | None = None, tolerance: float = EXACT) -> State:
         """The equilibria of parameters (p,), from displacements (s n, 3) [m] near to them, or from rest.
 

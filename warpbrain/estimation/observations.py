@@ -23,7 +23,7 @@ from warpbrain.cases.enough import too_few_for_noise
 from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
-from warpbrain.estimation.within_element import change_over_element
+from warpbrain.inference.beliefs import belief
 from warpbrain.inference.noise import noise_covariance
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.free_surfaces import faces_of_set
@@ -283,8 +283,17 @@ def _observations(case: Case, recording: Recording, moments: Moments) -> Iterato
     start = -1 if recording.reference is None else moments.number(recording.reference)
     for number in np.unique(states).tolist():
         members, weights, size, positions, edges, at = make(case, recording, rows[states == number])
-        sigma, change = _sigma(recording, members, weights), np.zeros((len(members), size, 3))
-        about = sigma, weights, size, positions, edges, change, times[members], recording.reference or 0.0
+        sigma, sigmas = recording.sigma, getattr(recording, "sigmas", None)
+        # of each row, or None: it is to be estimated
+        declared = None
+        if sigmas is not None or sigma is not None:
+            declared = np.full(len(members), sigma, dtype=np.float64) if sigmas is None else np.asarray(sigmas)[members]
+            for value in declared.tolist():
+                if not (math.isfinite(value) and value > 0.0):
+                    raise InputError(f"recording '{recording.name}': sigma = {value:g}: expected a positive number")
+            declared = declared / np.sqrt(weights)
+        change = np.zeros((len(members), size, 3))
+        about = declared, weights, size, positions, edges, change, times[members], recording.reference or 0.0
         yield Observation(recording.name, recording.kind, unit, members, *about, number, start, at)
 
 
@@ -395,13 +404,43 @@ def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observ
     return tuple(replace(seen, over_element=change) for (_, seen), change in zip(each, changes, strict=True))
 
 
-def _sigma(recording: Recording, rows: Ints, weights: Floats) -> Floats | None:
-    """Standard deviation of each row, None if it is to be estimated."""
-    sigmas = getattr(recording, "sigmas", None)
-    if sigmas is None and recording.sigma is None:
-        return None
-    sigma = np.full(len(rows), recording.sigma, dtype=np.float64) if sigmas is None else np.asarray(sigmas)[rows]
-    for value in sigma.tolist():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(f"recording '{recording.name}': sigma = {value:g}: expected a positive number")
-    return sigma / np.sqrt(weights)
+#: Rounds of weighted least squares that come to least absolute deviations, and the least of these, relative to the
+#: displacement: smaller ones are alike.
+_ROUNDS, _LEAST = 6, 1e-3
+
+
+def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> Floats:
+    """Change of recorded displacement over an edge of the element in which each point is.
+
+    A wall that was cut out of elements is a staircase, and a linear element has one gradient. Where displacement
+    changes much from place to place the mesh has a recorded point beside where it is, by a part of the edge of its
+    element, and its displacement is wrong by that part of this change (errors in variables, by effective variances:
+    Orear, Am. J. Phys. 50 (1982) 912). A finer mesh with the same wall does not show this error; taken for noise alone
+    it would look like a second force beside the first. It is that of what was recorded, whatever is thought to act.
+
+    Gradients over each point and its neighbours are by least absolute deviations: a gross error is no gradient of its
+    neighbours, and what changes faster than tissue can is not tissue. Points and displacement (n, 3) were recorded at
+    one time [m]; `edges` (n,) are mean lengths of those of the element [m]. Returns (n, 3, 3), of each component along
+    each axis [m]; zero of points that are too few to tell.
+    """
+    from scipy.spatial import cKDTree
+
+    neighbours = min(round(belief("mesh.neighbours")), len(points) - 1)
+    if neighbours < 3:
+        return np.zeros((len(points), 3, 3))
+    near = cKDTree(points).query(points, neighbours + 1)[1]
+    weights = np.ones((*near.shape, 1))
+    least = _LEAST * float(np.median(np.linalg.norm(displacement, axis=1)))
+    for _ in range(_ROUNDS):
+        share = weights / weights.sum(axis=1, keepdims=True)
+        offsets = points[near] - np.sum(share * points[near], axis=1, keepdims=True)
+        changes = displacement[near] - np.sum(share * displacement[near], axis=1, keepdims=True)
+        # of points in one plane the gradient across it is not known, and taken for zero
+        root = np.sqrt(weights)
+        gradients = np.linalg.pinv(root * offsets, rcond=belief("mesh.flat")) @ (root * changes)
+        left = np.linalg.norm(changes - offsets @ gradients, axis=2, keepdims=True)
+        weights = 1.0 / np.maximum(left, least + np.finfo(float).tiny)
+    steepest = belief("mesh.steepest")
+    sizes = np.linalg.norm(gradients, ord=2, axis=(1, 2), keepdims=True)
+    gradients *= np.minimum(1.0, steepest / np.maximum(sizes, steepest))
+    return np.asarray(edges[:, None, None] * gradients.transpose(0, 2, 1))

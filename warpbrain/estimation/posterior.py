@@ -2,24 +2,251 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.case import Case
+from warpbrain.cases.moments import Moments
 from warpbrain.estimation.finer_mesh import DiscretisationError
 from warpbrain.estimation.fit import Estimate, probabilities
-from warpbrain.estimation.identifiability import Identifiability, identifiability
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
-from warpbrain.estimation.prediction import OverallErrors, Prediction, predictions
+from warpbrain.estimation.registration import realigned
 from warpbrain.estimation.sampling import Chain, Importance
 from warpbrain.gp.prior import Prior
+from warpbrain.physics.words import enumerated
+from warpbrain.recordings.agreement import by_unit
+from warpbrain.recordings.comparison import Comparison
 from warpbrain.shown import Shown
+from warpbrain.simulation.observation import observe
+from warpbrain.simulation.result import NodalState
+
+#: Probabilities of the intervals whose coverage is told.
+INTERVALS = (0.5, 0.95)
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """A recording beside what the estimate makes of it."""
+
+    name: str
+    kind: str
+    role: str
+    unit: str
+    rows: Ints  # (n,), rows of the recording that have a weight
+    before: Floats  # (n, d), their residuals with nothing moved (or no force)
+    after: Floats  # (n, d), those of the estimate with its nuisances
+    #: (n,), noise of one component of each row, given or estimated, its scale in it; None if it is not known
+    sigma: Floats | None
+    deviation: Floats  # (n, d), standard deviation of the prediction itself, from the posterior to first order
+    gross: Bools  # (n,), rows that are gross errors; none where the noise is not known
+    #: Part of the components that lie in their predictive intervals of `INTERVALS`, without gross errors
+    coverage: tuple[float, ...] | None
+    run: Comparison  # all recorded rows beside the most probable state as `warpbrain run` has it
+    #: Beside the estimate: with the error of the mesh, and with what was recorded moved back by that of registration
+    fitted: Comparison
+
+    @property
+    def error_before(self) -> float:
+        """Root mean square of all rows with nothing moved, in `unit`."""
+        return self.run.before.root_mean_square
+
+    @property
+    def error_after(self) -> float:
+        """Root mean square of all rows beside the estimate, in `unit`."""
+        return self.fitted.after.root_mean_square
+
+
+@dataclass(frozen=True)
+class OverallErrors:
+    """All points and surfaces of one role: root mean square of the 3-D distance over every row [m]."""
+
+    role: str
+    count: int
+    before: float  # with nothing moved
+    after: float  # beside the estimate
+    of_run: float  # beside its most probable state as `warpbrain run` has it
+
+    @classmethod
+    def of(cls, each: Sequence[Prediction]) -> tuple[OverallErrors, ...]:
+        """Of each role that has any."""
+        overall = []
+        for role in dict.fromkeys(prediction.role for prediction in each if prediction.unit == "m"):
+            lengths = [prediction for prediction in each if prediction.role == role and prediction.unit == "m"]
+            residuals = (
+                [prediction.run.residuals_before for prediction in lengths],
+                [prediction.fitted.residuals_after for prediction in lengths],
+                [prediction.run.residuals_after for prediction in lengths],
+            )
+            errors = (by_unit(("m", residual) for residual in values)["m"] for values in residuals)
+            overall.append(cls(role, sum(prediction.fitted.count for prediction in lengths), *errors))
+        return tuple(overall)
+
+
+def predictions(
+    case: Case, estimate: Estimate, role: str, observations: Observations, joint: Floats
+) -> tuple[Prediction, ...]:
+    """Recordings of one role, ``"fit"`` or ``"check"``, beside an estimate.
+
+    `joint` (p + q, p + q) is the covariance of parameters and nuisances.
+    """
+    from scipy.special import ndtri
+
+    if not observations.recordings:
+        return ()
+    problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised
+    centre, motion = problem.observations.centre, problem.nuisances.motion(point.nuisances)
+    rest = np.zeros_like(point.state.u)
+    seen = problem.nuisances.observed(point.state, point.nuisances)
+    before, after = observations.at(rest, rest, centre), observations.at(*seen, centre, motion)
+    moments = problem.forward.moments
+    run = compared(case, point.state.u, point.state.reactions, moments)
+    fitted = compared(realigned(case, motion, centre), *seen, moments)
+    jacobian = problem.nuisances.jacobian(after, point.state.theta, point.nuisances, derivatives.du, derivatives.dR)
+    deviations = np.sqrt(np.einsum("np,pq,nq->n", jacobian, joint, jacobian))
+    results = []
+    for number, name in enumerate(after.names):
+        members = np.flatnonzero(after.recordings == number)
+        parts = [observation for observation in observations.recordings if observation.name == name]
+        rows, first = np.concatenate([observation.rows for observation in parts]), parts[0]
+        shape = len(rows), first.size
+        seen_rows, noise = after.of_rows(members), point.noise
+        if role != "fit":
+            # of a recording that was not fitted, its gross errors beside what the estimate knows of it
+            undeclared = np.isnan(seen_rows.sigma)
+            sigmas = np.where(undeclared, 1.0 / np.sqrt(seen_rows.weights), seen_rows.sigma)
+            noise = replace(noise, rows=seen_rows, sigma=sigmas, inflation=np.ones(len(seen_rows.points)))
+            if not undeclared.any():
+                noise = noise.with_gross_errors(seen_rows.residual, jacobian[members] @ np.linalg.cholesky(joint))
+        noise_rows = members if role == "fit" else members - members[0]
+        known = role == "fit" or first.sigma is not None
+        gross = noise.gross[[k for k, at in enumerate(noise.rows.points) if noise_rows[0] <= at[0] <= noise_rows[-1]]]
+        gross = gross if len(gross) else np.zeros(len(rows), dtype=bool)
+        residual, deviation = seen_rows.residual.reshape(shape), deviations[members].reshape(shape)
+        within = None
+        if known and not gross.all():
+            away = (np.abs(residual) / np.hypot(deviation, noise.deviation[noise_rows].reshape(shape)))[~gross]
+            within = tuple(float(np.mean(away <= ndtri(0.5 + 0.5 * probability))) for probability in INTERVALS)
+        sigma = (noise.scale * noise.sigma)[noise_rows].reshape(shape)[:, 0] if known else None
+        about = name, first.kind, role, first.unit, rows, before.residual[members].reshape(shape), residual
+        results.append(Prediction(*about, sigma, deviation, gross, within, run[name], fitted[name]))
+    return tuple(results)
+
+
+def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapping[str, Comparison]:
+    """Recordings by name beside displacement and reactions (s N, 3) at moments, as `warpbrain run` compares them."""
+    count = len(moments.cases)
+    pairs = zip(np.split(u, count), np.split(reactions, count), strict=True)
+    states = [NodalState(case.remaining[0], *state) for state in pairs]
+    others = {time: states[number] for time, number in zip(moments.times, moments.numbers, strict=True)}
+    return {comparison.name: comparison for comparison in observe(case, states[-1], others=others).comparisons}
+
+
+#: Gains from which a direction is told, since the data know more of it than the prior did and the variance at least
+#: halves, and below which it is hidden: an estimate along it is the prior, and no finding.
+TOLD, HIDDEN = 1.0, 0.1
+#: Parts of a direction smaller than this, in standard deviations of the prior, are not spoken of.
+_NEGLIGIBLE = 0.1
+#: A change of the moduli that moves the body by less than this part of its displacement moves nothing.
+_UNMOVED = 1e-4
+#: Two parts of a direction that differ by less than this are the same.
+_ALIKE = 0.1
+#: How a combination of parameters is told, and a change: of one, of moduli alike, of any.
+_COMBINATION = "the {}", "the geometric mean of the shear moduli of {}", "the combination {}"
+_CHANGE = "a change of the {}", "a change of the shear moduli of {} by one factor", "a change along {}"
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """A verdict."""
+
+    informed: tuple[str, ...]  # combinations of parameters that the data tell
+    weakly_informed: tuple[str, ...]  # and that they tell a little
+    hidden: tuple[str, ...]  # changes of the parameters that the data do not see
+    #: All shear moduli together can be changed by a factor, and the data do not see it: the loads are displacements
+    #: only, and no force was recorded
+    scale_is_hidden: bool
+
+    @property
+    def nothing(self) -> bool:
+        """The data say nothing: the posterior is the prior."""
+        return not self.informed and not self.weakly_informed
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """For people to read."""
+        sentences = []
+        if self.nothing:
+            sentences.append(
+                "Not identifiable: the recordings say nothing of the tissue. What is given is the prior, no finding."
+            )
+        if self.informed:
+            sentences.append(f"The recordings inform {enumerated(self.informed)}.")
+        if self.weakly_informed:
+            sentences.append(f"They inform a little {enumerated(self.weakly_informed)}.")
+        if self.hidden and not self.nothing:
+            sentences.append(f"They do not see {enumerated(self.hidden)}: there the estimate is the prior.")
+        if self.scale_is_hidden:
+            sentences.append(
+                "Absolute stiffness cannot be told from displacements that displacements cause: a recorded force, or a "
+                "load that is known, such as weight, would tell it."
+            )
+        return tuple(sentences)
+
+
+def identifiability(estimate: Estimate) -> Identifiability:
+    """What the data of an estimate inform."""
+    posterior = estimate.laplace
+    parameters, gains = tuple(posterior.parameters), posterior.gains
+    informed, hidden = gains >= TOLD, gains < HIDDEN
+    # one prior standard deviation of a parameter is the unit in which changes of different kinds compare
+    unit = posterior.prior.standard_deviations
+    # a factor on all moduli moves nothing if displacements do it all, and everything under a weight or a force
+    scale = posterior.parameters.is_modulus.astype(np.float64)
+    moved = np.linalg.norm(np.tensordot(scale, estimate.linearised.du, axes=1))
+    known = float(scale @ posterior.information @ scale) / float(scale @ posterior.prior.precision @ scale)
+
+    def combinations(rows: Floats) -> tuple[str, ...]:
+        return tuple(in_words(parameters, row / unit, _COMBINATION) for row in _reduced(rows * unit))
+
+    return Identifiability(
+        combinations(posterior.combinations[informed]),
+        combinations(posterior.combinations[~informed & ~hidden]),
+        tuple(in_words(parameters, row * unit, _CHANGE) for row in _reduced(posterior.directions[hidden] / unit)),
+        known < HIDDEN and bool(moved <= _UNMOVED * np.linalg.norm(estimate.point.state.u)),
+    )
+
+
+def _reduced(rows: Floats) -> Floats:
+    """Other rows of the same span, each with a 1 where the others have zeros: the fewest parameters in each."""
+    rows = rows.copy()
+    for k in range(len(rows)):
+        column = int(np.abs(rows[k]).argmax())
+        rows[k] /= rows[k, column]
+        others = np.arange(len(rows)) != k
+        rows[others] -= np.outer(rows[others, column], rows[k])
+    return np.where(np.abs(rows) >= _NEGLIGIBLE * np.abs(rows).max(axis=1, keepdims=True, initial=0.0), rows, 0.0)
+
+
+def in_words(parameters: Sequence[Parameter], row: Floats, words: tuple[str, str, str]) -> str:
+    """A direction (p,) in parameters of their own units; those with a weight of zero are not in it."""
+    single, alike, other = words
+    weights = row / row[np.abs(row).argmax()]
+    parts = [(parameters[k], float(weights[k])) for k in np.flatnonzero(weights).tolist()]
+    if len(parts) == 1:
+        return single.format(f"{parts[0][0].coordinate.noun} of {parts[0][0].tissue}")
+    if all(parameter.is_modulus for parameter, _ in parts):
+        tissues = enumerated([parameter.tissue for parameter, _ in parts])
+        if max(weight for _, weight in parts) - min(weight for _, weight in parts) < _ALIKE:
+            return alike.format(tissues)
+        if len(parts) == 2 and abs(parts[0][1] + parts[1][1]) < _ALIKE:
+            return single.format(f"ratio of the shear moduli of {tissues}")
+    return other.format(" ".join(f"{weight:+.2g} [{parameter.name}]" for parameter, weight in parts))
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,7 @@ from warpbrain.estimation.finer_mesh import Discretisation, DiscretisationError
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.estimation.likelihood import IndependentNoise, Likelihood, Noise
 from warpbrain.estimation.observations import Observations, Sensors
-from warpbrain.estimation.parameters import Gaussian, Parameters
-from warpbrain.estimation.prior import PriorMode
+from warpbrain.estimation.parameters import Gaussian, Parameters, PriorMode
 from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
 from warpbrain.inference.least_squares import minimise
 from warpbrain.recordings.registration import Registration

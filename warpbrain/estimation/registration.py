@@ -61,17 +61,17 @@ def realigned(case: Case, motion: Floats, centre: Floats) -> Case:
     """
     if not motion.any():
         return case
-    return replace(case, recordings=tuple(realigned_recording(each, motion, centre) for each in case.recordings))
 
+    def moved(recording: Recording) -> Recording:
+        """Forces are as they were."""
+        if isinstance(recording, PointsRecording):
+            positions = recording.points + recording.displacement
+            return replace(recording, displacement=moved_back(positions, motion, centre) - recording.points)
+        if isinstance(recording, SurfaceRecording):
+            return replace(recording, points=moved_back(recording.points, motion, centre))
+        return recording
 
-def realigned_recording(recording: Recording, motion: Floats, centre: Floats) -> Recording:
-    """The same of one recording: forces are as they were."""
-    if isinstance(recording, PointsRecording):
-        positions = recording.points + recording.displacement
-        return replace(recording, displacement=moved_back(positions, motion, centre) - recording.points)
-    if isinstance(recording, SurfaceRecording):
-        return replace(recording, points=moved_back(recording.points, motion, centre))
-    return recording
+    return replace(case, recordings=tuple(map(moved, case.recordings)))
 
 
 def _crossed(vectors: Floats) -> Floats:

@@ -19,7 +19,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
-from warpbrain.estimation.prediction import compared
+from warpbrain.estimation.posterior import compared
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import law_of_curve
 from warpbrain.recordings.agreement import by_unit
@@ -88,7 +88,10 @@ def sweep(
     points = dict(known or {})
     forward: Forward | None = None
     near: Floats | None = None
-    order = _neighbours(values, len(curves))
+    # all combinations, each beside the one before it; from the stiffest, where an equilibrium is surest
+    falling, order = sorted(values, reverse=True), [Steps()]
+    for _ in curves:
+        order = [(*head, k) for number, head in enumerate(order) for k in falling[:: -1 if number % 2 else 1]]
     for k in order:
         if k in points:
             continue
@@ -101,25 +104,11 @@ def sweep(
             if not state.passed_unstable:
                 near = state.u
             comparisons = compared(case, state.u, state.reactions, moments)
-            error = by_unit((each.unit, comparisons[each.name].residuals_after) for each in observations.recordings)[
-                unit
-            ]
+            errors = by_unit((each.unit, comparisons[each.name].residuals_after) for each in observations.recordings)
+            error = errors[unit]
         except (InputError, SolveError) as failure:
             reason = str(failure)
         points[k] = SweepPoint(k, tuple(theta.tolist()), error, reason)
         if on_point is not None:
             on_point(points[k])
     return Sweep(parameters, unit, tuple(points[k] for k in order))
-
-
-def _neighbours(values: Sequence[float], tissues: int) -> list[Steps]:
-    """All combinations, each beside the one before it; from the stiffest, where an equilibrium is surest."""
-    order: list[Steps] = [()]
-    for _ in range(tissues):
-        falling = tuple(sorted(values, reverse=True))
-        order = [
-            (*head, step)
-            for number, head in enumerate(order)
-            for step in (falling if number % 2 == 0 else tuple(reversed(falling)))
-        ]
-    return order

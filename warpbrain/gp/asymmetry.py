@@ -14,10 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import REACH
-from warpbrain.gp.literature.study import STRETCHES, Study
-from warpbrain.gp.secant import equivalent_strain, invariant, stretch_of
+from warpbrain.gp.hierarchy import REACH, Hierarchical
+from warpbrain.gp.literature.study import STRETCHES, Study, equivalent_strain, invariant, stretch_of
 
 #: Parts of the largest strain at which both sides are compared: the middles of five equal ones.
 STRAINS = (np.arange(5) + 0.5) / 5.0
@@ -52,7 +50,7 @@ def asymmetry(model: Hierarchical, group: str) -> Asymmetry:
     from scipy.special import ndtr
 
     strain = _largest_strain(STRETCHES[group])
-    # of a and b in `hierarchy`
+    # of a and b
     weights = 2.0 * np.array([np.tanh(STRAINS * strain / REACH).mean(), 1.0])
     everyone = [_along(weights, *each.mean_asymmetry()) for each in model.conditionals]
     sides = np.repeat([-1.0, 1.0], len(STRAINS)) / len(STRAINS)

@@ -1,7 +1,7 @@
 """Covariance of secant moduli: what studies share, level by level.
 
 With `z = ln mu(l)` of a study of method `m`, anatomy `a`, paper `q`, and `x(l) = 0.5 tanh(e(l)/0.5)` of the equivalent
-strain `e` (`secant`), which is `l - 1` near rest and of equal size for tension and compression of one I1,
+strain `e` (`literature.study`), which is `l - 1` near rest and of equal size for tension and compression of one I1,
 
     z = ln 1500 Pa + overall + method + anatomy + group + paper + study                       one modulus each
         + [curve shared by all + by anatomy + by paper + of the study](x), even, 0 at rest    hyperelastic studies only
@@ -22,15 +22,26 @@ through all that is shared: overall, method and paper.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import SolveError
-from warpbrain.gp.kernels import KERNELS
-from warpbrain.gp.literature.study import ANATOMIES, METHODS, Study
-from warpbrain.gp.secant import equivalent_strain, log_secant_modulus
+from warpbrain.gp.literature.study import (
+    ANATOMIES,
+    GROUPS,
+    METHODS,
+    Study,
+    equivalent_strain,
+    groups_of,
+    log_energy,
+    log_secant_modulus,
+)
+from warpbrain.gp.process import KERNELS, Draws, standard_normal
 
 #: A curve of a hyperelastic study is seen at this many stretches. It has one to eight parameters: a hundred points of
 #: it are not a hundred observations.
@@ -110,8 +121,13 @@ def observations(studies: Sequence[Study]) -> Observations:
     names = papers(studies)
     rows: list[tuple[int, int, int, float, bool]] = []
     moduli = [np.empty(0)]
+    half = STRETCHES // 2
+    middle = (np.arange(half) + 0.5) / half
     for index, study in enumerate(studies):
-        grid = _stretches(study)
+        low, high = study.stretch
+        # the middles of equal parts of its range, so that neither 1 nor an end is among them
+        curved = np.concatenate([low + (1.0 - low) * middle, 1.0 + (high - 1.0) * middle])
+        grid = curved if study.hyperelastic else np.array([low, high])
         values = log_secant_modulus(grid, study.energy(grid))
         if not study.hyperelastic:
             grid, values = np.ones(1), values.mean(keepdims=True)
@@ -130,16 +146,6 @@ def places_of(rows: Sequence[tuple[int, int, int, float, bool]]) -> Places:
 def papers(studies: Sequence[Study]) -> list[str]:
     """The papers that studies are from; the place of one is its number in `Places.source`."""
     return sorted({study.paper for study in studies})
-
-
-def _stretches(study: Study) -> Floats:
-    """The middles of equal parts of its range, so that neither 1 nor an end is among them."""
-    low, high = study.stretch
-    if not study.hyperelastic:
-        return np.array([low, high])
-    half = STRETCHES // 2
-    middle = (np.arange(half) + 0.5) / half
-    return np.concatenate([low + (1.0 - low) * middle, 1.0 + (high - 1.0) * middle])
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,7 +342,7 @@ def fit_hierarchy(
     return hierarchy, Fitted(float(end.fun), bool(end.success), str(end.message), int(end.nit), condition)
 
 
-def sample_hierarchies(best: Hierarchy, seen: Observations, count: int, seed: int = 0) -> tuple[Hierarchy, ...]:
+def sample_hierarchies(best: Hierarchy, seen: Observations, count: int) -> tuple[Hierarchy, ...]:
     """Hierarchies that the data allow, drawn by Laplace's approximation of the posterior of their logarithms.
 
     Thirty papers do not say how far papers differ to more than some tens of per cent, and of some effects hardly
@@ -356,7 +362,7 @@ def sample_hierarchies(best: Hierarchy, seen: Observations, count: int, seed: in
     values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T)[np.ix_(free, free)])
     # the posterior is no wider than the prior along any direction
     root = vectors / np.sqrt(np.maximum(values, 1.0 / spread.max() ** 2))
-    normal = np.random.default_rng(seed).standard_normal(((count + 1) // 2, len(values)))
+    normal = np.random.default_rng(0).standard_normal(((count + 1) // 2, len(values)))
     vectors = np.tile(centre, (count, 1))
     vectors[:, free] += np.concatenate([normal, -normal])[:count] @ root.T
     return tuple(Hierarchy.from_vector(vector, best.kernel, best.mean_asymmetry) for vector in vectors)
@@ -379,3 +385,159 @@ def negative_log_likelihood(hierarchy: Hierarchy, seen: Observations, structure:
     G = 0.5 * (cho_solve((L, True), identity) - np.outer(weights, weights))
     value = 0.5 * float(away @ weights) + float(np.log(np.diag(L)).sum()) + 0.5 * len(away) * np.log(2.0 * np.pi)
     return value, hierarchy.slopes(structure, G)
+
+
+#: Stretches at which draws are drawn; between them they are the mean given these values.
+ANCHORS = np.linspace(0.4, 1.8, 57)
+
+
+class Structures(NamedTuple):
+    """Structures of observations with places and with other places, and between the two, under any hierarchy."""
+
+    at: Structure
+    other: Structure
+    between: Structure
+
+
+@dataclass(frozen=True, eq=False)
+class Conditional:
+    """The normal distribution of log moduli under a hierarchy, given observations."""
+
+    hierarchy: Hierarchy
+    seen: Observations
+
+    def moments(self, structures: Structures) -> tuple[Floats, Floats]:
+        """Mean at places (n,) and covariance with other places (n, m)."""
+        at, other, between = structures
+        k = self._whitened(self.hierarchy.covariance_of(at))
+        to = k if other is at else self._whitened(self.hierarchy.covariance_of(other))
+        return CENTRE + k.T @ self._factored[1], self.hierarchy.covariance_of(between) - k.T @ to
+
+    def mean_asymmetry(self) -> tuple[Floats, Floats]:
+        """Mean (2,) and covariance (2, 2) of `a` and `b`, the asymmetry of all papers in the mean."""
+        prior = np.diag(np.square(self.hierarchy.mean_asymmetry))
+        k = self._whitened(mean_asymmetry_of(self.seen.places) @ prior)
+        return k.T @ self._factored[1], prior - k.T @ k
+
+    def _whitened(self, covariance: Floats) -> Floats:
+        from scipy.linalg import solve_triangular
+
+        return np.asarray(solve_triangular(self._factored[0], covariance, lower=True))
+
+    @cached_property
+    def _factored(self) -> tuple[Floats, Floats]:
+        """The factor of the covariance of the observations, and what it makes of them."""
+        from scipy.linalg import cholesky, solve_triangular
+
+        among = self.hierarchy.covariance(self.seen.places, self.seen.places)
+        L = cholesky(among + REST**2 * np.eye(len(among)), lower=True)
+        return L, solve_triangular(L, self.seen.log_modulus - CENTRE, lower=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Hierarchical:
+    """The hierarchical model of a set of studies (a `warpbrain.gp.process.Process`): they differ as wholes.
+
+    The paper's process takes what studies of a group differ by for noise that is independent at every stretch. A
+    hundred points of five curves then pin the group down as five hundred observations would, and a joint draw is
+    jagged. Here a study, and the paper it is from, is an effect, so the spread of a new study is one of whole curves.
+
+    `hierarchy` is that of largest posterior density, `sample` was drawn from the posterior: predictions are averaged
+    over it, and a draw is of one of it. Where it is empty, `hierarchy` stands for all.
+    """
+
+    studies: tuple[Study, ...]
+    hierarchy: Hierarchy
+    variant: str = "corrected"
+    sample: tuple[Hierarchy, ...] = ()
+    name = "hierarchical"
+    _structures_of: dict[tuple[Any, ...], Structures] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups that it has seen studies of."""
+        return groups_of(self.studies)
+
+    def modulus(self, groups: Sequence[str], stretches: ArrayLike) -> tuple[Floats, Floats]:
+        """Mean (groups, n) and covariance (groups * n, groups * n) of the log secant modulus of a new study.
+
+        All groups are measured by one new paper, as in one subject.
+        """
+        moments = self.moments(self.places(groups, stretches))
+        means = np.array([mean for mean, _ in moments])
+        # of a mixture of distributions of equal weight
+        away = means - means.mean(axis=0)
+        within = np.mean([covariance for _, covariance in moments], axis=0)
+        return means.mean(axis=0).reshape(len(groups), -1), within + away.T @ away / len(moments)
+
+    def moduli_of(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> list[tuple[Floats, Floats]]:
+        """Mean and covariance, under each hierarchy, of log secant moduli of studies that it has not seen.
+
+        Joint over studies, each at its own stretches. Where it has seen others of the same paper, these count.
+        """
+        known = papers(self.studies)
+        new = sorted({study.paper for study in studies} - set(known))
+        sources = {**{name: index for index, name in enumerate(known)}, **{n: -1 - k for k, n in enumerate(new)}}
+        rows = [
+            (-1 - index, sources[study.paper], study.task, l, study.symmetric)
+            for index, (study, at) in enumerate(zip(studies, stretches, strict=True))
+            for l in at
+        ]
+        return self.moments(places_of(rows))
+
+    def moments(self, at: Places) -> list[tuple[Floats, Floats]]:
+        """Mean (n,) and covariance (n, n) of the log secant modulus at places, under each hierarchy."""
+        here = Structure.of(self._seen.places, at)
+        structures = Structures(here, here, Structure.of(at, at))
+        return [each.moments(structures) for each in self.conditionals]
+
+    @staticmethod
+    def places(groups: Sequence[str], stretches: ArrayLike) -> Places:
+        """Places (groups * n) of one new paper, with one new study a group, free to be asymmetric."""
+        l = np.asarray(stretches, dtype=np.float64)
+        numbered = enumerate(map(GROUPS.index, groups))
+        return places_of([(-1 - index, -1, task, stretch, False) for index, task in numbered for stretch in l])
+
+    def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
+        """The curve `k` standard deviations from the mean, see `Process`."""
+        mean, covariance = self.modulus([group], stretches)
+        away = np.multiply.outer(np.asarray(k, dtype=np.float64), np.sqrt(np.diag(covariance)))
+        return log_energy(stretches, mean[0] + away)
+
+    def draw(self, groups: Sequence[str], stretches: ArrayLike, number: int | tuple[int, ...], seed: int = 0) -> Floats:
+        """Draw `number` of a seed, see `Process`."""
+        from scipy.special import ndtr
+
+        l = np.asarray(stretches, dtype=np.float64)
+        normal = standard_normal(1 + len(groups) * len(ANCHORS), number, seed)
+        which = min(int(ndtr(normal[0]) * len(self.conditionals)), len(self.conditionals) - 1)
+
+        def moments(groups: tuple[str, ...], at: Floats, other: Floats) -> tuple[Floats, Floats]:
+            # all hierarchies share structures; the last ones are kept, for many draws at the same stretches
+            key = groups, at.tobytes(), other.tobytes()
+            if key not in self._structures_of:
+                if len(self._structures_of) > 1:
+                    self._structures_of.clear()
+                seen, here = self._seen.places, self.places(groups, at)
+                to = to_others = Structure.of(seen, here)
+                there = here
+                if other is not at:
+                    there = self.places(groups, other)
+                    to_others = Structure.of(seen, there)
+                self._structures_of[key] = Structures(to, to_others, Structure.of(here, there))
+            return self.conditionals[which].moments(self._structures_of[key])
+
+        return log_energy(l, self._draws[which].at(tuple(groups), l, normal[1:], moments))
+
+    @cached_property
+    def _draws(self) -> tuple[Draws, ...]:
+        return tuple(Draws(ANCHORS) for _ in self.conditionals)
+
+    @cached_property
+    def _seen(self) -> Observations:
+        return observations(self.studies)
+
+    @cached_property
+    def conditionals(self) -> tuple[Conditional, ...]:
+        """What is known of moduli under each hierarchy of the sample."""
+        return tuple(Conditional(hierarchy, self._seen) for hierarchy in self.sample or (self.hierarchy,))

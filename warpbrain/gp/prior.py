@@ -2,24 +2,62 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError
-from warpbrain.gp.coordinates import coordinates, laws_from, to_coordinates
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import DrawnLaws, draw_many
 
 if TYPE_CHECKING:
     from warpbrain.physics.laws import Law
     from warpbrain.physics.laws.law import Coordinate
+
+
+def coordinates(law: str) -> tuple[Coordinate, ...]:
+    """Of a law by its name in `case.toml`, Ogden's of one term; `InputError` if none that has a prior is called so."""
+    from warpbrain.physics.laws import LAWS
+
+    known = {name: kind.coordinates for name, kind in LAWS.items() if kind.coordinates}
+    if law not in known:
+        raise InputError(f"law '{law}': expected one of {', '.join(known)}")
+    return known[law]
+
+
+def to_coordinates(law: Law) -> tuple[float, ...]:
+    """Coordinates of a law; `InputError` if it has none, or several terms."""
+    coordinates(law.name)
+    return math.log(law.shear_modulus), *law.shape
+
+
+def from_coordinates(law: str, values: Sequence[float]) -> Law:
+    """The law of its coordinates; `InputError` if there are not as many as it has, or there is no such law."""
+    from warpbrain.physics.laws import LAWS
+
+    known = coordinates(law)
+    if len(values) != len(known):
+        names = ", ".join(coordinate.name for coordinate in known)
+        raise InputError(f"{law}: found {len(values)} numbers, expected {len(known)}: {names}")
+    kind: Any = LAWS[law]
+    return kind.of_shear_modulus(math.exp(values[0]), *values[1:])
+
+
+def laws_from(names: Sequence[str], values: Sequence[float]) -> tuple[Law, ...]:
+    """Laws by their names, of the coordinates of all of them, one after the other."""
+    rest, laws = list(values), []
+    for name in names:
+        count = len(coordinates(name))
+        laws.append(from_coordinates(name, rest[:count]))
+        del rest[:count]
+    return tuple(laws)
 
 
 #: Smallest width of a kernel along a bounded coordinate, relative to the box: where all samples are on one side, their
@@ -206,23 +244,20 @@ class FoldedDensity:
         points = np.atleast_2d(np.asarray(at, dtype=np.float64))
         count, size = self.samples.shape
         centres = solve_triangular(self._factor, self.samples.T, lower=True).T
+        # the points and their mirror images in all sides; a kernel is narrow: images of images are of no weight
+        by_column = [
+            [column, *(2.0 * side - column for side in sides if np.isfinite(side))]
+            for column, *sides in zip(points.T, self.low, self.high, strict=True)
+        ]
         terms = []
-        for image in self._images(points):
-            away = solve_triangular(self._factor, image.T, lower=True).T
+        for image in product(*by_column):
+            away = solve_triangular(self._factor, np.stack(image), lower=True).T
             squares = np.sum(away**2, axis=1)[:, None] - 2.0 * away @ centres.T + np.sum(centres**2, axis=1)
             terms.append(logsumexp(-0.5 * squares, axis=1))
         density: Floats = logsumexp(terms, axis=0)
         density -= np.log(count) + 0.5 * size * np.log(2.0 * np.pi) + np.log(np.diag(self._factor)).sum()
         inside = np.all((points >= self.low) & (points <= self.high), axis=1)
         return np.where(inside, density, -np.inf)
-
-    def _images(self, points: Floats) -> list[Floats]:
-        """The points and their mirror images in all sides; a kernel is narrow, so images of images are of no weight."""
-        by_column = []
-        for column, low, high in zip(points.T, self.low, self.high, strict=True):
-            sides = [side for side in (low, high) if np.isfinite(side)]
-            by_column.append([column, *(2.0 * side - column for side in sides)])
-        return [np.stack(columns, axis=1) for columns in product(*by_column)]
 
     @cached_property
     def _factor(self) -> Floats:

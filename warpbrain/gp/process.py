@@ -5,14 +5,46 @@ A draw is drawn at anchors; elsewhere it is what follows from its values there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats
 from warpbrain.gp.literature.study import Study
+
+#: A kernel takes distances and a length scale, and returns values and derivatives by the logarithm of that.
+Kernel = Callable[[Floats, float], tuple[Floats, Floats]]
+
+
+def _matern(root: float, value: Callable[[Any], Any], slope: Callable[[Any], Any]) -> Kernel:
+    """Polynomials times `exp(-r)`, `r = root d / length`: of the value and of the derivative."""
+
+    def kernel(distance: Floats, length: float) -> tuple[Floats, Floats]:
+        r = root * distance / length
+        decay = np.exp(-r)
+        return value(r) * decay, slope(r) * decay
+
+    return kernel
+
+
+def squared_exponential(distance: Floats, length: float) -> tuple[Floats, Floats]:
+    """`exp(-r^2 / 2)`, `r = d / length`."""
+    r2 = (distance / length) ** 2
+    k = np.exp(-0.5 * r2)
+    return k, r2 * k
+
+
+#: Stationary kernels of unit variance over stretch by name; Matern 3/2 is the paper's.
+KERNELS: dict[str, Kernel] = {
+    "matern12": _matern(1.0, lambda _r: 1.0, lambda r: r),
+    "matern32": _matern(math.sqrt(3.0), lambda r: 1.0 + r, lambda r: r * r),
+    "matern52": _matern(math.sqrt(5.0), lambda r: 1.0 + r + r * r / 3.0, lambda r: r * r * (1.0 + r) / 3.0),
+    "squared-exponential": squared_exponential,
+}
+
 
 #: Added to the diagonal of the covariance of anchors, relative to its mean: they are dense enough for a smooth curve to
 #: be singular in double precision. A draw moves by its root, 1e-4 of a standard deviation.

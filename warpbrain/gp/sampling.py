@@ -1,22 +1,306 @@
-"""Laws that the literature makes likely: curves of a generative model, the laws fitted to them, and their moduli."""
+"""Laws that the literature makes likely: curves of a generative model, the laws fitted to them, and their moduli.
+
+A curve is a logarithm of energy. Least squares against it of a meta-model, a law of few parameters on the
+incompressible uniaxial path (supplement 2.2 and 2.3),
+
+    minimise 1/2 sum_i r_i^2,    r_i = ln(Psi(l_i) + d) - y_i,    dr_i/dtheta = dPsi/dtheta / (Psi + d)
+
+with `d` = 1e-3 Pa go over the boxes of the meta-model, in the logarithms of the parameters: they are positive or
+negative throughout a box, and of any order of magnitude. That changes the way, not the optimum.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
-from warpbrain.gp.literature.study import OFFSET, STRETCHES
-from warpbrain.gp.metamodels import METAMODELS, Fit, MetaModel, fit, unstable
+from warpbrain.gp.literature import forms
+from warpbrain.gp.literature.study import OFFSET, STRETCHES, invariant
 from warpbrain.gp.process import Process
 
 if TYPE_CHECKING:
     from warpbrain.physics.laws import Law
+
+#: How far exponents are searched: the paper's two settings.
+SEARCHES = ("low", "high")
+#: Largest `|alpha|` of the paper's searches; "high" has boxes to 5, 10, 20 and 50 there.
+_LIMITS = {"low": 5.0, "high": 50.0}
+#: Smallest `|alpha|` that is positive or negative: between them laws are unstable (-2 to 1, the paper allows 0.1).
+_POSITIVE, _NEGATIVE = 0.1, 2.1
+#: Relative change of cost and of parameters at which a search ends.
+_TOLERANCE = 1e-12
+#: Cosine between the residual and a direction, below which the cost is stationary in it (as MINPACK's `gtol`).
+_STATIONARY = 1e-4
+#: Residual [log units] that counts as none.
+_EXACT = 1e-9
+_EVALUATIONS = 500
+#: Stretches that a curve can have, and the largest modulus [Pa] that is tried: energies stay finite.
+_STRETCHES = (1e-3, 1e3)
+_LARGEST = 1e30
+
+Values = Sequence[float] | Floats
+
+
+@dataclass(frozen=True)
+class Box:
+    """Bounds of the parameters, each of one sign and infinite where there is none, and where a search starts."""
+
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    start: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class MetaModel:
+    """A law of few parameters on the incompressible uniaxial path `(l, l^-1/2, l^-1/2)` (supplement eq. (2)).
+
+    By itself one that is linear in its parameters, `Psi = sum_i values_i basis_i(l)`, all of them positive moduli.
+    """
+
+    name: str  # of its law, as in `warpbrain.physics.laws.LAWS`
+    parameter_names: tuple[str, ...]
+    units: tuple[str, ...]  # of the parameters: "Pa", or "" for a number without unit
+    basis: tuple[Callable[[Floats], Floats], ...] = ()
+    moduli: tuple[float, ...] = ()  # shear modulus at rest of each for a parameter of one
+    least: float = 0.1  # [Pa], of the parameters of a fit
+
+    def energy(self, stretches: Floats, values: Values) -> Floats:
+        """Strain energy `Psi` [Pa] at stretches `l` > 0 of shape (n,), good to all digits near `l = 1`; (n,)."""
+        return np.asarray(sum(value * psi(stretches) for value, psi in zip(values, self.basis, strict=True)))
+
+    def jacobian(self, stretches: Floats, values: Values) -> Floats:
+        """Its derivatives by the parameters, (n, p): the numerators of supplement eq. (3)."""
+        return np.stack([psi(stretches) for psi in self.basis], axis=1)
+
+    def boxes(self, search: str = "high") -> tuple[Box, ...]:
+        """Boxes whose best optimum is the fit, for one of `SEARCHES`."""
+        size = len(self.basis)
+        return (Box((self.least,) * size, (math.inf,) * size, (1000.0,) * size),)
+
+    def law(self, values: Values) -> Law:
+        """The law that a simulation takes; `InputError` if there is none, as with a modulus that is not positive."""
+        from warpbrain.physics.laws import LAWS
+
+        kind: Any = LAWS[self.name]
+        return kind(*map(float, values))
+
+    def shear_modulus(self, values: Values) -> float:
+        """Shear modulus at rest `mu0` [Pa]; `d2Psi/dl2 = 3 mu0` at `l = 1`."""
+        return sum(modulus * float(value) for modulus, value in zip(self.moduli, values, strict=True))
+
+
+class _Ogden(MetaModel):
+    """One term `Psi = mu/alpha (l^alpha + 2 l^(-alpha/2) - 3)`, `mu` and `alpha` of the same sign."""
+
+    def energy(self, stretches: Floats, values: Values) -> Floats:
+        mu, alpha = values
+        return mu / alpha * self._bracket(alpha * np.log(stretches))
+
+    def jacobian(self, stretches: Floats, values: Values) -> Floats:
+        mu, alpha = values
+        power = alpha * np.log(stretches)
+        bracket = self._bracket(power)
+        # d(l^alpha + 2 l^(-alpha/2))/dalpha = ln l (l^alpha - l^(-alpha/2))
+        by_alpha = mu / alpha**2 * (power * (np.expm1(power) - np.expm1(-0.5 * power)) - bracket)
+        return np.stack([bracket / alpha, by_alpha], axis=1)
+
+    @staticmethod
+    def _bracket(power: Floats) -> Floats:
+        """`e^x + 2 e^(-x/2) - 3`: with `q = e^(x/2)` it is `(q - 1)^2 (1 + 2/q)`, which has all its digits near 0."""
+        return np.expm1(0.5 * power) ** 2 * (1.0 + 2.0 * np.exp(-0.5 * power))
+
+    def boxes(self, search: str = "high") -> tuple[Box, ...]:
+        """Exponents of either sign, each searched from its smallest and from its largest.
+
+        "low" goes to 5 and -5, as the paper's two boxes. "high" goes to 50 and -50: the paper has boxes to 5, 10, 20
+        and 50 there, all with the start of the smallest exponent, and the last of them holds the others. A curve can
+        have two optima in positive exponents (Schiavone 2009: 0.1 and 12.2), and then all searches of the paper may end
+        in the worse one: in one of 300 curves, of which searches from both ends missed none.
+        """
+        limit = _LIMITS[search]
+        return (
+            *(Box((0.1, _POSITIVE), (math.inf, limit), (1000.0, alpha)) for alpha in (_POSITIVE, limit)),
+            *(Box((-math.inf, -limit), (-0.1, -_NEGATIVE), (-1000.0, -alpha)) for alpha in (_NEGATIVE, limit)),
+        )
+
+    def law(self, values: Values) -> Law:
+        from warpbrain.physics.laws import Ogden
+
+        mu, alpha = values
+        return Ogden((float(mu),), (float(alpha),))
+
+    def shear_modulus(self, values: Values) -> float:
+        mu, alpha = values
+        return 0.5 * float(mu) * float(alpha)
+
+
+#: Meta-models by the name of their law.
+METAMODELS: dict[str, MetaModel] = {
+    model.name: model
+    for model in (
+        MetaModel("neo-hookean", ("mu",), ("Pa",), (invariant,), (1.0,), least=1e-3),
+        MetaModel("mooney-rivlin", ("C1", "C2"), ("Pa", "Pa"), (forms.first, forms.second), (2.0, 2.0)),
+        _Ogden("ogden", ("mu", "alpha"), ("Pa", "")),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A meta-model that was fitted to a curve."""
+
+    model: MetaModel
+    values: tuple[float, ...]
+    cost: float  # half the sum of the squared residuals
+    points: int
+    converged: bool  # the search ended where the cost is stationary in all directions that the bounds leave open
+    message: str  # why it ended
+    evaluations: int  # of the energies, in all boxes together
+    at_bound: tuple[str, ...] = ()  # names of the parameters that lie at a bound
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residuals, in log units."""
+        return float(np.sqrt(2.0 * self.cost / self.points))
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus at rest `mu0` [Pa]."""
+        return self.model.shear_modulus(self.values)
+
+    def law(self) -> Law:
+        """The law that a simulation takes."""
+        return self.model.law(self.values)
+
+
+def fit(
+    model: MetaModel, stretches: ArrayLike, log_energy: ArrayLike, search: str = "high", offset: float = 1e-3
+) -> Fit:
+    """Fit a meta-model to a curve of stretches `l` (n,), in any order, and log energies `y` (n,): the best optimum in
+    all its boxes, `converged` False if no parameters come near to it.
+
+    `search` is one of `SEARCHES`, `offset` is `d` [Pa]. `InputError` if the arrays are not finite, of different lengths
+    or shorter than the parameters, a stretch is not between 1e-3 and 1e3, the offset is not positive, or the search is
+    unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> l = np.linspace(0.9, 1.1, 101)
+    >>> y = np.log(300.0 * (l**2 + 2.0 / l - 3.0) + 1e-3)
+    >>> round(fit(METAMODELS["neo-hookean"], l, y).shear_modulus, 6)
+    600.0
+    """
+    l, y = _curve(model, stretches, log_energy)
+    if search not in SEARCHES:
+        raise InputError(f"search = {search!r}: expected one of {', '.join(SEARCHES)}")
+    if not (np.isfinite(offset) and offset > 0.0):
+        raise InputError(f"offset = {offset:g} Pa: expected a positive number")
+    with np.errstate(over="ignore", invalid="ignore"):
+        fits = [_search(model, box, l, y, offset) for box in model.boxes(search)]
+    best = min(fits, key=attrgetter("cost"))
+    return replace(best, evaluations=sum(fitted.evaluations for fitted in fits))
+
+
+def _curve(model: MetaModel, stretches: ArrayLike, log_energy: ArrayLike) -> tuple[Floats, Floats]:
+    l, y = np.asarray(stretches, dtype=np.float64), np.asarray(log_energy, dtype=np.float64)
+    if l.ndim != 1 or l.shape != y.shape:
+        raise InputError(f"expected as many stretches as log energies, in a row: found shapes {l.shape} and {y.shape}")
+    if len(l) < len(model.parameter_names):
+        raise InputError(f"{len(l)} points: {model.name} needs at least {len(model.parameter_names)}")
+    low, high = _STRETCHES
+    for name, values, good, expected in (
+        ("stretch", l, (low <= l) & (l <= high), f"a number from {low:g} to {high:g}"),
+        ("log energy", y, np.isfinite(y), "a finite number"),
+    ):
+        if not good.all():
+            at = int(np.argmin(good))
+            raise InputError(f"{name} {at} is {values[at]:g}: expected {expected}")
+    return l, y
+
+
+def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> Fit:
+    """Search one box from its start."""
+    from scipy.optimize import least_squares
+
+    signs = np.sign(box.start)
+    nearest, farthest = np.sort(np.abs([box.lower, box.upper]), axis=0)
+    bounded = np.isfinite(farthest)
+
+    def residual(logs: Floats) -> Floats:
+        return np.log(model.energy(l, signs * np.exp(logs)) + offset) - y
+
+    def jacobian(logs: Floats) -> Floats:
+        values = signs * np.exp(logs)
+        return model.jacobian(l, values) * values / (model.energy(l, values) + offset)[:, None]
+
+    start = np.log(np.abs(box.start))
+    if not np.isfinite(np.sum(residual(start) ** 2)):
+        return Fit(model, box.start, np.inf, len(y), False, "the residuals are too large for a sum of squares", 1)
+    # the variant for which a bound can be reached in a step, so that parameters lie at it and not near it
+    result = least_squares(
+        residual,
+        start,
+        jacobian,
+        bounds=(np.log(nearest), np.log(np.where(bounded, farthest, _LARGEST))),
+        method="dogbox",
+        ftol=_TOLERANCE,
+        xtol=_TOLERANCE,
+        gtol=None,
+        max_nfev=_EVALUATIONS,
+    )
+    held = (result.active_mask < 0) | (result.active_mask > 0) & bounded
+    sizes = np.where(held, np.where(result.active_mask > 0, farthest, nearest), np.exp(result.x))
+    # the residual stands upright on every direction that is not held at a bound
+    least = max(_STATIONARY * float(np.linalg.norm(result.fun)), _EXACT * np.sqrt(len(y)))
+    upright = np.abs(result.fun @ result.jac) <= least * np.linalg.norm(result.jac, axis=0)
+    stationary = bool(np.all(upright | held))
+    return Fit(
+        model,
+        tuple(float(value) for value in signs * sizes),
+        float(result.cost),
+        len(y),
+        bool(result.success) and stationary,
+        result.message if stationary or not result.success else "ended where the cost still falls",
+        int(result.nfev),
+        tuple(name for name, at in zip(model.parameter_names, held, strict=True) if at),
+    )
+
+
+def unstable(fit: Fit, poisson: float = 0.45, formulation: str = "coupled") -> str:
+    """Why a fit cannot be computed with, by the supplement's Table 2: the message of `require_stable`, or of the law if
+    it is none; empty if it can.
+
+    `InputError` if the Poisson ratio at rest is outside (-1, 0.5) or the formulation is unknown.
+    """
+    try:
+        law = fit.law()
+    except InputError as error:
+        return str(error)
+    # the conditions are signs, and ratios to the shear modulus: all neo-Hookean laws are one
+    return _instability(law, poisson, formulation) if _instability(law.scaled_to(1.0), poisson, formulation) else ""
+
+
+@lru_cache(maxsize=64)
+def _instability(law: Law, poisson: float, formulation: str) -> str:
+    """The message of `require_stable`, kept for the last laws that were asked for; empty of a stable one."""
+    from warpbrain.physics.laws.stability import UnstableLawError, require_stable
+
+    try:
+        require_stable(law, poisson, formulation)
+    except UnstableLawError as error:
+        return str(error)
+    return ""
+
 
 #: Stretches of a curve that is fitted, as in the paper.
 POINTS = 101
@@ -59,7 +343,7 @@ def usual_stretches(group: str) -> Floats:
 def law_of_curve(model: Process, group: str, k: float = 0.0, law: str = "neo-hookean") -> Fit:
     """The law of the curve `k` standard deviations from the mean, as the paper samples.
 
-    Nothing is redrawn here: `warpbrain.gp.metamodels.unstable` says what the law is worth. `InputError` if the model
+    Nothing is redrawn here: `warpbrain.gp.sampling.unstable` says what the law is worth. `InputError` if the model
     has seen no study of the group, or there is no such law.
 
     Examples

@@ -22,15 +22,20 @@ import numpy as np
 
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
-from warpbrain.gp.coregionalised import Coregionalised, training_points
-from warpbrain.gp.hierarchical import Hierarchical
-from warpbrain.gp.hierarchy import EFFECTS, SAMPLE, Fitted, Hierarchy, fit_hierarchy, observations, sample_hierarchies
-from warpbrain.gp.kernels import KERNELS
-from warpbrain.gp.likelihood import TASKS, Parameters
+from warpbrain.gp.coregionalised import JITTER, TASKS, Coregionalised, Parameters, train, training_points
+from warpbrain.gp.hierarchy import (
+    EFFECTS,
+    SAMPLE,
+    Fitted,
+    Hierarchical,
+    Hierarchy,
+    fit_hierarchy,
+    observations,
+    sample_hierarchies,
+)
 from warpbrain.gp.literature.studies import VARIANTS, Variant, read_studies
 from warpbrain.gp.literature.study import GROUPS, Study
-from warpbrain.gp.process import Process
-from warpbrain.gp.training import JITTER, Climb, train
+from warpbrain.gp.process import KERNELS, Process
 from warpbrain.keys import finite
 
 Kind = Literal["hierarchical", "coregionalised"]
@@ -100,7 +105,12 @@ def read_model(folder: Path) -> Process:
         sample = table.get("sample")
         if not isinstance(sample, list) or not all(isinstance(drawn, dict) for drawn in sample):
             raise InputError(f"{path}: sample: expected tables of parameters")
-        best, *others = (_hierarchy(path, each, kernel) for each in (numbers, *sample))
+        best, *others = (
+            Hierarchy(
+                {name: _positive(path, each, name) for name in EFFECTS}, _positive(path, each, "length scale"), kernel
+            )
+            for each in (numbers, *sample)
+        )
         return Hierarchical(studies, best, variant, tuple(others))
     arrays = {name: _numbers(path, numbers, name) for name in ("w", "kappa", "noise")}
     try:
@@ -116,13 +126,13 @@ def fit_model(
     add: Path | None = None,
     *,
     climbs: int = 1,
-    progress: Callable[[float, str], None] = lambda part, said: None,
+    progress: Callable[[float, str], None] = lambda part, text: None,
 ) -> tuple[Process, dict[str, Any]]:
     """Fit a model to the literature and to the studies of a user's file (`warpbrain.gp.literature.studies`).
 
-    For `climbs` and `progress` see `warpbrain.gp.training.train`. Returns the model and, for `write_model` and for the
-    reader, a record: objective, convergence, restarts, conditioning and seconds. `InputError` if the file of studies is
-    wrong; `SolveError` if no covariance can be factored.
+    For `climbs` and `progress` see `warpbrain.gp.coregionalised.train`. Returns the model and, for `write_model` and
+    for the reader, a record: objective, convergence, restarts, conditioning and seconds. `InputError` if the file of
+    studies is wrong; `SolveError` if no covariance can be factored.
     """
     began = time.perf_counter()
     studies = read_studies(variant, add)
@@ -142,21 +152,15 @@ def fit_model(
             "means of replicates": data.size,
             "jitter": JITTER,
             "negative log likelihood": training.best.value,
-            "climbs": [_climb_table(climb) for climb in training.climbs],
+            "climbs": [climb.described() for climb in training.climbs],
             "starts": [
                 {"apart": None if start.apart is None else GROUPS[start.apart], "every": training.step}
-                | _climb_table(start.climb)
+                | start.climb.described()
                 for start in training.starts
             ],
         }
     record["seconds"] = time.perf_counter() - began
     return model, record
-
-
-def _climb_table(climb: Climb) -> dict[str, Any]:
-    table = asdict(climb)
-    del table["parameters"]
-    return table
 
 
 def fitted_hierarchical(
@@ -195,11 +199,6 @@ def write_model(folder: Path, model: Process, record: dict[str, Any], added: Pat
             path.write_text(text, encoding="utf-8")
     with whole_file(folder / MODEL) as path:
         path.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
-
-
-def _hierarchy(path: Path, numbers: dict[str, Any], kernel: str) -> Hierarchy:
-    spread = {name: _positive(path, numbers, name) for name in EFFECTS}
-    return Hierarchy(spread, _positive(path, numbers, "length scale"), kernel)
 
 
 def _described(hierarchy: Hierarchy) -> dict[str, Any]:

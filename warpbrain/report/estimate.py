@@ -11,8 +11,7 @@ import numpy as np
 
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.estimation.parameters import Parameter, Parameters
-from warpbrain.estimation.posterior import Marginal, Posterior
-from warpbrain.estimation.prediction import INTERVALS, OverallErrors, Prediction
+from warpbrain.estimation.posterior import INTERVALS, Marginal, OverallErrors, Posterior, Prediction
 from warpbrain.estimation.registration import registration_of
 from warpbrain.physics.words import tabled
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.estimation.posterior import Marginal, Posterior
-from warpbrain.estimation.prediction import Prediction
+from warpbrain.estimation.posterior import Marginal, Posterior, Prediction
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.estimate import recorded_points

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.gp.literature.study import ANATOMIES, METHODS, OFFSET, Study
+from warpbrain.gp.literature.study import ANATOMIES, METHODS, OFFSET, Study, invariant
 from warpbrain.gp.process import Process
-from warpbrain.gp.secant import invariant
 from warpbrain.report import views
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY, VERMILLION
 

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.gp.asymmetry import Asymmetry
-from warpbrain.gp.metamodels import Fit
-from warpbrain.gp.sampling import CURVES, DrawnLaws, Moduli, rejection_rate
+from warpbrain.gp.sampling import CURVES, DrawnLaws, Fit, Moduli, rejection_rate
 from warpbrain.report.files import write_csv
 from warpbrain.report.page import lines
 

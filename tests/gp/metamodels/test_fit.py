@@ -10,7 +10,7 @@ from scipy.optimize import least_squares, minimize_scalar
 
 from warpbrain.errors import InputError
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.gp.metamodels import METAMODELS, SEARCHES, fit
+from warpbrain.gp.sampling import METAMODELS, SEARCHES, fit
 from warpbrain.physics.laws import Ogden
 
 OFFSET = 1e-3

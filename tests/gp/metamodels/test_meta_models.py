@@ -6,7 +6,7 @@ import pytest
 
 from warpbrain.errors import InputError
 from warpbrain.gp.literature.forms import FORMS
-from warpbrain.gp.metamodels import METAMODELS, SEARCHES
+from warpbrain.gp.sampling import METAMODELS, SEARCHES
 from warpbrain.physics.laws import LAWS
 
 #: Values of each meta-model, both signs and the ends of the boxes among them.

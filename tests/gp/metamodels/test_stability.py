@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpbrain.errors import InputError
-from warpbrain.gp.metamodels import METAMODELS, Fit, fit, unstable
+from warpbrain.gp.sampling import METAMODELS, Fit, fit, unstable
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from slow_block import CAUSES, write_slow
 
-from warpbrain.estimation.prior import declared
+from warpbrain.estimation.parameters import declared
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
 from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.effects import Effects

@@ -98,8 +98,8 @@ def _read(path: Path, variant: Variant, shipped: Iterable[Study] = ()) -> tuple[
         entry = _Entry(path, index, table, unit, problems)
         if isinstance(name := table.get("name"), str):
             if name in owners:
-                found = f"found '{name}', which is the name of {owners[name]} already"
-                entry.problem("name", found, "give it another name")
+                fault = f"found '{name}', which is the name of {owners[name]} already"
+                entry.problem("name", fault, "give it another name")
             owners.setdefault(name, entry.where)
         if variant == "corrected":
             entry.correct()
@@ -131,8 +131,8 @@ def _read_tables(path: Path, problems: Problems) -> tuple[list[dict[str, Any]], 
     if isinstance(entries, dict):
         problems.add(path, "study", "found one table, expected a list of them", "write [[study]] with two brackets")
     elif not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
-        found = "found none" if entries is None else f"found {short(entries)}"
-        problems.add(path, "study", f"{found}, expected at least one table [[study]]")
+        fault = "found none" if entries is None else f"found {short(entries)}"
+        problems.add(path, "study", f"{fault}, expected at least one table [[study]]")
     else:
         return entries, UNITS[units]
     return [], 1.0
@@ -277,8 +277,8 @@ class _Entry:
             numbers[name] = scaled if key.several else scaled[0]
         lengths = {name: len(value) for name, value in numbers.items() if isinstance(value, tuple)}
         if len(set(lengths.values())) > 1:
-            found = " and ".join(f"{length} of {name}" for name, length in lengths.items())
-            self.problem(side + ", ".join(lengths), f"found {found}, expected as many", "one of each for every term")
+            counts = " and ".join(f"{length} of {name}" for name, length in lengths.items())
+            self.problem(side + ", ".join(lengths), f"found {counts}, expected as many", "one of each for every term")
             return None
         return convention.convert(**numbers)
 
@@ -306,14 +306,14 @@ class _Entry:
             return
         if not (energies > 0.0).all():
             worst = int(np.argmin(energies))
-            found = f"the energy is {energies[worst]:.3g} Pa at the stretch {stretches[worst]:.3g}, expected above 0"
-            self.problem("", f"{found} everywhere but at 1", "is a sign, or the convention, another one?")
+            fault = f"the energy is {energies[worst]:.3g} Pa at the stretch {stretches[worst]:.3g}, expected above 0"
+            self.problem("", f"{fault} everywhere but at 1", "is a sign, or the convention, another one?")
             return
         for modulus in set(study.shear_moduli):
             if not MODULI[0] <= modulus <= MODULI[1]:
-                found = f"the shear modulus at rest is {modulus:.3g} Pa, expected {MODULI[0]:g} to {MODULI[1]:g} Pa"
+                fault = f"the shear modulus at rest is {modulus:.3g} Pa, expected {MODULI[0]:g} to {MODULI[1]:g} Pa"
                 cure = 'write units = "kPa" at the top of the file if that is meant' if modulus < MODULI[0] else ""
-                self.problem("", found, cure)
+                self.problem("", fault, cure)
 
 
 def nearest(name: Any, names: Iterable[str]) -> str:

@@ -16,8 +16,7 @@ import numpy as np
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.options import Listener
-from warpbrain.estimation.parameters import Gaussian
-from warpbrain.estimation.prior import declared, tissue_prior
+from warpbrain.estimation.parameters import Gaussian, declared, tissue_prior
 from warpbrain.estimation.registration import registration_of
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
