@@ -208,7 +208,7 @@ def _what_else(
     from warpbrain.diagnosis.locating import map_of_search
     from warpbrain.estimation.options import Listener
     from warpbrain.worlds.body.averaged_tissue import averaged_tissue
-    from warpbrain.worlds.body.screened import screened
+    from warpbrain.worlds.body.hypotheses import screened
     from warpbrain.worlds.options import DiagnosisOptions
 
     prior, mesh_error = posterior.best.problem.mode.gaussian, posterior.options.discretisation is not None

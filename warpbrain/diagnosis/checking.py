@@ -11,14 +11,14 @@ import numpy as np
 from warpbrain.arrays import Floats, Ints
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
-from warpbrain.diagnosis.held_out import distance
+from warpbrain.diagnosis.confirming import distance
 from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.fit_columns import with_laws_about
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
+from warpbrain.worlds.body.nuisances import RigidMotion
 from warpbrain.worlds.body.refit import Refit
-from warpbrain.worlds.body.rigid_motion import RigidMotion
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState, States
 from warpbrain.worlds.body.time_courses import finite_times

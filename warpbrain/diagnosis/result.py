@@ -10,12 +10,10 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.locating import ScoreMap
+from warpbrain.diagnosis.locating import ScoreMap, Traits
 from warpbrain.diagnosis.onset import Onset
-from warpbrain.diagnosis.traits import Traits
 from warpbrain.inference import Kind
-from warpbrain.inference.confirm import Confirmation
-from warpbrain.inference.decide import Decision
+from warpbrain.inference.decide import Confirmation, Decision
 from warpbrain.inference.predict import Prediction
 from warpbrain.physics.words import Measurement, Smallest, Value
 from warpbrain.shown import Shown

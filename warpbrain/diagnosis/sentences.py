@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.traits import Traits
+from warpbrain.diagnosis.locating import Traits
 from warpbrain.inference.beliefs import belief
+from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import UNKNOWN
-from warpbrain.inference.probability import percent
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import size_in_words
 from warpbrain.physics.words import length, measured, number, place

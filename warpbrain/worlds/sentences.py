@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from warpbrain.inference.beliefs import belief
+from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN, Decision
-from warpbrain.inference.probability import percent
 from warpbrain.physics.sizes import smallest_in_words
 from warpbrain.physics.words import Smallest
 

@@ -8,8 +8,7 @@ from sinking_block import OPTIONS, write_sinking
 
 from warpbrain.inference.causes import Kind
 from warpbrain.worlds.body.averaged_tissue import AveragedTissue, averaged_tissue
-from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.screened import screened
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,7 @@ import pytest
 from rods import ROD, cycle, noisy, rod_test, viscous
 from testing_machine import case_of
 
-from warpbrain.inference.confirm import Confirmation, after_checks
-from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
+from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Confirmation, Decision, after_checks
 from warpbrain.physics.words import Value
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import CheckResults, Folds, folds_of, grown_errors, held_out

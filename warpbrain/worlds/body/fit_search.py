@@ -22,15 +22,13 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
-from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
-from warpbrain.worlds.body.mesh_share import MeshShare, mesh_share_of
-from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH
-from warpbrain.worlds.body.refit import Refit
-from warpbrain.worlds.body.rigid_motion import RigidMotion
+from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion
+from warpbrain.worlds.body.refit import MeshShare, Refit, mesh_share_of
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
+from warpbrain.worlds.body.weighted_set import evidence_of
 
 _ITERATIONS, _HALVINGS = 20, 6
 #: How far [standard deviations] coordinates go until columns are made anew.

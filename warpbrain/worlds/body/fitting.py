@@ -15,8 +15,7 @@ from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.fit_search import FitSearch
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors
-from warpbrain.worlds.body.mesh_share import excess_error
-from warpbrain.worlds.body.refit import Refit
+from warpbrain.worlds.body.refit import Refit, excess_error
 from warpbrain.worlds.body.states import SolvedState
 
 #: How often at most a fit is repeated with the error of the mesh, or the gross errors and the noise, of its result.

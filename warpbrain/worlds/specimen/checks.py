@@ -14,7 +14,7 @@ from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause, Kind, Place
-from warpbrain.inference.confirm import Confirmation
+from warpbrain.inference.decide import Confirmation
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.predict import Prediction, p_value, predictive_p
 from warpbrain.physics.words import pascals

@@ -11,8 +11,16 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.confirm import after_checks, if_significant
-from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
+from warpbrain.inference.decide import (
+    NAMED,
+    NAMED_AND_REST,
+    NOTHING,
+    UNKNOWN,
+    Decision,
+    after_checks,
+    decide,
+    if_significant,
+)
 from warpbrain.physics.words import Measurement
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.seconds import Seconds

@@ -31,8 +31,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import NotTestableError
 from warpbrain.physics.words import Value
 from warpbrain.simulation.specimen import specimen_of
-from warpbrain.worlds.specimen.noise import smooth_patterns
-from warpbrain.worlds.specimen.protocol import Chain, Protocol
+from warpbrain.worlds.specimen.protocol import Chain, Protocol, smooth_patterns
 
 if TYPE_CHECKING:
     from warpbrain.worlds.specimen.forward import Forward

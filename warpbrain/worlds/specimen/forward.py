@@ -25,8 +25,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.worlds.specimen.effects import Action, Effect, Variant, excess_rows, invariant_rows, specimen_rows
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.material import HomogeneousMaterial
-from warpbrain.worlds.specimen.noise import noise_factor
-from warpbrain.worlds.specimen.protocol import Protocol
+from warpbrain.worlds.specimen.protocol import Protocol, noise_factor
 
 #: Step of differences, in standard deviations; responses that are kept.
 _STEP, _REMEMBERED = 1e-3, 500

@@ -9,8 +9,7 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.physics.words import Measurement, Smallest, Value
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
-from warpbrain.worlds.specimen.noise import noise_factor
-from warpbrain.worlds.specimen.protocol import REST, Protocol, Test
+from warpbrain.worlds.specimen.protocol import REST, Protocol, Test, noise_factor
 from warpbrain.worlds.specimen.result import Segment
 from warpbrain.worlds.specimen.search import Linear
 

@@ -9,8 +9,7 @@ from functools import cached_property
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.causes import Kind
-from warpbrain.inference.confirm import Confirmation
-from warpbrain.inference.decide import Decision
+from warpbrain.inference.decide import Confirmation, Decision
 from warpbrain.physics.words import Measurement, Smallest, Value
 from warpbrain.shown import Shown
 from warpbrain.worlds.specimen.protocol import Protocol

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpbrain.inference.beliefs import belief
+from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import UNKNOWN
-from warpbrain.inference.probability import percent
 from warpbrain.physics.sizes import size_in_words
 from warpbrain.physics.words import pascals
 from warpbrain.simulation.specimen import specimen_of
