@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from warpbrain.diagnosis.locating import Traits, traits_of
-from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.diagnosis.sentences import traits_in_words
+from warpbrain.diagnosis.result import Diagnosis, traits_in_words
 from warpbrain.inference import GaussianModel
 from warpbrain.worlds.body.unknown import body_forces, force_patches
 

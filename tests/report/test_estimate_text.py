@@ -9,7 +9,7 @@ from warpbrain.inference.calibration import percent
 from warpbrain.inference.causes import Kind
 from warpbrain.report.estimate import averaged_row, describe_nothing_else
 from warpbrain.report.page import lines
-from warpbrain.worlds.body.averaged_tissue import AveragedTissue, LikelyCause
+from warpbrain.worlds.body.uncertainty import AveragedTissue, LikelyCause
 
 
 def averaged(nothing: float) -> AveragedTissue:

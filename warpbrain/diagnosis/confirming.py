@@ -103,17 +103,6 @@ class HeldOut:
             chosen.append(sizes[size] * patterns[int(blocks.place[place])])
         return predict_with(without, residual, self.blocks, chosen)
 
-    def ceiling(self, model: GaussianModel, residual: Floats, fields: Sequence[Floats]) -> float:
-        """Least held-out error [m] with any of some fields, (n, k) as large as the noise, of any size."""
-        column_sets = [size * columns for columns in fields for size in beliefs("unknown.sizes")]
-        predictions = predict_with(model, residual, self.blocks, column_sets)
-        return self.error(max(predictions, key=lambda prediction: prediction.log_density))
-
-
-def tries_of(places: int) -> int:
-    """How many patterns a scan of so many places is worth, which are far from independent of each other."""
-    return int(min(places, belief("checks.tries")))
-
 
 class Confirming:
     """Checks the sets of one search.
@@ -195,7 +184,7 @@ class Confirming:
         effect = weighted_set.effects[weighted_set.mechanisms.index(name)]
         held_out = self._held_out[effect.proposed.centre is not None]
         full, reduced = self.predict(weighted_set, held_out), self.predict(others, held_out)
-        patterns = self._patterns(others, held_out, effect.columns.shape[1], len(self.search.causes.named(name).places))
+        patterns = self._patterns(others, held_out, effect.columns.shape[1], (name,))
         return Confirmation(
             name,
             weighted_set.hypothesis.log_evidence - others.hypothesis.log_evidence,
@@ -204,9 +193,14 @@ class Confirming:
             p_value(full.log_density, [pattern.log_density for pattern in patterns]),
         )
 
-    def _patterns(self, others: WeightedSet, held_out: HeldOut, freedom: int, places: int) -> tuple[Prediction, ...]:
+    def _patterns(
+        self, others: WeightedSet, held_out: HeldOut, freedom: int, names: Sequence[str]
+    ) -> tuple[Prediction, ...]:
+        # places of a scan are far from independent of each other
+        places = max(len(self.search.causes.named(name).places) for name in names)
+        tries = int(min(places, belief("checks.tries")))
         model = others.marginal.model
-        return held_out.with_patterns(model, others.residual, self.modes, freedom, tries_of(places), self._random)
+        return held_out.with_patterns(model, others.residual, self.modes, freedom, tries, self._random)
 
     def improvement(
         self, nothing: WeightedSet, weighted_set: WeightedSet
@@ -217,13 +211,14 @@ class Confirming:
         interval.
         """
         held_out = self.held_out_for(weighted_set)
-        places = max(len(self.search.causes.named(name).places) for name in weighted_set.mechanisms)
-        patterns = self._patterns(nothing, held_out, width_of(weighted_set.effects), places)
+        patterns = self._patterns(nothing, held_out, width_of(weighted_set.effects), weighted_set.mechanisms)
         low, high = np.quantile([held_out.error(pattern) for pattern in patterns], [0.05, 0.95]).tolist()
         without, explained = self.predict(nothing, held_out), self.predict(weighted_set, held_out)
         return (low, high), held_out.improvement(explained, without, self._random)
 
     def ceiling(self, nothing: WeightedSet, held_out: HeldOut) -> float:
-        """Least held-out error [m] with an unknown field."""
-        fields = [self.search.base.typical_noise * columns for columns in self.search.base.unknown.values()]
-        return held_out.ceiling(nothing.marginal.model, nothing.residual, fields)
+        """Least held-out error [m] with an unknown field of any size."""
+        base, sizes = self.search.base, beliefs("unknown.sizes")
+        column_sets = [size * base.typical_noise * columns for columns in base.unknown.values() for size in sizes]
+        predictions = predict_with(nothing.marginal.model, nothing.residual, held_out.blocks, column_sets)
+        return held_out.error(max(predictions, key=lambda prediction: prediction.log_density))

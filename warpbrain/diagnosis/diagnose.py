@@ -14,8 +14,7 @@ from warpbrain.diagnosis.locating import ScoreMap, Traits, map_of_search, traits
 from warpbrain.diagnosis.measuring import imitations, next_measurements, smallest
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time
 from warpbrain.diagnosis.ranking import Ranking, about_base
-from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked
-from warpbrain.diagnosis.sentences import assumptions_of
+from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked, assumptions_of
 from warpbrain.errors import require_kind
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief

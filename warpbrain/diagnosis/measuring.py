@@ -29,6 +29,12 @@ from warpbrain.worlds.body.parameters import smallest_of
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
+#: Points of a further recording.
+_POINTS = 25
+#: By how much the head is turned for another one [degrees], and about which axes of the body.
+_TURN = 30.0
+_AXES = ("left-right", "front-back", "head-foot")
+
 
 def imitations(causes: BodyCauses, model: GaussianModel) -> Confusion:
     """Part of each mechanism, at its median detectability, that the best place of each other cause explains."""
@@ -89,13 +95,6 @@ def _orthonormal(model: GaussianModel, columns: Floats) -> Floats:
     """Orthonormal basis (n, k) of the span of columns, standardised."""
     vectors, sizes, _ = np.linalg.svd(model.standardised(columns), full_matrices=False)
     return np.asarray(vectors[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)])
-
-
-#: Points of a further recording.
-_POINTS = 25
-#: By how much the head is turned for another one [degrees], and about which axes of the body.
-_TURN = 30.0
-_AXES = ("left-right", "front-back", "head-foot")
 
 
 def next_measurements(

@@ -8,7 +8,7 @@ import pytest
 from sinking_block import OPTIONS, write_sinking
 
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.fit_search import FitSearch
+from warpbrain.worlds.body.fitting import FitSearch
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 

@@ -29,7 +29,7 @@ from warpbrain.worlds.body.effects import Effects, SolvedSwitches
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
-from warpbrain.worlds.body.sensors import Sensors, noise_of, rows_of_points, tracked_points
+from warpbrain.worlds.body.sensors import Sensors, noise_of, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
 from warpbrain.worlds.body.unknown import body_forces, fields
 
@@ -233,7 +233,7 @@ class _LinearModel:
         self.noise = noise_of(sensors, self.residual, self.nuisances.columns, smooth)
         self.noise_factor = noise_factor(sensors.noise_covariance(self.noise), self.noise)
         self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
-        self.points = tuple(rows for group in rows_of_points(sensors) for rows in group)
+        self.points = sensors.points
 
     def _residual_at_mean(self, state: SolvedState) -> Floats:
         """Residual of the linear model about a state with its tissue, field and motion at their prior mean."""

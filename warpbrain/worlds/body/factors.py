@@ -22,6 +22,8 @@ from warpbrain.simulation.sparse_factors import SparseFactors
 
 #: Matrices of the size of the dense one for which there has to be memory, and columns that are solved together.
 _MATRICES, _TOGETHER_ON_GPU = 3, 2048
+#: Columns that are solved together.
+_TOGETHER = 256
 
 
 class DenseFactors:
@@ -94,10 +96,6 @@ def _on_gpu(columns: Any) -> Any:
     if issparse(columns):
         return csc_matrix(columns.tocsc().astype(np.float64)).toarray(order="F")
     return cupy.asarray(columns, dtype=np.float64, order="F")
-
-
-#: Columns that are solved together.
-_TOGETHER = 256
 
 
 class Factors:

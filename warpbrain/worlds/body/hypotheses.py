@@ -30,11 +30,10 @@ from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads, one_thread_of_blas
 from warpbrain.worlds.body.base import Base, BaseFinder
-from warpbrain.worlds.body.causes import causes_of, visible
+from warpbrain.worlds.body.causes import causes_of, not_physics_at, visible
 from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit, candidates_at, dictionary_of
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
-from warpbrain.worlds.body.not_physics import not_physics_at
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.placing import moved_about_fit, weigh, with_refined_places
 from warpbrain.worlds.body.refit import Refit

@@ -134,9 +134,11 @@ class Linearisation:
         free = ~system.model.constrained.ravel()
         #: `K` [N/m] on every component, SciPy CSR (3 N, 3 N).
         self.stiffness: Any = K
-        self._free, self._held_free = free, K[~free][:, free]
+        #: Components (3 N,) that nothing holds.
+        self.free: Bools = free
+        self._held_free = K[~free][:, free]
         # Cholesky factors on a GPU need a symmetric matrix
-        self._factors = Factors(K[free][:, free], system.device if skew is None else None, symmetric=skew is None)
+        self.factors = Factors(K[free][:, free], system.device if skew is None else None, symmetric=skew is None)
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:
         """The same state with other sensors, without factorising again."""
@@ -156,7 +158,7 @@ class Linearisation:
     @cached_property
     def _rows(self) -> tuple[Floats, NDArray[np.intp]]:
         """Distinct rows of `A`, and the number of its row for each sensor (n,): several times share one row."""
-        free, sensors = self._free, self.sensors
+        free, sensors = self.free, self.sensors
         by_R = sensors.by_reactions[:, ~free]
         moved = (sensors.by_displacement[:, free] + by_R @ self._held_free).tocsr()
         held = -np.asarray(by_R.todense())
@@ -165,7 +167,7 @@ class Linearisation:
         _, different, which = np.unique(mark, return_index=True, return_inverse=True)
         # Fortran order: products with sparse forces then need no copy
         A = np.empty((len(different), len(free)), order="F")
-        A[:, free] = self._factors.solve(moved[different].T, transposed=True).T
+        A[:, free] = self.factors.solve(moved[different].T, transposed=True).T
         A[:, ~free] = held[different]
         return A, which.ravel()
 
@@ -188,27 +190,15 @@ class Linearisation:
         """A held surface with the responses of the sensors to it, made once."""
         if key not in self._surfaces:
             mesh = self.system.model.mesh
-            self._surfaces[key] = HeldSurface(
-                self.stiffness,
-                self._free,
-                self._factors,
-                held,
-                vertex_normals(mesh),
-                self.reactions,
-                extent(mesh.points),
-            )
+            self._surfaces[key] = HeldSurface(self, held, vertex_normals(mesh), extent(mesh.points))
         if key not in self._surface_responses:
-            sensors = self.sensors
-            answers = self._surfaces[key].answers(
-                self.stiffness, self._free, self.compliance, sensors.by_displacement, sensors.by_reactions
-            )
             # Fortran order: of each patch a few columns are used
-            self._surface_responses[key] = np.asfortranarray(answers)
+            self._surface_responses[key] = np.asfortranarray(self._surfaces[key].answers(self))
         return self._surfaces[key]
 
     def answers(self, forces: Floats) -> Floats:
         """Response (n, ...) of the sensors to nodal forces (..., N, 3) [N]."""
-        flat = np.asarray(forces).reshape(-1, len(self._free))
+        flat = np.asarray(forces).reshape(-1, len(self.free))
         return self.answers_of_columns(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
 
     def answers_of_patches(self, weights: Floats) -> Floats:
@@ -241,13 +231,13 @@ class Linearisation:
             return answers[which]
         forces = forces.toarray() if issparse(forces) else forces
         du = self.displacements(forces)
-        dR = np.where(self._free[:, None], 0.0, self.stiffness @ du - forces)
+        dR = np.where(self.free[:, None], 0.0, self.stiffness @ du - forces)
         return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
 
     def displacements(self, forces: Floats) -> Floats:
         """Of all components (3 N, k) [m] under nodal forces (3 N, k) [N]."""
         du = np.zeros(forces.shape)
-        du[self._free] = self._factors.solve(forces[self._free])
+        du[self.free] = self.factors.solve(forces[self.free])
         return du
 
     def toward_equilibrium(self, system: System, external: Floats, start: Floats, tolerance: float) -> Floats:
@@ -255,7 +245,7 @@ class Linearisation:
 
         See `warpbrain.simulation.multisecant`; the start itself where other nodes are held.
         """
-        if not np.array_equal(system.model.constrained.ravel(), ~self._free):
+        if not np.array_equal(system.model.constrained.ravel(), ~self.free):
             return start
         solve = self.displacements
         return toward_equilibrium(system, external, start, lambda r: solve(r.reshape(-1, 1)).reshape(-1, 3), tolerance)

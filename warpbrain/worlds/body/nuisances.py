@@ -143,21 +143,20 @@ def nuisances_at(
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
     """What one standard deviation of each parameter of the tissues changes of what is recorded: (n, p)."""
-    return at.summed(lambda state: _tissue_columns(state, states, theta, prior))
 
+    def about(state: Linearisation) -> Floats:
+        system = state.system
+        forces = np.zeros((len(theta), system.size, 3))
+        for k in range(len(theta)):
+            for sign in (-1.0, 1.0):
+                shifted = theta.copy()
+                shifted[k] += sign * _STEP
+                system.set_model(system.model.with_materials(states.parameters.materials(shifted)))
+                forces[k] -= sign * state.internal_forces() / (2.0 * _STEP)
+        system.set_model(system.model.with_materials(states.parameters.materials(theta)))
+        return state.answers(forces) @ prior.factor
 
-def _tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
-    """The same about one state."""
-    system = at.system
-    forces = np.zeros((len(theta), system.size, 3))
-    for k in range(len(theta)):
-        for sign in (-1.0, 1.0):
-            shifted = theta.copy()
-            shifted[k] += sign * _STEP
-            system.set_model(system.model.with_materials(states.parameters.materials(shifted)))
-            forces[k] -= sign * at.internal_forces() / (2.0 * _STEP)
-    system.set_model(system.model.with_materials(states.parameters.materials(theta)))
-    return at.answers(forces) @ prior.factor
+    return at.summed(about)
 
 
 def field_columns(at: Linearisation, states: States) -> Floats:
@@ -167,7 +166,14 @@ def field_columns(at: Linearisation, states: States) -> Floats:
 
 def law_columns(effects: Effects, states: States) -> Floats:
     """What another Poisson ratio, exponent, share of the second invariant and stiffening change: (n, 4)."""
-    proposals = [other_volume(states), *_other_shape(states)]
+    proposals = [
+        other_volume(states),
+        _always(states, "tissue.exponent"),
+        Proposal.of_one(
+            lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
+        ),
+        Proposal.of_one(lambda share: _Stiffening(share=share), 0.5, belief("tissue.stiffening"), "smooth", 0.5),
+    ]
     return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
 
 
@@ -219,32 +225,21 @@ class _Stiffening(Mechanism):
         return Ogden(moduli, exponents), poisson, formulation
 
 
-def _other_shape(states: States) -> list[Proposal]:
-    return [
-        _always(states, "tissue.exponent"),
-        Proposal.of_one(
-            lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
-        ),
-        Proposal.of_one(lambda share: _Stiffening(share=share), 0.5, belief("tissue.stiffening"), "smooth", 0.5),
-    ]
-
-
 def _known_loads(at: Linearisation) -> Floats:
     """All known loads larger or smaller by one factor, and all prescribed displacements."""
-    columns = at.summed(_known_loads_at)
+
+    def about(state: Linearisation) -> Floats:
+        model = state.system.model
+        columns = np.zeros((len(state.sensors), 2))
+        columns[:, 0] = state.answers(model.external_forces())
+        if model.prescribed.any():
+            forces = (state.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
+            direct = state.sensors.answer(model.prescribed, np.where(model.constrained, forces, 0.0))
+            columns[:, 1] = direct + state.answers(np.where(model.constrained, 0.0, -forces))
+        return belief("loads.size") * columns
+
+    columns = at.summed(about)
     return columns[:, columns.any(axis=0)]
-
-
-def _known_loads_at(at: Linearisation) -> Floats:
-    """The same about one state: (n, 2)."""
-    model = at.system.model
-    columns = [belief("loads.size") * at.answers(model.external_forces()[None]), np.zeros((len(at.sensors), 1))]
-    if model.prescribed.any():
-        forces = (at.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
-        direct = at.sensors.answer(model.prescribed, np.where(model.constrained, forces, 0.0))
-        answer = direct + at.answers(np.where(model.constrained, 0.0, -forces)[None])[:, 0]
-        columns[1] = belief("loads.size") * answer[:, None]
-    return np.concatenate(columns, axis=1)
 
 
 def _displacement(at: Linearisation) -> Floats:

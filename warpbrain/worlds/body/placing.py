@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,21 +36,18 @@ from warpbrain.worlds.body.weighted_set import WeightedSet, evidence_of
 
 #: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
 _RADII = (0.8, 1.0, 1.25)
-
-
-@dataclass(frozen=True, eq=False)
-class BestInCell:
-    """The best effect of a cell."""
-
-    effect: Effect
-    gain: float  # by how much [nats] the mean of the cell is more probable than its middle
-    log_share: float  # log of the part of the best place in that mean
+#: How often places are looked at anew, how far they are apart in spacings of a scan, and by how much [nats] the linear
+#: model must say that others are better.
+_MOVES, _MOVE, _BETTER = 3, 0.25, 1.0
 
 
 def best_in_cell(
     base: Base, effects: Effects, effect: Effect, size: float, spacing: float, without: GaussianModel, residual: Floats
-) -> BestInCell:
-    """Scan the cell of an effect.
+) -> tuple[Effect, float, float]:
+    """The best effect of the cell of another one.
+
+    And by how much [nats] the mean of the cell is more probable than its middle, and the log of the part of the best
+    place in that mean.
 
     Each place has gross errors of its own: points that a local effect moves far are sound in the right place alone.
 
@@ -77,7 +74,7 @@ def best_in_cell(
     if not effect.proposed.on_surface:
         tried, logs = logs_of(_around(base, best.proposed, 0.25 * spacing))
         best = tried[int(np.argmax(logs))]
-    return BestInCell(best, gain, log_share)
+    return best, gain, log_share
 
 
 def _effects_of(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect]:
@@ -242,26 +239,21 @@ def with_refined_places(
         # what lets go has its columns at the base; centres are as far apart as those of a scan's patches
         at_base = effect.proposed.is_there_or_not
         apart, about = (BETWEEN * base.at.sensors.radius, base.effects) if at_base else (spacing, source)
-        best = best_in_cell(base, about, effect, size, apart, without, residual)
+        best, gain, log_share = best_in_cell(base, about, effect, size, apart, without, residual)
         columns = candidate.columns.copy()
-        columns[:, part] = best.effect.columns
-        residual = residual - best.effect.mean
+        columns[:, part] = best.columns
+        residual = residual - best.mean
         columns, refined = evidence_of(base, columns, residual, candidate.marginal.scale)
-        effects[number] = best.effect
+        effects[number] = best
         candidate = replace(
             candidate,
             effects=tuple(effects),
             residual=residual,
             columns=columns,
             marginal=refined,
-            log_share=candidate.log_share + best.log_share,
-        ).with_evidence(candidate.hypothesis.log_evidence + best.gain)
+            log_share=candidate.log_share + log_share,
+        ).with_evidence(candidate.hypothesis.log_evidence + gain)
     return replace(candidate, refined=True)
-
-
-#: How often places are looked at anew, how far they are apart in spacings of a scan, and by how much [nats] the linear
-#: model must say that others are better.
-_MOVES, _MOVE, _BETTER = 3, 0.25, 1.0
 
 
 def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:

@@ -16,7 +16,7 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.parameters import Gaussian
-from warpbrain.inference.marginal import Marginal
+from warpbrain.inference.gross_errors import Marginal
 from warpbrain.worlds.body.effects import Effect, column_slices
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
 from warpbrain.worlds.body.states import SolvedState

@@ -11,14 +11,16 @@ lift off also leave the wall where they are under tension, by an active set (Wri
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
 from warpbrain.mesh import tangents
-from warpbrain.worlds.body.factors import Factors
+
+if TYPE_CHECKING:
+    from warpbrain.worlds.body.linearisation import Linearisation
 
 #: Changes of the active set at most.
 _CHANGES = 20
@@ -29,53 +31,37 @@ _FARTHEST = 0.2
 class HeldSurface:
     """A set of held nodes at a state.
 
-    `stiffness` SciPy CSR (3 N, 3 N): `K` [N/m]. `free` (3 N,): components that nothing holds. `factors`: of the free
-    part of `K`. `members` (N,): nodes, all of whose components are held. `normals`, `reactions` (N, 3): outward, and
-    what the nodes are held with [N]. `size`: of the body [m].
+    `at`: about that. `members` (N,): nodes, all of whose components are held. `normals` (N, 3): outward. `size`: of the
+    body [m].
     """
 
-    def __init__(
-        self,
-        stiffness: Any,
-        free: Bools,
-        factors: Factors,
-        members: Bools,
-        normals: Floats,
-        reactions: Floats,
-        size: float,
-    ) -> None:
+    def __init__(self, at: Linearisation, members: Bools, normals: Floats, size: float) -> None:
+        stiffness, free = at.stiffness, at.free
         self.members = np.flatnonzero(members)
         self._farthest = _FARTHEST * size
         count = len(self.members)
         components = np.repeat(members, 3)
         coupling = stiffness[free][:, components].tocsc()
         condensed = np.asarray(stiffness[components][:, components].todense())
-        condensed -= factors.between(stiffness[components][:, free], coupling)
+        condensed -= at.factors.between(stiffness[components][:, free], coupling)
         self._coupling = coupling
         # two tangents and the normal
         tangent_vectors = tangents(normals[self.members])
         self._frames = np.concatenate([tangent_vectors, normals[self.members][:, None]], axis=1)
         rotated = np.einsum("aki,aibj,blj->akbl", self._frames, condensed.reshape(count, 3, count, 3), self._frames)
         self._S = rotated.reshape(3 * count, 3 * count)
-        self._R = np.einsum("aki,ai->ak", self._frames, reactions[self.members])
+        self._R = np.einsum("aki,ai->ak", self._frames, at.reactions[self.members])
         self._released: dict[tuple[bytes, bool], Floats] = {}
 
-    def answers(
-        self, stiffness: Any, free: Bools, compliance: Floats, by_displacement: Any, by_reactions: Any
-    ) -> Floats:
-        """What sensors (n,) record where each component of `moved` is 1 m: (n, 3 m).
-
-        `stiffness`, `free`: those that it was made of. `compliance` (n, 3 N): of the sensors, see
-        `Linearisation.compliance`. `by_displacement`, `by_reactions` SciPy CSR (n, 3 N).
-        """
+    def answers(self, at: Linearisation) -> Floats:
+        """What the sensors of the same state record where each component of `moved` is 1 m: (n, 3 m)."""
+        sensors, free = at.sensors, at.free
         components = (3 * self.members[:, None] + np.arange(3)).ravel()
-        held = by_reactions[:, ~free] @ stiffness[~free][:, components]
-        direct = (
-            np.asarray((by_displacement[:, components] + held).todense()) - (self._coupling.T @ compliance[:, free].T).T
-        )
-        return np.asarray(np.einsum("naj,akj->nak", direct.reshape(len(direct), -1, 3), self._frames)).reshape(
-            direct.shape
-        )
+        held = sensors.by_reactions[:, ~free] @ at.stiffness[~free][:, components]
+        direct = np.asarray((sensors.by_displacement[:, components] + held).todense())
+        direct -= (self._coupling.T @ at.compliance[:, free].T).T
+        along = np.einsum("naj,akj->nak", direct.reshape(len(direct), -1, 3), self._frames)
+        return np.asarray(along).reshape(direct.shape)
 
     def moved(self, patch: Bools, lifts: bool) -> Floats:
         """Displacement (3 m,) [m] of its nodes, along two tangents and the normal of each, where a patch lets go.

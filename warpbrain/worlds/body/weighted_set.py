@@ -9,7 +9,6 @@ sets they would hide causes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -19,7 +18,7 @@ from warpbrain.arrays import Floats
 from warpbrain.inference import Kind
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.causes import Hypothesis
-from warpbrain.inference.marginal import Marginal, RowsAtScales, Summed, marginal_of
+from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, marginal_of, outward
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
@@ -65,12 +64,12 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
         return summed[fraction, noise].log_evidence
 
     first = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction))))
-    by_fraction = _around(lambda number: log_evidence(number, 0), first, len(fractions))
+    by_fraction = outward(lambda number: log_evidence(number, 0), first, len(fractions), _NEGLIGIBLE)
     best = int(np.argmax(by_fraction))
-    by_noise = _around(lambda number: log_evidence(best, number), 0, len(base.noises))
+    by_noise = outward(lambda number: log_evidence(best, number), 0, len(base.noises), _NEGLIGIBLE)
     noise = int(np.argmax(by_noise))
     if noise > 0:
-        by_fraction = _around(lambda number: log_evidence(number, noise), best, len(fractions))
+        by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
         best = int(np.argmax(by_fraction))
     # as if the evidence were a product of what depends on one size, and on the other
     if relative is not None:
@@ -86,20 +85,6 @@ def _displacement(base: Base, left: Floats) -> Floats:
     explained = sensors.residual + sensors.computed - left
     moved = np.sqrt(np.bincount(sensors.groups, explained**2))[sensors.groups]
     return np.where(sensors.is_displacement, np.maximum(moved, base.nuisances.displacement), 0.0)
-
-
-def _around(log_evidence: Callable[[int], float], first: int, count: int) -> Floats:
-    """Log evidence (count,) by the number of a size, as far from the first one as it is not negligible."""
-    logs = np.full(count, -np.inf)
-    logs[first] = log_evidence(first)
-    for step in (-1, 1):
-        number = first + step
-        while 0 <= number < count:
-            logs[number] = log_evidence(number)
-            if logs[number] < logs.max() + np.log(_NEGLIGIBLE):
-                break
-            number += step
-    return logs
 
 
 @dataclass(frozen=True, eq=False)

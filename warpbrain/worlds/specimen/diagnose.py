@@ -28,15 +28,14 @@ from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import Checker, grown_errors, score
+from warpbrain.worlds.specimen.effects import effects_of
 from warpbrain.worlds.specimen.fit import Fit, fit
 from warpbrain.worlds.specimen.forward import Forward
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.measures import next_measurements, smallest_of, values_of, where_it_shows
 from warpbrain.worlds.specimen.protocol import protocol_of
-from warpbrain.worlds.specimen.registered import effects_of
-from warpbrain.worlds.specimen.result import Combination, Ranked, SpecimenDiagnosis
+from warpbrain.worlds.specimen.result import Combination, Ranked, SpecimenDiagnosis, assumptions_of
 from warpbrain.worlds.specimen.search import CauseSet, Sets
-from warpbrain.worlds.specimen.sentences import assumptions_of
 
 #: Rows below which nothing is concluded; combinations that are told.
 _FEWEST, _TOLD = 15, 12

@@ -38,6 +38,8 @@ from warpbrain.simulation.history import corners_of, history_of
 _STEPS, _ROWS, _FIRST = 4, 60, 0.005
 #: Strain at rest, of each mode.
 REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0, "confined": 1.0, "biaxial": 1.0}
+#: Patterns of a test at most, the smoothest.
+_PATTERNS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,10 +259,6 @@ def _kept(test: Test) -> Ints:
     wanted = np.searchsorted(test.time, history.time).clip(0, count - 1)
     corners = np.array(corners_of(test.time, test.strain, 0.02 * test.reach))
     return np.unique(np.concatenate([wanted, corners])).astype(np.int64)
-
-
-#: Patterns of a test at most, the smoothest.
-_PATTERNS = 8
 
 
 def noise_factor(protocol: Protocol) -> Floats:
