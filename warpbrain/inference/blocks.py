@@ -24,9 +24,9 @@ from warpbrain.inference.gaussian import GaussianModel
 
 @dataclass(frozen=True, eq=False)
 class ActingColumns:
-    """Columns of causes that act together with each block: standardised (n, k), prior deviations (k,), mean (n,)."""
+    """Columns of causes that act together with each block: numbers (k,), prior deviations (k,), mean (n,)."""
 
-    columns: Floats
+    numbers: Ints
     deviations: Floats
     mean: Floats
 
@@ -87,6 +87,11 @@ class Blocks:
         """Numbers (c + 1,) of the first block of each cause in order, and at last how many blocks there are."""
         return np.flatnonzero(np.diff(self.cause, prepend=-1, append=-1))
 
+    @cached_property
+    def _gram(self) -> Floats:
+        """`Z^T Z` of all blocks: of few places, since each pair of these is weighed with every size."""
+        return self._Z.T @ self._Z
+
     def subset(self, chosen: Ints) -> Blocks:
         """Some of the blocks by their numbers, in the same order."""
         other: Blocks = object.__new__(Blocks)
@@ -100,10 +105,10 @@ class Blocks:
 
     def acting(self, members: Sequence[tuple[int, int]]) -> ActingColumns:
         """Blocks by number, with the numbers of their sizes, as columns that act together with others."""
-        columns = [self._Z[:, self._first[k] : self._first[k + 1]] for k, _ in members]
+        columns = [np.arange(self._first[k], self._first[k + 1]) for k, _ in members]
         deviations = [np.full(self._width[k], self._sizes[k, size]) for k, size in members]
         mean = self._m[:, [k for k, _ in members]].sum(axis=1)
-        return ActingColumns(np.concatenate(columns, axis=1), np.concatenate(deviations), mean)
+        return ActingColumns(np.concatenate(columns), np.concatenate(deviations), mean)
 
     def log_factors(self, acting: ActingColumns | None = None, start: int = 0) -> Floats:
         """Log Bayes factors (p - start, s) of blocks from `start` on, with every size.
@@ -125,7 +130,11 @@ class Blocks:
         at = slice(self._first[blocks[0]], self._first[blocks[-1] + 1])
         Z, means, sizes = self._Z[:, at], self._m[:, blocks], self._sizes[blocks]
         of_block = Z.reshape(len(Z), count, width)
-        M = np.einsum("nbi,nbj->bij", of_block, of_block, optimize=True)
+        if acting is None:
+            M = np.einsum("nbi,nbj->bij", of_block, of_block, optimize=True)
+        else:
+            numbers = np.arange(at.start, at.stop).reshape(count, width)
+            M = self._gram[numbers[:, :, None], numbers[:, None, :]]
         with_means = bool(means.any())
         r = self._r if acting is None else self._r - acting.mean
         residual = r[:, None] - means if with_means else r[:, None]
@@ -136,13 +145,14 @@ class Blocks:
         )
         log = 0.5 * (self._r @ self._r - np.sum(residual**2, axis=0)) * np.ones(count)
         if acting is not None:
-            W = acting.columns
-            A = np.linalg.inv(W.T @ W + np.diag(acting.deviations**-2.0))
+            W = self._Z[:, acting.numbers]
+            of_acting = self._gram[acting.numbers]
+            A = np.linalg.inv(of_acting[:, acting.numbers] + np.diag(acting.deviations**-2.0))
             projection = W.T @ residual
-            C = (W.T @ Z).reshape(W.shape[1], count, width)
-            AC = np.einsum("kl,lbi->kbi", A, C)
+            C = of_acting[:, at].reshape(len(A), count, width)
+            AC = np.tensordot(A, C, 1)
             M = M - np.einsum("kbi,kbj->bij", C, AC)
-            b = b - np.einsum("kbi,kb->bi", AC, np.broadcast_to(projection, (W.shape[1], count)))
+            b = b - np.einsum("kbi,kb->bi", AC, np.broadcast_to(projection, (len(A), count)))
             log = log + 0.5 * np.einsum("kb,kl,lb->b", projection, A, projection) * np.ones(count)
             log = log + 0.5 * np.linalg.slogdet(A)[1] - np.log(acting.deviations).sum()
         values, vectors = np.linalg.eigh(M)

@@ -51,7 +51,6 @@ class Base:
     state: SolvedState  # the base
     at: Linearisation
     effects: Effects
-    switch_states: dict[str, SolvedState]  # states with a switch that were solved for them, by the mechanism
     nuisances: Nuisances
     unknown: dict[str, Floats]  # (n, k), columns of unknown fields, of 1 m
     #: Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
@@ -74,7 +73,7 @@ class Base:
     def for_sensors(self, sensors: Sensors) -> tuple[Nuisances, Effects]:
         """Nuisances as columns over other sensors, in the same coordinates, and what makes effects over them."""
         at = self.at.with_sensors(sensors)
-        effects = Effects(at, SolvedSwitches(self.states, self.state, at.sensors, self.switch_states), self.mesh_errors)
+        effects = self.effects.over(at)
         theta, nuisances = self.state.hypothesis.theta, self.nuisances
         return nuisances_at(
             at, self.states, theta, self.prior, effects, self.mesh_errors, nuisances.anchors, nuisances.fraction
@@ -159,7 +158,6 @@ class BaseFinder:
             state,
             linear.at,
             linear.effects,
-            linear.switch_states,
             nuisances,
             unknown,
             GaussianModel(factor, nuisances.columns),
@@ -215,8 +213,7 @@ class _LinearModel:
     def __init__(self, finder: BaseFinder, state: SolvedState, errors: MeshErrors | None) -> None:
         sensors, states = state.sensors, finder.states
         self.at = state.linearised()
-        self.switch_states: dict[str, SolvedState] = {}
-        self.effects = Effects(self.at, SolvedSwitches(states, state, sensors, self.switch_states), errors)
+        self.effects = Effects(self.at, SolvedSwitches(states, state, {}), errors)
         # first, since it makes the compliance, with which nuisances are products instead of equilibria
         self.lengths = (finder._spacing * beliefs("unknown.lengths")).tolist()
         self.body_forces = body_forces(self.at, self.lengths)
