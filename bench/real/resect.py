@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from bench.real.tables import landmarks
 from warpbrain.atomic import whole_file
 from warpbrain.cases.shipped import RESECT, find_case
-from warpbrain.diagnosis.confirming import HeldOut
+from warpbrain.diagnosis.checking import HeldOut
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.estimation.registration import moved_back, registration_of

@@ -8,8 +8,7 @@ import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
-from warpbrain.diagnosis.checking import check_errors
-from warpbrain.diagnosis.confirming import Confirming, distance
+from warpbrain.diagnosis.checking import Confirming, check_errors, distance
 from warpbrain.diagnosis.locating import ScoreMap, Traits, map_of_search, traits_of
 from warpbrain.diagnosis.measuring import imitations, next_measurements, smallest
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time

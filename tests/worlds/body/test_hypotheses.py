@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from sinking_block import OPTIONS, write_sinking
 
-from warpbrain.diagnosis.confirming import Confirming
+from warpbrain.diagnosis.checking import Confirming
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import NAMED, decide

@@ -8,7 +8,7 @@ from scipy.sparse import csr_matrix
 
 from warpbrain.errors import SolveError
 from warpbrain.worlds.body.factors import Factors
-from warpbrain.worlds.body.releasing import HeldSurface
+from warpbrain.worlds.body.linearisation import HeldSurface
 
 
 @pytest.fixture

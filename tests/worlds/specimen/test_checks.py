@@ -13,8 +13,7 @@ from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import CheckResults, Folds, folds_of, grown_errors, held_out
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.effects import effects_of, stiffening
-from warpbrain.worlds.specimen.fit import fit
-from warpbrain.worlds.specimen.forward import Component, Forward
+from warpbrain.worlds.specimen.fit import Component, Forward, fit
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.protocol import protocol_of
 from warpbrain.worlds.specimen.result import Score

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from warpbrain.diagnosis.confirming import distance
+from warpbrain.diagnosis.checking import distance
 from warpbrain.diagnosis.result import Diagnosis, Ranked, confusion_sentences, effect_sentence, sentence_of_kind
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import Decision

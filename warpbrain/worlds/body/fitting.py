@@ -27,9 +27,8 @@ from warpbrain.worlds.body.fit_columns import Layout, columns_about
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion
-from warpbrain.worlds.body.refit import MeshShare, Refit, excess_error, mesh_share_of
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
-from warpbrain.worlds.body.weighted_set import evidence_of
+from warpbrain.worlds.body.weighted_set import MeshShare, Refit, evidence_of, excess_error, mesh_share_of
 
 _ITERATIONS, _HALVINGS = 20, 6
 #: How far [standard deviations] coordinates go until columns are made anew.

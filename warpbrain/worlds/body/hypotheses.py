@@ -36,10 +36,9 @@ from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.placing import moved_about_fit, weigh, with_refined_places
-from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.states import States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
-from warpbrain.worlds.body.weighted_set import WeightedSet, evidence_of
+from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
 
 #: Places of each cause of which pairs are made, and sets that are weighed with gross errors of their own.
 _PLACES, _SETS = 20, 12

@@ -31,8 +31,7 @@ from warpbrain.worlds.body.causes import BodyCauses, scaled
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
 from warpbrain.worlds.body.effects import Effect, Effects, width_of
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
-from warpbrain.worlds.body.refit import Refit
-from warpbrain.worlds.body.weighted_set import WeightedSet, evidence_of
+from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
 
 #: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
 _RADII = (0.8, 1.0, 1.25)

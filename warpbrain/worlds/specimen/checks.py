@@ -12,11 +12,11 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.beliefs import beliefs
-from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.decide import Confirmation
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.predict import Prediction, p_value, predict, predictive_p
+from warpbrain.inference.subsets import Blocks
 from warpbrain.physics.words import pascals
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.specimen.fit import Fit

@@ -29,12 +29,19 @@ from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import Checker, grown_errors, score
 from warpbrain.worlds.specimen.effects import effects_of
-from warpbrain.worlds.specimen.fit import Fit, fit
-from warpbrain.worlds.specimen.forward import Forward
+from warpbrain.worlds.specimen.fit import Fit, Forward, fit
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
-from warpbrain.worlds.specimen.measures import next_measurements, smallest_of, values_of, where_it_shows
 from warpbrain.worlds.specimen.protocol import protocol_of
-from warpbrain.worlds.specimen.result import Combination, Ranked, SpecimenDiagnosis, assumptions_of
+from warpbrain.worlds.specimen.result import (
+    Combination,
+    Ranked,
+    SpecimenDiagnosis,
+    assumptions_of,
+    next_measurements,
+    smallest_of,
+    values_of,
+    where_it_shows,
+)
 from warpbrain.worlds.specimen.search import CauseSet, Sets
 
 #: Rows below which nothing is concluded; combinations that are told.

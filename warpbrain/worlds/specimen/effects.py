@@ -38,7 +38,7 @@ from warpbrain.worlds.specimen.material import can_act
 from warpbrain.worlds.specimen.protocol import Chain, Protocol, Test, smooth_patterns
 
 if TYPE_CHECKING:
-    from warpbrain.worlds.specimen.forward import Forward
+    from warpbrain.worlds.specimen.fit import Forward
 
 #: Strain path over the largest strain after which tissue was deformed before; beyond which no exponential is computed.
 _BACK, _MOST = 1.2, 8.0
