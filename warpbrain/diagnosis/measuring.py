@@ -38,7 +38,7 @@ _AXES = ("left-right", "front-back", "head-foot")
 
 def imitations(causes: BodyCauses, model: GaussianModel) -> Confusion:
     """Part of each mechanism, at its median detectability, that the best place of each other cause explains."""
-    bases = {cause.name: [_orthonormal(model, place.columns) for place in cause.places] for cause in causes.causes}
+    bases = {cause.name: _orthonormal(model, cause) for cause in causes.causes}
     rows: dict[str, dict[str, float]] = {}
     for cause in causes.causes:
         if cause.kind is not Kind.PHYSICS:
@@ -91,10 +91,15 @@ def _median_place(causes: BodyCauses, cause: Cause, model: GaussianModel) -> tup
     return numbers[middle], float(lengths[middle])
 
 
-def _orthonormal(model: GaussianModel, columns: Floats) -> Floats:
-    """Orthonormal basis (n, k) of the span of columns, standardised."""
-    vectors, sizes, _ = np.linalg.svd(model.standardised(columns), full_matrices=False)
-    return np.asarray(vectors[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)])
+def _orthonormal(model: GaussianModel, cause: Cause) -> list[Floats]:
+    """Orthonormal basis (n, k) of the span of the columns of each place, standardised."""
+    ends = np.cumsum([place.columns.shape[1] for place in cause.places])[:-1]
+    columns = model.standardised(np.concatenate([place.columns for place in cause.places], axis=1))
+    bases = []
+    for of_place in np.split(columns, ends, axis=1):
+        vectors, sizes, _ = np.linalg.svd(of_place, full_matrices=False)
+        bases.append(vectors[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)])
+    return bases
 
 
 def next_measurements(

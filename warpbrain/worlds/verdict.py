@@ -24,7 +24,8 @@ from warpbrain.physics.words import Measurement, Smallest
 from warpbrain.shown import Shown
 
 #: Causes with their probabilities, and sets of causes.
-Ranked, Combination = TypeVar("Ranked"), TypeVar("Combination")
+Ranked = TypeVar("Ranked")
+Combination = TypeVar("Combination")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
