@@ -22,8 +22,8 @@ from scipy.spatial.transform import Rotation
 from bench.real.tables import landmarks
 from warpbrain.atomic import whole_file
 from warpbrain.cases.shipped import RESECT, find_case
+from warpbrain.diagnosis.checking import HeldOut
 from warpbrain.diagnosis.diagnose import Diagnosing
-from warpbrain.diagnosis.held_out import HeldOut
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.estimation.registration import moved_back, registration_of
 from warpbrain.recordings.agreement import root_mean_square

@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from warpbrain.inference.probability import percent
+from warpbrain.inference.calibration import percent
 
 RESULTS = Path(__file__).resolve().parents[1] / "results"
 TABLES = RESULTS / "real.md"

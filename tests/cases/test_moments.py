@@ -18,7 +18,7 @@ from warpbrain.estimation.observations import Observations
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.recordings.recording import PointsRecording
-from warpbrain.worlds.body.screened import require_observable
+from warpbrain.worlds.body.hypotheses import require_observable
 
 
 def marker(times: int, **more) -> PointsRecording:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from warpbrain.diagnosis.held_out import HeldOut, blocks_of, distance
+from warpbrain.diagnosis.checking import HeldOut, blocks_of, distance
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.predict import p_value, predict, predict_with
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpbrain.diagnosis.confirming import Confirming
+from warpbrain.diagnosis.checking import Confirming
 from warpbrain.diagnosis.ranking import Ranking
 
 

@@ -9,12 +9,11 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from warpbrain.diagnosis.result import Fit, Ranked
-from warpbrain.diagnosis.sentences import effect_sentence, sentence_of
+from warpbrain.diagnosis.result import Fit, Ranked, effect_sentence, sentence_of
 from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import Smallest, Value
-from warpbrain.worlds.body.not_physics import SENTENCES
+from warpbrain.worlds.body.causes import SENTENCES
 
 #: What each verdict says, whatever its numbers.
 SAID = {

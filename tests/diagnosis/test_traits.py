@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.diagnosis.sentences import traits_in_words
-from warpbrain.diagnosis.traits import Traits, traits_of
+from warpbrain.diagnosis.locating import Traits, traits_of
+from warpbrain.diagnosis.result import Diagnosis, traits_in_words
 from warpbrain.inference import GaussianModel
 from warpbrain.worlds.body.unknown import body_forces, force_patches
 

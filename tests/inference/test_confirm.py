@@ -2,8 +2,7 @@
 
 import pytest
 
-from warpbrain.inference.confirm import if_significant
-from warpbrain.inference.decide import CANNOT_SAY, NOTHING, VERDICTS, Decision
+from warpbrain.inference.decide import CANNOT_SAY, NOTHING, VERDICTS, Decision, if_significant
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)

@@ -37,15 +37,6 @@ def test_products_of_standardised_rows_are_those_with_the_inverse_covariance() -
     np.testing.assert_allclose(white.T @ white, rows.T @ np.linalg.solve(one.covariance, rows), rtol=1e-10)
 
 
-def test_held_out_density_is_that_of_the_conditional() -> None:
-    one = model()
-    rows = RANDOM.normal(size=N)
-    observed = np.arange(N) % 3 != 0
-    mean, covariance = one.conditional(rows, observed)
-    expected = stats.multivariate_normal(mean, covariance).logpdf(rows[~observed])
-    assert one.log_density_of_hidden(rows, observed) == pytest.approx(expected, abs=1e-9)
-
-
 def test_coefficients_are_those_of_bayesian_least_squares() -> None:
     one = model()
     rows = RANDOM.normal(size=N)

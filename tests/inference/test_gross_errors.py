@@ -8,7 +8,8 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import Outliers, PointRows, columns_of_inflation, with_gross_errors
+from warpbrain.inference.gross_errors import PointRows, columns_of_inflation, with_gross_errors
+from warpbrain.inference.noise import Outliers
 
 PRIOR = Outliers(0.03, 15.0)
 #: Two kinds of gross errors.

@@ -3,8 +3,7 @@
 import numpy as np
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import with_gross_errors
-from warpbrain.inference.marginal import Marginal, RowsAtScales, marginal_of
+from warpbrain.inference.gross_errors import Marginal, RowsAtScales, marginal_of, with_gross_errors
 from warpbrain.inference.noise import outliers, scales
 
 N = 30

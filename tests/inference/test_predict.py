@@ -21,10 +21,11 @@ def test_blocks_are_predicted_as_conditioning_says(model, verify):
     random = np.random.default_rng(1)
     residual, blocks = model.draws(1, random)[:, 0], random.integers(5, size=N)
     prediction = predict(model, residual, blocks)
-    worst = 0.0
+    worst, S = 0.0, model.covariance
     for number, block in enumerate(np.unique(blocks)):
         hidden = blocks == block
-        mean, covariance = model.conditional(residual, ~hidden)
+        gain = np.linalg.solve(S[np.ix_(~hidden, ~hidden)], S[np.ix_(~hidden, hidden)])
+        mean, covariance = gain.T @ residual[~hidden], S[np.ix_(hidden, hidden)] - S[np.ix_(hidden, ~hidden)] @ gain
         density = multivariate_normal(mean, covariance).logpdf(residual[hidden])
         worst = max(worst, abs(density - prediction.log_densities[number]))
         worst = max(worst, np.abs(prediction.errors[hidden] - (residual[hidden] - mean)).max())

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from warpbrain.inference.calibration import calibration
-from warpbrain.inference.probability import percent
+from warpbrain.inference.calibration import calibration, percent
 
 
 @pytest.mark.parametrize(("probability", "said"), [(0.5, "50 %"), (0.934, "93 %"), (0.066, "7 %")])

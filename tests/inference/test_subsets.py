@@ -25,9 +25,7 @@ def some_causes(random: np.random.Generator) -> list[Cause]:
 
     def places(count: int, width: int, mean: bool = False) -> tuple[Place, ...]:
         each = range(count)
-        return tuple(
-            Place(random.normal(size=(N, width)), random.normal(size=N) if mean else None, 1.0 + k) for k in each
-        )
+        return tuple(Place(random.normal(size=(N, width)), random.normal(size=N) if mean else None) for _ in each)
 
     sizes = np.array([0.3, 1.0, 3.0])
     return [
@@ -46,12 +44,10 @@ def by_hand(one: GaussianModel, residual: np.ndarray, causes: list[Cause], membe
         choices = [[]]
         for c in members:
             cause = causes[c]
-            weights = np.array([place.weight for place in cause.places])
-            weights = weights / weights.sum()
             choices = [
-                [*chosen, (place, size, np.log(weight / len(cause.sizes)))]
+                [*chosen, (place, size, -np.log(len(cause.places) * len(cause.sizes)))]
                 for chosen in choices
-                for place, weight in zip(cause.places, weights, strict=True)
+                for place in cause.places
                 for size in cause.sizes
             ]
         for chosen in choices:
@@ -92,8 +88,7 @@ def test_a_place_has_its_share_of_the_evidence() -> None:
         [cause] = [cause for cause in causes if cause.name == hypothesis.causes[0]]
         place = cause.places[hypothesis.best.members[0].place]
         alone = by_hand(one, residual, [replace(cause, places=(place,))], (0,))
-        weight = place.weight / sum(other.weight for other in cause.places)
-        share = alone + np.log(weight) - hypothesis.log_evidence
+        share = alone - np.log(len(cause.places)) - hypothesis.log_evidence
         np.testing.assert_allclose(hypothesis.best.log_share, share, atol=1e-8)
 
 
@@ -119,8 +114,7 @@ def test_probabilities_are_calibrated_over_draws_of_the_model(verify) -> None:
         members = sets[random.choice(len(sets), p=prior)]
         rows = one.draws(1, random)[:, 0]
         for c in members:
-            weights = np.array([place.weight for place in causes[c].places])
-            place = causes[c].places[random.choice(len(weights), p=weights / weights.sum())]
+            place = causes[c].places[random.choice(len(causes[c].places))]
             size = random.choice(causes[c].sizes)
             rows += size * place.columns @ random.normal(size=place.columns.shape[1])
             rows += 0.0 if place.mean is None else place.mean
@@ -145,7 +139,6 @@ def test_likely_places_are_those_of_the_greatest_density():
     one, causes, residual = model(random), some_causes(random), 2.0 * random.normal(size=N)
     found = likely_places(one, residual, causes, 2)
     for cause in causes:
-        total = sum(place.weight for place in cause.places)
         density = [
             logsumexp(
                 [
@@ -155,7 +148,7 @@ def test_likely_places_are_those_of_the_greatest_density():
                     for size in cause.sizes
                 ]
             )
-            + np.log(place.weight / total)
+            - np.log(len(cause.places))
             for place in cause.places
         ]
         assert set(found[cause.name].tolist()) == set(np.argsort(density)[-2:].tolist())
@@ -182,6 +175,5 @@ def test_a_single_cause_keeps_its_next_best_places():
             only = Cause(cause.name, (cause.places[member.place],), cause.log_prior, cause.sizes)
             alone = posterior(given, residual, [only], SCALES)
             best = next(h.best for h in alone if h.causes)
-            total = sum(place.weight for place in cause.places)
-            weight = np.log(cause.places[member.place].weight / total)
+            weight = -np.log(len(cause.places))
             assert configuration.log_density == pytest.approx(best.log_density + weight)

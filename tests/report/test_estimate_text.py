@@ -5,11 +5,11 @@ import pytest
 from synthetic import WHITE, block
 
 from warpbrain.estimation.parameters import Parameters
+from warpbrain.inference.calibration import percent
 from warpbrain.inference.causes import Kind
-from warpbrain.inference.probability import percent
 from warpbrain.report.estimate import averaged_row, describe_nothing_else
 from warpbrain.report.page import lines
-from warpbrain.worlds.body.averaged_tissue import AveragedTissue, LikelyCause
+from warpbrain.worlds.body.uncertainty import AveragedTissue, LikelyCause
 
 
 def averaged(nothing: float) -> AveragedTissue:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from warpbrain.recordings.registration import Registration
     from warpbrain.report.warped import WarpRequest
     from warpbrain.terminal.record import Record
-    from warpbrain.worlds.body.averaged_tissue import AveragedTissue
+    from warpbrain.worlds.body.uncertainty import AveragedTissue
 
 #: Nodes up to which it is said unasked what else may act: its cost grows faster than that of an estimate.
 _LARGEST = 20_000
@@ -207,8 +207,8 @@ def _what_else(
 
     from warpbrain.diagnosis.locating import map_of_search
     from warpbrain.estimation.options import Listener
-    from warpbrain.worlds.body.averaged_tissue import averaged_tissue
-    from warpbrain.worlds.body.screened import screened
+    from warpbrain.worlds.body.hypotheses import screened
+    from warpbrain.worlds.body.uncertainty import averaged_tissue
     from warpbrain.worlds.options import DiagnosisOptions
 
     prior, mesh_error = posterior.best.problem.mode.gaussian, posterior.options.discretisation is not None

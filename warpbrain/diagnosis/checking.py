@@ -1,4 +1,10 @@
-"""Errors at recordings with role `check`, to which nothing is fitted: each at its time."""
+"""Checks of sets of causes: p-values, cross-validation by blocks of rows against patterns, and unseen recordings.
+
+Blocks do not depend on any fit; each is predicted from all others by conditioning the same model. Blocks are regions.
+The effect of a local cause cannot be predicted from other regions, so for that blocks are scattered points. Random
+patterns in the place of mechanisms say what chance predicts. To recordings with role `check` nothing is fitted: each is
+compared at its time.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +17,224 @@ import numpy as np
 from warpbrain.arrays import Floats, Ints
 from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
-from warpbrain.diagnosis.held_out import distance
 from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
+from warpbrain.inference import Cause, GaussianModel, Kind, Place
+from warpbrain.inference.beliefs import belief, beliefs
+from warpbrain.inference.calibration import calibration
+from warpbrain.inference.decide import Confirmation
+from warpbrain.inference.predict import Prediction, p_value, predict, predict_with, predictive_p
+from warpbrain.inference.subsets import Blocks
+from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.effects import width_of
 from warpbrain.worlds.body.fit_columns import with_laws_about
+from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
-from warpbrain.worlds.body.refit import Refit
-from warpbrain.worlds.body.rigid_motion import RigidMotion
-from warpbrain.worlds.body.sensors import Sensors
+from warpbrain.worlds.body.nuisances import RigidMotion
+from warpbrain.worlds.body.sensors import Sensors, spread_points
 from warpbrain.worlds.body.states import SolvedState, States
 from warpbrain.worlds.body.time_courses import finite_times
+from warpbrain.worlds.body.weighted_set import Refit, WeightedSet
+
+#: Blocks, and random patterns.
+_BLOCKS, _PATTERNS = 24, 100
+
+
+def blocks_of(sensors: Sensors, local: bool) -> Ints:
+    """Block (n,) of each row: scattered points if `local`, else regions; forces are one region."""
+    if local:
+        return sensors.groups % _BLOCKS
+    rows = sensors.is_displacement
+    blocks = np.zeros(len(sensors), dtype=np.int64)
+    places = sensors.positions[rows]
+    if not len(places):
+        return blocks
+    centres = spread_points(places, 0.0, min(_BLOCKS, len(np.unique(sensors.groups[rows]))))
+    blocks[rows] = np.argmin(np.linalg.norm(places[:, None] - places[centres][None], axis=2), axis=1)
+    blocks[~rows] = len(centres)
+    return blocks
+
+
+def distance(sensors: Sensors, errors: Floats) -> float:
+    """Root mean square of the 3-D distances [m] that errors (n,) of displacements are, over all recorded points."""
+    rows = sensors.is_displacement
+    if not rows.any():
+        return float("nan")
+    _, group = np.unique(sensors.groups[rows], return_inverse=True)
+    return root_mean_square(np.sqrt(np.bincount(group, weights=errors[rows] ** 2)))
+
+
+class HeldOut:
+    """Predicts the rows of one case.
+
+    `local`: whether all that acts is local.
+    """
+
+    def __init__(self, sensors: Sensors, local: bool) -> None:
+        self.sensors, self.blocks = sensors, blocks_of(sensors, local)
+
+    def predict(self, model: GaussianModel, residual: Floats) -> Prediction:
+        """Predict every block from the others."""
+        return predict(model, residual, self.blocks)
+
+    def error(self, prediction: Prediction) -> float:
+        """Root mean square [m]."""
+        return distance(self.sensors, prediction.errors)
+
+    def improvement(
+        self, prediction: Prediction, over: Prediction, random: np.random.Generator
+    ) -> tuple[float, float, float]:
+        """Part of another prediction's error that is removed, and its 95 % interval."""
+        return prediction.improvement(over, self.sensors.is_displacement, random)
+
+    def with_patterns(
+        self,
+        without: GaussianModel,
+        residual: Floats,
+        modes: Floats,
+        freedom: int,
+        tries: int,
+        random: np.random.Generator,
+    ) -> tuple[Prediction, ...]:
+        """Predictions with random patterns in the place of a mechanism.
+
+        A pattern is a random mixture of the modes of a smooth force with the size that fits best. The best of `tries`
+        patterns is taken, as the mechanism is the best of its places.
+
+        `without`: of all else that acts. `residual` (n,). `modes` (n, m): as large as the noise. `freedom`:
+        coefficients of the mechanism.
+        """
+        sizes = beliefs("unknown.sizes")
+        chosen = []
+        for _ in range(_PATTERNS):
+            mixtures = random.normal(size=(tries, modes.shape[1], freedom)) / np.sqrt(freedom)
+            patterns = [modes @ mixture for mixture in mixtures]
+            blocks = Blocks(without, residual, [Cause("", tuple(map(Place, patterns)), 0.0, sizes)])
+            logs = blocks.log_factors()
+            place, size = np.unravel_index(int(np.argmax(logs)), logs.shape)
+            chosen.append(sizes[size] * patterns[int(blocks.place[place])])
+        return predict_with(without, residual, self.blocks, chosen)
+
+
+class Confirming:
+    """Checks the sets of one search.
+
+    `draws`: of rows from each model.
+    """
+
+    def __init__(self, search: HypothesisSearch, draws: int, random: np.random.Generator) -> None:
+        self.search, self._draws, self._random = search, draws, random
+        sensors = search.base.at.sensors
+        self._held_out = {local: HeldOut(sensors, local) for local in (False, True)}
+        #: Columns (n, m) of a smooth force as large as the noise, of which random patterns are mixtures.
+        self.modes = search.base.typical_noise * next(iter(search.base.unknown.values()))
+
+    def p_of_nothing(self, nothing: WeightedSet) -> float:
+        """p-value of the hypothesis that no cause acts.
+
+        The smaller of two, times two (Bonferroni's correction). The first compares the Bayes factor of any cause with
+        draws of the model without any, its gross errors included. These may hide what a local cause moves; the second
+        takes the Bayes factor of all causes, each with gross errors of its own, which is `b` or more with a probability
+        of `1 / b` at most if none acts (Markov's inequality).
+        """
+        by_draws = self._predictive_p(nothing.marginal.model, nothing.residual, mechanisms=True)
+        bound = float(np.exp(-max(self.search.log_bayes_factor, 0.0) / calibration().temperature))
+        return min(1.0, 2.0 * min(by_draws, bound))
+
+    def p_left(self, weighted_set: WeightedSet) -> float:
+        """p-value of the hypothesis that a set is all that acts, against unknown fields."""
+        return self._predictive_p(weighted_set.marginal.model, weighted_set.residual, mechanisms=False)
+
+    def _predictive_p(self, model: GaussianModel, residual: Floats, mechanisms: bool) -> float:
+        fields, weights = [], []
+        for cause in self.search.causes.causes:
+            if cause.kind is Kind.UNKNOWN or (mechanisms and cause.kind is Kind.PHYSICS):
+                columns = [
+                    place.columns if place.mean is None else np.column_stack([place.mean, place.columns])
+                    for place in cause.places
+                ]
+                fields += columns
+                weights += [-np.log(len(columns))] * len(columns)
+        logs = np.array(weights) - np.logaddexp.reduce(weights)
+        return predictive_p(model, fields, beliefs("unknown.sizes"), residual, self._draws, self._random, logs)
+
+    def held_out_for(self, weighted_set: WeightedSet) -> HeldOut:
+        """Held-out blocks for a set: scattered points if all its effects are local, else regions."""
+        local = bool(weighted_set.effects) and all(
+            effect.proposed.centre is not None for effect in weighted_set.effects
+        )
+        return self._held_out[local]
+
+    def predict(self, weighted_set: WeightedSet, held_out: HeldOut) -> Prediction:
+        """Held-out rows predicted with a set."""
+        return held_out.predict(weighted_set.marginal.model, weighted_set.residual)
+
+    def confirmations(self, weighted_set: WeightedSet) -> tuple[Confirmation, ...]:
+        """Of each mechanism of a set, given those that explain more.
+
+        The one without which a set is most probable is left out first. Given all others, what two causes explain alike
+        would confirm neither, and the weaker one where the stronger one is more like a third.
+        """
+        confirmed = {}
+        while weighted_set.mechanisms:
+            without = self._without(weighted_set)
+            weakest = max(without, key=lambda name: without[name].hypothesis.log_evidence)
+            confirmed[weakest] = self._confirm(weighted_set, weakest, without[weakest])
+            weighted_set = without[weakest]
+        return tuple(reversed(confirmed.values()))
+
+    def _without(self, weighted_set: WeightedSet) -> dict[str, WeightedSet]:
+        """Sets without one of the mechanisms of a set, by its name: those that were weighed, if any was.
+
+        About a fit of all, what is left may do the work of a large cause that would be nothing without that.
+        """
+        every = {name: self.search.get(weighted_set.names - {name}) for name in weighted_set.mechanisms}
+        weighed = {name: known for name, known in every.items() if known is not None}
+        return weighed or {name: weighted_set.without(name, self.search.base) for name in every}
+
+    def _confirm(self, weighted_set: WeightedSet, name: str, others: WeightedSet) -> Confirmation:
+        effect = weighted_set.effects[weighted_set.mechanisms.index(name)]
+        held_out = self._held_out[effect.proposed.centre is not None]
+        full, reduced = self.predict(weighted_set, held_out), self.predict(others, held_out)
+        patterns = self._patterns(others, held_out, effect.columns.shape[1], (name,))
+        return Confirmation(
+            name,
+            weighted_set.hypothesis.log_evidence - others.hypothesis.log_evidence,
+            full.gain(reduced),
+            held_out.improvement(full, reduced, self._random),
+            p_value(full.log_density, [pattern.log_density for pattern in patterns]),
+        )
+
+    def _patterns(
+        self, others: WeightedSet, held_out: HeldOut, freedom: int, names: Sequence[str]
+    ) -> tuple[Prediction, ...]:
+        # places of a scan are far from independent of each other
+        places = max(len(self.search.causes.named(name).places) for name in names)
+        tries = int(min(places, belief("checks.tries")))
+        model = others.marginal.model
+        return held_out.with_patterns(model, others.residual, self.modes, freedom, tries, self._random)
+
+    def improvement(
+        self, nothing: WeightedSet, weighted_set: WeightedSet
+    ) -> tuple[tuple[float, float], tuple[float, float, float]]:
+        """Held-out errors with random patterns in the place of the mechanisms of a set, and what these improve.
+
+        Quantiles of 5 and 95 % of the former [m]; the part of the error without any cause that is removed, and its 95 %
+        interval.
+        """
+        held_out = self.held_out_for(weighted_set)
+        patterns = self._patterns(nothing, held_out, width_of(weighted_set.effects), weighted_set.mechanisms)
+        low, high = np.quantile([held_out.error(pattern) for pattern in patterns], [0.05, 0.95]).tolist()
+        without, explained = self.predict(nothing, held_out), self.predict(weighted_set, held_out)
+        return (low, high), held_out.improvement(explained, without, self._random)
+
+    def ceiling(self, nothing: WeightedSet, held_out: HeldOut) -> float:
+        """Least held-out error [m] with an unknown field of any size."""
+        base, sizes = self.search.base, beliefs("unknown.sizes")
+        column_sets = [size * base.typical_noise * columns for columns in base.unknown.values() for size in sizes]
+        predictions = predict_with(nothing.marginal.model, nothing.residual, held_out.blocks, column_sets)
+        return held_out.error(max(predictions, key=lambda prediction: prediction.log_density))
 
 
 def check_errors(case: Case, base: Base, fits: Sequence[Refit]) -> tuple[float, ...] | None:

@@ -8,22 +8,16 @@ import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
-from warpbrain.diagnosis.checking import check_errors
-from warpbrain.diagnosis.confirming import Confirming
-from warpbrain.diagnosis.held_out import distance
-from warpbrain.diagnosis.locating import ScoreMap, map_of_search
-from warpbrain.diagnosis.measuring import next_measurements
+from warpbrain.diagnosis.checking import Confirming, check_errors, distance
+from warpbrain.diagnosis.locating import ScoreMap, Traits, map_of_search, traits_of
+from warpbrain.diagnosis.measuring import imitations, next_measurements, smallest
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time
 from warpbrain.diagnosis.ranking import Ranking, about_base
-from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked
-from warpbrain.diagnosis.sentences import assumptions_of
-from warpbrain.diagnosis.telling_apart import imitations, smallest
-from warpbrain.diagnosis.traits import Traits, traits_of
+from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked, assumptions_of
 from warpbrain.errors import require_kind
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.confirm import Confirmation, after_checks, if_significant
 from warpbrain.inference.decide import (
     CANNOT_SAY,
     NAMED,
@@ -31,15 +25,17 @@ from warpbrain.inference.decide import (
     NOT_PHYSICS,
     NOTHING,
     UNKNOWN,
+    Confirmation,
     Decision,
+    after_checks,
     decide,
+    if_significant,
 )
 from warpbrain.inference.predict import Prediction
 from warpbrain.physics.words import Measurement
 from warpbrain.seconds import Seconds
 from warpbrain.threads import one_thread_of_blas
-from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.screened import require_observable, screened
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, require_observable, screened
 from warpbrain.worlds.body.surfaces import with_sets_that_act
 from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.options import DiagnosisOptions

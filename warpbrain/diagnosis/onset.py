@@ -16,7 +16,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.inference import Cause, GaussianModel, Place
 from warpbrain.inference.beliefs import belief
-from warpbrain.inference.blocks import Blocks
+from warpbrain.inference.subsets import Blocks
 from warpbrain.physics.proposal import Varying
 from warpbrain.physics.words import label
 from warpbrain.worlds.body.base import Base

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.diagnosis.confirming import Confirming
+from warpbrain.diagnosis.checking import Confirming
 from warpbrain.diagnosis.locating import ball_of
 from warpbrain.diagnosis.result import Ranked
 from warpbrain.inference import Cause, GaussianModel, Kind
-from warpbrain.inference.blocks import Blocks
+from warpbrain.inference.subsets import Blocks
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.parameters import scanned_values, values_of

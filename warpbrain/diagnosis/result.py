@@ -1,27 +1,30 @@
-"""The result of a diagnosis as plain data."""
+"""The result of a diagnosis as plain data, and its sentences, made from the numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.locating import ScoreMap
+from warpbrain.diagnosis.locating import ScoreMap, Traits
 from warpbrain.diagnosis.onset import Onset
-from warpbrain.diagnosis.traits import Traits
 from warpbrain.inference import Kind
-from warpbrain.inference.confirm import Confirmation
-from warpbrain.inference.decide import Decision
+from warpbrain.inference.beliefs import belief
+from warpbrain.inference.calibration import percent
+from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.predict import Prediction
-from warpbrain.physics.words import Measurement, Smallest, Value
-from warpbrain.shown import Shown
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.sizes import size_in_words
+from warpbrain.physics.words import Value, length, measured, number, place
 from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.causes import SENTENCES
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.weighted_set import WeightedSet
+from warpbrain.worlds.verdict import Verdict, Words, clause, grounds, missing_in_words, verdict_in_words
 
 #: Sets of causes: without any, and with all that is named.
 REFITTED, EXPLAINED = "refitted", "explained"
@@ -134,28 +137,12 @@ class Fit:
     check: tuple[float, ...] | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosis(Shown):
-    """A diagnosis of a body.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Diagnosis(Verdict[Ranked, Combination]):
+    """A diagnosis of a body; what it has in common with others: `warpbrain.worlds.verdict.Verdict`.
 
     Attributes
     ----------
-    case : Case
-    decision : Decision
-        After the checks; `by_posterior` before them.
-    doubts : tuple of str
-        Checks that failed, in words.
-    p_value : float
-        Of the hypothesis that nothing is missing.
-    p_left : float or None
-        Of the hypothesis that nothing else is missing; None if nothing is named.
-    named : tuple of Ranked
-        What is named, the most probable first, as it is in the joint fit.
-    ranking : tuple of Ranked
-    rejected : dict of str to str
-        Kinds that were not tried, and why.
-    combinations : tuple of Combination
-        Sets of causes, the most probable first.
     map : ScoreMap
     when : Onset or None
         When the best explanation set in; None with one recorded time, or if nothing physical is missing.
@@ -165,55 +152,20 @@ class Diagnosis(Shown):
         ``"refitted"`` without any cause, ``"explained"`` with all that is named.
     held_out : dict of str to Prediction
         Their predictions of held-out points.
-    explained : Case or None
-        The case with what was named, ready to run.
-    smallest : dict of str to Smallest
     confusion : Confusion
-    next_measurement : tuple of Measurement
     fit : Fit
-    confirmations : tuple of Confirmation
-        Of each mechanism of the best set.
-    assumptions, remarks : tuple of str
-    seconds : dict of str to float
     unknown : Traits or None
         Of a force that no mechanism explains: alone, or in addition to what is named.
     """
 
-    case: Case
-    decision: Decision
-    by_posterior: Decision
-    doubts: tuple[str, ...]
-    p_value: float
-    p_left: float | None
-    named: tuple[Ranked, ...]
-    ranking: tuple[Ranked, ...]
-    rejected: Mapping[str, str]
-    combinations: tuple[Combination, ...]
     map: ScoreMap
     when: Onset | None
     search: HypothesisSearch
     weighted_sets: Mapping[str, WeightedSet]
     held_out: Mapping[str, Prediction]
-    explained: Case | None
-    smallest: Mapping[str, Smallest]
     confusion: Confusion
-    next_measurement: tuple[Measurement, ...]
     fit: Fit
-    confirmations: tuple[Confirmation, ...]
-    assumptions: tuple[str, ...]
-    remarks: tuple[str, ...]
-    seconds: Mapping[str, float] = field(default_factory=dict)
     unknown: Traits | None = None
-
-    @property
-    def verdict(self) -> str:
-        """One of `warpbrain.inference.decide.VERDICTS`."""
-        return self.decision.verdict
-
-    @property
-    def group(self) -> tuple[str, ...]:
-        """Causes that the data do not discriminate; possible ones if nothing can be said."""
-        return () if self.named else self.decision.causes
 
     @property
     def base(self) -> Base:
@@ -229,13 +181,120 @@ class Diagnosis(Shown):
     def gross(self) -> Bools:
         """Rows (n,) of points that are gross errors under that set."""
         rows = np.zeros(len(self.base.residual), dtype=bool)
-        for number in np.flatnonzero(self.best.marginal.gross).tolist():
-            rows[self.base.points[number]] = True
+        for point in np.flatnonzero(self.best.marginal.gross).tolist():
+            rows[self.base.points[point]] = True
         return rows
 
     @cached_property
     def sentence(self) -> str:
         """The verdict for people: whole sentences, in millimetres, pascals, percent and degrees."""
-        from warpbrain.diagnosis.sentences import sentence_of
-
         return sentence_of(self)
+
+
+def sentence_of(diagnosis: Diagnosis) -> str:
+    """The verdict for people: whole sentences, in millimetres, pascals, percent and degrees."""
+    fit, ranking, named = diagnosis.fit, diagnosis.ranking, diagnosis.named
+    chances = {ranked.kind: ranked.probability for ranked in ranking}
+    least = belief("checks.perhaps")
+    likely = [ranked for ranked in ranking if ranked.kind != UNKNOWN and ranked.probability > least][:2]
+    nothing = sum(each.probability for each in diagnosis.combinations if not each.causes)
+    errors = None if fit.explained is None else (length(fit.explained[1]), length(fit.refitted[1]))
+    words = Words(
+        data="these data",
+        nothing="nothing was looked for",
+        unnamed="a force without a name",
+        named=[effect_sentence(ranked, diagnosis.case.gravity_axis) for ranked in named],
+        grounds=grounds([ranked.probability for ranked in named], "points", errors),
+        members=[(sentence_of_kind(kind), chances.get(kind, 0.0)) for kind in diagnosis.group if kind != UNKNOWN],
+        perhaps=[clause(sentence_of_kind(ranked.kind)) for ranked in likely],
+        missing=missing_in_words(nothing, all(ranked.physics for ranked in likely)),
+        rest=_traits(diagnosis),
+    )
+    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.smallest, words)
+    return " ".join([sentence, *diagnosis.doubts])
+
+
+def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | None = None) -> str:
+    """What a mechanism is, how large it was found to be, and where."""
+    sizes = "; ".join(size_in_words(ranked.kind, ranked.values, gravity_axis))
+    parts = [sentence_of_kind(ranked.kind).rstrip(".")]
+    if sizes:
+        parts.append(f": {sizes}")
+    return f"{''.join(parts)}.{_where(ranked)}"
+
+
+def confusion_sentences(confusion: Confusion) -> tuple[str, ...]:
+    """Which mechanisms these recordings confuse most easily."""
+    pairs = [(part, kind, other) for kind, row in confusion.rows.items() for other, part in row.items()]
+    pairs_in_words = [f"{kind} for {other} ({percent(part)})" for part, kind, other in sorted(pairs, reverse=True)[:4]]
+    sentence = (
+        f"With these recordings most easily taken for another: {', '.join(pairs_in_words)}." if pairs_in_words else ""
+    )
+    return (
+        *([sentence] if sentence else []),
+        "In percent of what is visible of it, at its middling place and the best place of the other.",
+    )
+
+
+def sentence_of_kind(kind: str) -> str:
+    """What a kind of cause is, in words."""
+    registry = mechanisms()
+    if kind in registry:
+        return registry[kind].sentence
+    return SENTENCES.get(kind, "Something acts that is none of the known mechanisms.")
+
+
+def _where(ranked: Ranked) -> str:
+    if ranked.centre is None:
+        return f" Where: {ranked.region}." if ranked.region else ""
+    # to whole millimetres where its size is not known
+    radius = f", within {number(1e3 * ranked.radius, 1)} mm" if ranked.radius else ""
+    surface = f", on the {ranked.region}" if ranked.region else ""
+    return f" It lies about {place(ranked.centre, 10.0 * (ranked.radius or 1.0))}{radius}{surface}."
+
+
+def _traits(diagnosis: Diagnosis) -> str:
+    """What is known of an unknown force, to follow a sentence; empty if nothing is."""
+    if diagnosis.unknown is None:
+        return ""
+    return traits_in_words(diagnosis.unknown, float(np.ptp(diagnosis.case.mesh.points, axis=0).max()))
+
+
+def traits_in_words(unknown: Traits, extent: float) -> str:
+    """What is known of an unknown force in a body of an extent [m], to follow a sentence."""
+    size, sd = unknown.size
+    where = f"about {place(unknown.centre, extent)}"
+    if unknown.outside:
+        sentence = f"It is a force from outside, {where}, of {measured(size, sd, 'N')} in all"
+    elif unknown.hidden:
+        sentence = (
+            f"It is strongest {where}, so near to what is held that the reactions there may carry it: whether it has a "
+            "net force cannot be told"
+        )
+    else:
+        sentence = (
+            f"It is strongest {where}, and no net force of it is seen ({measured(size, sd, 'N')}): it may act within"
+        )
+    depth = abs(unknown.surface_nats)
+    if depth > belief("checks.surface_told"):
+        sentence += ", and on the surface" if unknown.surface_nats > 0.0 else ", and below the surface"
+    return f" {sentence}."
+
+
+def assumptions_of(case: Case, base: Base, best: WeightedSet) -> tuple[str, ...]:
+    """The assumptions of a diagnosis."""
+    sensors = base.at.sensors
+    assumptions = [*case.assumptions]
+    assumptions.append(
+        f"{len(sensors)} numbers were recorded; their noise is {best.marginal.scale:.2f} times what was declared or "
+        "found, of which neighbours have a part in common."
+    )
+    gross = [int(sensors.groups[base.points[k][0]]) for k in np.flatnonzero(best.marginal.gross).tolist()]
+    if gross:
+        acting = " and ".join(best.mechanisms)
+        assumptions.append(
+            f"{len(gross)} points contradict all that surrounds them{f', with {acting},' if acting else ''} and are "
+            f"taken for gross errors: {sorted(gross)}."
+        )
+    assumptions.append(f"Allowed to explain residuals first: {', '.join(base.nuisances.families)}.")
+    return tuple(assumptions)

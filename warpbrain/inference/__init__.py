@@ -12,7 +12,8 @@ Nothing here knows Warp, a mesh or the name of a mechanism.
 
 from warpbrain.inference.causes import Cause, Kind, Place
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import GrossErrors, Outliers, with_gross_errors
+from warpbrain.inference.gross_errors import GrossErrors, with_gross_errors
+from warpbrain.inference.noise import Outliers
 from warpbrain.inference.subsets import Search, posterior
 
 __all__ = [

@@ -51,3 +51,13 @@ def calibration() -> Calibration:
     """The calibration that the package has."""
     values = json.loads((files("warpbrain.inference") / "calibration.json").read_text(encoding="utf-8"))
     return Calibration(values["temperature"], values["log_weights"], values["losses"], values["most_said"])
+
+
+def percent(probability: float) -> str:
+    """A probability in percent; beyond `Calibration.most_said` it is only said to be beyond."""
+    most = calibration().most_said
+    if probability > most:
+        return f"above {100.0 * most:g} %"
+    if probability < 1.0 - most:
+        return f"below {100.0 * (1.0 - most):g} %"
+    return f"{100.0 * probability:.0f} %"

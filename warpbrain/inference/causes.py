@@ -26,7 +26,6 @@ class Place:
     #: (n,): expected change of each row, whatever the size, such as the weight at a level of the fluid; zero if not
     #: given.
     mean: Floats | None = None
-    weight: float = 1.0  # probability among the places of its cause
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +45,8 @@ class Cause:
 
     @property
     def log_weights(self) -> Floats:
-        """Logarithm of the probability of each place and size, (p, s): all sizes are equally probable."""
-        weights = np.array([place.weight for place in self.places])
-        return np.log(weights / weights.sum())[:, None] - np.log(len(self.sizes)) + np.zeros(len(self.sizes))
+        """Logarithm of the probability of each place and size, (p, s): all are equally probable."""
+        return np.full((len(self.places), len(self.sizes)), -np.log(len(self.places)) - np.log(len(self.sizes)))
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,6 @@ class _Spectrum:
             # a column ten million times as long as the noise: its square has no digits left for the others
             left, sizes, _ = np.linalg.svd(whitened, full_matrices=False)
             self.values, self.directions = sizes**2, left * sizes
-        self._products: dict[bytes, Floats] = {}
 
     @cached_property
     def dual(self) -> Floats:
@@ -62,19 +61,6 @@ class _Spectrum:
         from scipy.linalg import solve_triangular
 
         return np.asarray(solve_triangular(self._factor, self.directions, lower=True, trans="T", check_finite=False))
-
-    def products(self, rows: Ints) -> Floats:
-        """Products of each two rows of `dual` of points with the rows (g, d): (g d^2, q)."""
-        key = rows.tobytes()
-        if key not in self._products:
-            self._products[key] = products_of_rows(self.dual, rows)
-        return self._products[key]
-
-
-def products_of_rows(columns: Floats, rows: Ints) -> Floats:
-    """Products of each two rows of points with the rows (g, d), of each of some columns (n, q): (g d^2, q)."""
-    of_points = columns[rows]
-    return np.asarray((of_points[:, :, None] * of_points[:, None]).reshape(rows.size * rows.shape[1], columns.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,22 +198,6 @@ class GaussianModel:
         W = self._whitened / self.scale
         covariance: Floats = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
         return covariance @ (W.T @ self._by_noise(rows)) / self.scale, covariance
-
-    def conditional(self, rows: Floats, observed: Bools) -> tuple[Floats, Floats]:
-        """Distribution of the rows that were not observed given those that were.
-
-        `rows` (n,): only the observed ones count. `observed` (n,). Returns mean (m,) and covariance (m, m) of the
-        others, their noise included.
-        """
-        S = self.covariance
-        hidden = ~observed
-        gain = np.linalg.solve(S[np.ix_(observed, observed)], S[np.ix_(observed, hidden)])
-        covariance: Floats = S[np.ix_(hidden, hidden)] - S[np.ix_(hidden, observed)] @ gain
-        return gain.T @ rows[observed], covariance
-
-    def log_density_of_hidden(self, rows: Floats, observed: Bools) -> float:
-        """`ln p(r_hidden | r_observed)`: the joint log density less that of the observed rows."""
-        return float(self.log_density(rows)) - float(self.rows(observed).log_density(rows[observed]))
 
     def draws(self, count: int, random: np.random.Generator) -> Floats:
         """Rows (n, count) drawn from the model."""

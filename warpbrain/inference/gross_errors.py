@@ -13,42 +13,27 @@ Hypotheses that differ in some columns `G` alone, or in their length f, share al
 `G^T S_0^-1 G = V diag(l) V^T` and `D = S_0^-1 G V`
 
     S^-1 = S_0^-1 - D diag(f^2 / (1 + f^2 l)) D^T
+
+The marginal likelihood of a hypothesis is that density, summed over the scale of the noise, too.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from warpbrain.arrays import Floats, Ints
-from warpbrain.inference.gaussian import GaussianModel, products_of_rows
+from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.noise import Outliers, outliers, scales
 
 #: Passes over the points at most.
 _SWEEPS = 10
-
-
-@dataclass(frozen=True)
-class Outliers:
-    """Prior of gross errors."""
-
-    probability: float  # that a point is one
-    inflation: float  # factor on the standard deviation of its noise
-    #: Further factors, all equally probable: with a single one a point that is much farther off still has influence.
-    further: tuple[float, ...] = ()
-
-    @property
-    def inflations(self) -> Floats:
-        """Of a sound point, which is 1, and of a gross error, shape (1 + k,)."""
-        return np.array([1.0, self.inflation, *self.further])
-
-    @property
-    def log_probabilities(self) -> Floats:
-        """Of each of them, shape (1 + k,)."""
-        count = 1 + len(self.further)
-        return np.log(np.array([1.0 - self.probability, *[self.probability / count] * count]))
+#: The sum over scales ends where a term is below this part of the largest.
+_NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +130,12 @@ class FurtherColumns:
         values, vectors = np.linalg.eigh(columns.T @ weighted)
         #: `l` (k,) and `D` (n, k).
         self.values, self.dual = np.maximum(values, 0.0), weighted @ vectors
-        #: Of each group of points, products of the rows of `D`.
-        self.products = [products_of_rows(self.dual, group.rows) for group in rows.groups]
+        #: Of each group of points with the rows (g, d), products of each two rows of `D`: (g d^2, k).
+        self.products = []
+        for group in rows.groups:
+            of_points = self.dual[group.rows]
+            pairs = of_points[:, :, None] * of_points[:, None]
+            self.products.append(pairs.reshape(group.rows.size * group.rows.shape[1], -1))
 
 
 def with_gross_errors(model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> GrossErrors:
@@ -273,3 +262,111 @@ def _solved(A: Floats, b: Floats) -> tuple[Floats, Floats]:
 def _cross(a: Sequence[Floats], b: Sequence[Floats]) -> tuple[Floats, Floats, Floats]:
     """Vector product of components; NumPy's own takes several times as long for small arrays."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Summed:
+    """Evidence summed over scales of the noise and over gross errors."""
+
+    log_evidence: float  # [nats]
+    scale: float  # the most probable factor on the noise
+    inflation: Floats  # (g,), most probable factor on the noise of each point at that scale, 1 of sound ones
+
+
+@dataclass(frozen=True, eq=False)
+class Marginal(Summed):
+    """The same with the most probable model of the rows under one hypothesis."""
+
+    model: GaussianModel  # at that scale; the excess noise of these points is columns after those of the hypothesis
+    count: int  # how many columns the hypothesis has
+
+    @property
+    def gross(self) -> Bools:
+        """Points (g,) that are most probably gross errors."""
+        return self.inflation > 1.0
+
+    @cached_property
+    def noise(self) -> GaussianModel:
+        """Of the noise alone, with the excess noise of gross errors."""
+        scaled = self.scale * self.model.noise_factor
+        covariance = scaled @ scaled.T + self.excess @ self.excess.T
+        factor: Floats = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+        return GaussianModel(factor, np.zeros((len(factor), 0)))
+
+    def coordinates(self, residual: Floats) -> Floats:
+        """Mean of the coefficients (q,) of the hypothesis after residuals (n,)."""
+        return self.model.coefficients(residual)[0][: self.count]
+
+    @property
+    def excess(self) -> Floats:
+        """Columns (n, e) of the excess noise of gross errors."""
+        return self.model.columns[:, self.count :]
+
+
+class RowsAtScales:
+    """Evidence of rows under a model with further columns, whose length and the scale of the noise may vary.
+
+    What neither changes is computed once.
+
+    `model`: the causes of the hypothesis among its columns. `residual` (n,): less what is expected of the causes.
+    `points`: rows of each point. `further` (n, k).
+    """
+
+    def __init__(
+        self, model: GaussianModel, residual: Floats, points: Sequence[Ints], further: Floats | None = None
+    ) -> None:
+        self._model, self._residual, self._points = model, residual, points
+        self._further = np.zeros((len(residual), 0)) if further is None else further
+        self._values, self._log_prior = scales()
+        self._weighted = [model.precision_at(rows) for rows in (residual, self._further)]
+        self._at: dict[float, tuple[PointRows, FurtherColumns]] = {}
+
+    def summed(self, length: float = 1.0, scale: float = 1.0, inflation: Floats | None = None) -> Summed:
+        """The evidence with the further columns multiplied by a factor.
+
+        `length`: that factor. `scale`: a factor on the noise near the most probable one, where the sum begins.
+        `inflation` (g,): of gross errors under a hypothesis that is nearly the same.
+        """
+        values = self._values
+        first = int(np.argmin(np.abs(np.log(values / scale))))
+        inflations: dict[int, Floats] = {}
+
+        def log_density(number: int) -> float:
+            at_scale = self.with_gross_errors(float(values[number]), length, inflations.get(first, inflation))
+            inflations[number] = at_scale.inflation
+            return at_scale.log_density + float(self._log_prior[number])
+
+        logs = outward(log_density, first, len(values), _NEGLIGIBLE)
+        best = int(np.argmax(logs))
+        return Summed(float(np.logaddexp.reduce(logs)), float(values[best]), inflations[best])
+
+    def with_gross_errors(self, scale: float, length: float = 1.0, start: Floats | None = None) -> GrossErrors:
+        """Density at one scale of the noise, with the further columns multiplied by `length`."""
+        if scale not in self._at:
+            weighted, of_further = (times(scale) for times in self._weighted)
+            rows = PointRows(self._model.with_scale(scale), self._residual, self._points, weighted)
+            self._at[scale] = rows, FurtherColumns(rows, self._further, of_further)
+        rows, further = self._at[scale]
+        return rows.with_gross_errors(outliers(), start, further, length)
+
+
+def outward(log_evidence: Callable[[int], float], first: int, count: int, negligible: float) -> Floats:
+    """Log evidence (count,) by number, as far from the first one as it is not below a part of the largest."""
+    logs = np.full(count, -np.inf)
+    logs[first] = log_evidence(first)
+    for step in (-1, 1):
+        number = first + step
+        while 0 <= number < count:
+            logs[number] = log_evidence(number)
+            if logs[number] < logs.max() + np.log(negligible):
+                break
+            number += step
+    return logs
+
+
+def marginal_of(model: GaussianModel, points: Sequence[Ints], summed: Summed) -> Marginal:
+    """Evidence and most probable model of a sum; `model` has the columns of the hypothesis, at a scale of one."""
+    at_best = model.of_noise(model.columns, summed.scale)
+    excess = columns_of_inflation(at_best, points, summed.inflation)
+    with_excess = model.of_noise(np.column_stack([model.columns, excess]), summed.scale)
+    return Marginal(summed.log_evidence, summed.scale, summed.inflation, with_excess, model.columns.shape[1])

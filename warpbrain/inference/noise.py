@@ -12,12 +12,12 @@ Student t. Of a few points the noise is many times larger, see `gross_errors`.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief, beliefs
-from warpbrain.inference.gross_errors import Outliers
 
 
 def noise_covariance(
@@ -60,6 +60,27 @@ def noise_factor(covariance: Floats, sigma: Floats) -> Floats:
     """Lower triangular factor (n, n) of a covariance of rows whose independent noise is `sigma` (n,)."""
     # rows in metres and in newtons: scaled to a unit diagonal before they are factorised
     return np.asarray(sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma)))
+
+
+@dataclass(frozen=True)
+class Outliers:
+    """Prior of gross errors."""
+
+    probability: float  # that a point is one
+    inflation: float  # factor on the standard deviation of its noise
+    #: Further factors, all equally probable: with a single one a point that is much farther off still has influence.
+    further: tuple[float, ...] = ()
+
+    @property
+    def inflations(self) -> Floats:
+        """Of a sound point, which is 1, and of a gross error, shape (1 + k,)."""
+        return np.array([1.0, self.inflation, *self.further])
+
+    @property
+    def log_probabilities(self) -> Floats:
+        """Of each of them, shape (1 + k,)."""
+        count = 1 + len(self.further)
+        return np.log(np.array([1.0 - self.probability, *[self.probability / count] * count]))
 
 
 def outliers() -> Outliers:

@@ -92,8 +92,10 @@ def log_factors_of_fields(
     white = model.standardised(residuals)
     weights = np.full(len(fields), -np.log(len(fields))) if weights is None else weights
     logs = []
-    for field, weight in zip(fields, weights.tolist(), strict=True):
-        Z = model.standardised(field)
+    # all fields at once: one by one, thousands of small products take several times as long
+    ends = np.cumsum([field.shape[1] for field in fields])[:-1]
+    standardised = np.split(model.standardised(np.concatenate(fields, axis=1)), ends, axis=1)
+    for Z, weight in zip(standardised, weights.tolist(), strict=True):
         values, vectors = np.linalg.eigh(Z.T @ Z)
         values = np.maximum(values, 0.0)
         squares = ((Z @ vectors).T @ white) ** 2

@@ -20,7 +20,7 @@ from warpbrain.report.diagnosis.files import seen
 from warpbrain.report.files import MILLIMETRES, body_file, fingerprints, picked, write_body, write_csv
 from warpbrain.report.page import lines
 from warpbrain.report.summary import machine
-from warpbrain.worlds.body.averaged_tissue import AveragedTissue
+from warpbrain.worlds.body.uncertainty import AveragedTissue
 
 #: More than this part of a recording being gross errors is said.
 _UNEXPLAINED = 0.3

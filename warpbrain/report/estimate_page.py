@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup
 
 from warpbrain.estimation.posterior import Posterior
-from warpbrain.inference.probability import percent
+from warpbrain.inference.calibration import percent
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view, fields_of, known_displacement
 from warpbrain.report.comparison import Explained, explained

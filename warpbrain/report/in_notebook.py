@@ -13,7 +13,7 @@ from warpbrain.diagnosis.result import Diagnosis, Ranked
 from warpbrain.ensemble.results import EnsembleResult
 from warpbrain.errors import InputError
 from warpbrain.estimation.posterior import Marginal, Posterior
-from warpbrain.inference.probability import percent
+from warpbrain.inference.calibration import percent
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.report.case_text import show_lines
 from warpbrain.report.comparison import SHOWN

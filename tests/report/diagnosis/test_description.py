@@ -9,7 +9,7 @@ import pytest
 from sinking_block import OPTIONS, verdict_of
 
 from referee.diagnoses import read_diagnosis
-from warpbrain.diagnosis.held_out import distance
+from warpbrain.diagnosis.checking import distance
 from warpbrain.inference import Kind
 from warpbrain.inference.decide import VERDICTS
 from warpbrain.report.diagnosis.description import describe

@@ -5,7 +5,7 @@ import numpy as np
 from warpbrain.mesh.vtu import read_vtu
 from warpbrain.report.diagnosis.files import write_diagnosed_state
 from warpbrain.report.state_files import LEFT, SEEN, UNSEEN, read_state
-from warpbrain.worlds.body.displacement_spread import displacement_deviation
+from warpbrain.worlds.body.uncertainty import displacement_deviation
 
 
 def test_the_last_state_is_that_of_what_is_named(small_diagnosis, tmp_path):

@@ -7,9 +7,8 @@ import pytest
 from sinking_block import OPTIONS, write_sinking
 
 from warpbrain.inference.causes import Kind
-from warpbrain.worlds.body.averaged_tissue import AveragedTissue, averaged_tissue
-from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.screened import screened
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
+from warpbrain.worlds.body.uncertainty import AveragedTissue, averaged_tissue
 
 
 @pytest.fixture(scope="module")

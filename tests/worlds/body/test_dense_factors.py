@@ -5,9 +5,8 @@ import pytest
 import warp as wp
 from scipy.sparse import csr_array, eye_array, random_array
 
-from warpbrain.worlds.body import dense_factors as module
-from warpbrain.worlds.body.dense_factors import DenseFactors, dense_factors
-from warpbrain.worlds.body.factors import Factors
+from warpbrain.worlds.body import factors as module
+from warpbrain.worlds.body.factors import DenseFactors, Factors, dense_factors
 
 
 def _matrix(n: int = 60):
@@ -30,7 +29,7 @@ def test_a_gpu_without_cupy_has_none(monkeypatch):
 
 def test_they_answer_as_those_on_the_host(gpu, monkeypatch):
     # several blocks of columns
-    monkeypatch.setattr(module, "_TOGETHER", 32)
+    monkeypatch.setattr(module, "_TOGETHER_ON_GPU", 32)
     matrix, rng = _matrix()
     ours, host = Factors(matrix, gpu), Factors(matrix)
     assert ours._dense is not None and host._dense is None

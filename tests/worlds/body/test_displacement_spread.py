@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from warpbrain.diagnosis.result import REFITTED
-from warpbrain.worlds.body.displacement_spread import displacement_columns, displacement_deviation
 from warpbrain.worlds.body.fit_columns import Layout
+from warpbrain.worlds.body.uncertainty import displacement_columns, displacement_deviation
 
 
 def test_nodes_move_as_the_rows_of_a_fit_do(small_diagnosis):

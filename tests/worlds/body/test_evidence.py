@@ -8,10 +8,10 @@ import pytest
 
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import beliefs
-from warpbrain.inference.marginal import RowsAtScales
+from warpbrain.inference.gross_errors import RowsAtScales
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH, Nuisances
+from warpbrain.worlds.body.weighted_set import evidence_of
 
 
 @pytest.fixture

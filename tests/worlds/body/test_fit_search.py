@@ -8,10 +8,9 @@ import pytest
 from sinking_block import OPTIONS, write_sinking
 
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.fit_search import FitSearch
-from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.fitting import FitSearch
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
-from warpbrain.worlds.body.screened import screened
 
 
 @pytest.fixture(scope="module")

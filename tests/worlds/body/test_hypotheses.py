@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from sinking_block import OPTIONS, write_sinking
 
-from warpbrain.diagnosis.confirming import Confirming
+from warpbrain.diagnosis.checking import Confirming
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import NAMED, decide
-from warpbrain.worlds.body.evidence import evidence_of
-from warpbrain.worlds.body.hypotheses import HypothesisSearch, _of_all_places
-from warpbrain.worlds.body.screened import screened
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, _of_all_places, screened
+from warpbrain.worlds.body.weighted_set import evidence_of
 
 
 @pytest.fixture(scope="module")

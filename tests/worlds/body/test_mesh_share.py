@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warpbrain.worlds.body.mesh_share import MeshShare
+from warpbrain.worlds.body.weighted_set import MeshShare
 
 
 def test_a_share_does_not_change_with_mechanisms_beside():

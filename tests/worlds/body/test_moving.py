@@ -18,9 +18,8 @@ from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.fitting import Fitter
-from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.moving import moved_about_fit
-from warpbrain.worlds.body.screened import screened
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
+from warpbrain.worlds.body.placing import moved_about_fit
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
 #: Edge, noise, and centre of the patch [m]; tracked points.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpbrain.inference.beliefs import belief
-from warpbrain.worlds.body.not_physics import _off_surfaces, _wrong_forces
+from warpbrain.worlds.body.causes import _off_surfaces, _wrong_forces
 from warpbrain.worlds.body.sensors import Sensors
 
 POINTS, WALL = 4, 30

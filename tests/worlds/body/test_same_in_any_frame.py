@@ -12,8 +12,7 @@ from warpbrain.cases.case import Case
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import decide
 from warpbrain.mesh import TetMesh
-from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.screened import screened
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 
 _KINDS = ("gravity", "pressure", "swelling", "traction")
 

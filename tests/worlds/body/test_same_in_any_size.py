@@ -14,7 +14,7 @@ from warpbrain.inference.decide import decide
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.recordings.registration import Registration
-from warpbrain.worlds.body.screened import screened
+from warpbrain.worlds.body.hypotheses import screened
 from warpbrain.worlds.options import DiagnosisOptions
 
 #: A specimen of millimetres for a body of centimetres.

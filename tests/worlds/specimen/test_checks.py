@@ -7,18 +7,15 @@ import pytest
 from rods import ROD, cycle, noisy, rod_test, viscous
 from testing_machine import case_of
 
-from warpbrain.inference.confirm import Confirmation, after_checks
-from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Decision
+from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Confirmation, Decision, after_checks
 from warpbrain.physics.words import Value
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import CheckResults, Folds, folds_of, grown_errors, held_out
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
-from warpbrain.worlds.specimen.effects import stiffening
-from warpbrain.worlds.specimen.fit import fit
-from warpbrain.worlds.specimen.forward import Component, Forward
+from warpbrain.worlds.specimen.effects import effects_of, stiffening
+from warpbrain.worlds.specimen.fit import Component, Forward, fit
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.protocol import protocol_of
-from warpbrain.worlds.specimen.registered import effects_of
 from warpbrain.worlds.specimen.result import Score
 
 

@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from warpbrain.diagnosis.held_out import distance
-from warpbrain.diagnosis.result import Diagnosis, Ranked
-from warpbrain.diagnosis.sentences import confusion_sentences, effect_sentence, sentence_of_kind
+from warpbrain.diagnosis.checking import distance
+from warpbrain.diagnosis.result import Diagnosis, Ranked, confusion_sentences, effect_sentence, sentence_of_kind
 from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import Decision
 from warpbrain.physics.mechanisms import mechanisms
@@ -19,8 +18,7 @@ from warpbrain.report.files import fingerprints, picked, plain
 from warpbrain.report.summary import machine
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen import result as of_specimen
-from warpbrain.worlds.specimen import sentences as specimen_sentences
-from warpbrain.worlds.specimen.result import SpecimenDiagnosis
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis, specimen_effect_sentence
 
 #: States of a case in the order in which they are shown, and their names for people.
 STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what is named"}
@@ -229,4 +227,4 @@ def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
 def _ranked_of_specimen(ranked: of_specimen.Ranked) -> dict[str, Any]:
     why = "" if math.isfinite(ranked.log_evidence) else "no fit with it stands"
     known = {"physics": ranked.kind is Kind.PHYSICS, "rejected_because": why, "heldout_rmse_change_pa": ranked.change}
-    return _cause(ranked.name, specimen_sentences.effect_sentence(ranked), known, ranked)
+    return _cause(ranked.name, specimen_effect_sentence(ranked), known, ranked)

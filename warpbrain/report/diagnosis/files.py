@@ -21,7 +21,7 @@ from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.files import MILLIMETRES, body_file, write_body, write_csv
-from warpbrain.worlds.body.displacement_spread import displacement_deviation
+from warpbrain.worlds.body.uncertainty import displacement_deviation
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 

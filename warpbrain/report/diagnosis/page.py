@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
-from warpbrain.inference.probability import percent
 from warpbrain.report.body_sections import known_displacement
 from warpbrain.report.diagnosis import pictures, text
 from warpbrain.report.diagnosis.files import Recorded

@@ -10,7 +10,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.inference.probability import percent
+from warpbrain.inference.calibration import percent
 from warpbrain.physics.words import length, number
 from warpbrain.report import views
 from warpbrain.report.diagnosis.description import STATES

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import NOTHING
-from warpbrain.inference.probability import percent
 from warpbrain.physics.words import measured, number, place
 from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.files import MILLIMETRES

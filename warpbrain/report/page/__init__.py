@@ -21,7 +21,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup, escape
 
 from warpbrain.atomic import whole_file
-from warpbrain.inference.probability import percent
+from warpbrain.inference.calibration import percent
 from warpbrain.physics.words import tabled
 
 #: Characters of a cell that is never broken.

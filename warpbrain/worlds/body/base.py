@@ -28,7 +28,7 @@ from warpbrain.worlds.body.effects import Effects, SolvedSwitches
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
-from warpbrain.worlds.body.sensors import Sensors, noise_of, rows_of_points, tracked_points
+from warpbrain.worlds.body.sensors import Sensors, noise_of, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
 from warpbrain.worlds.body.unknown import body_forces, fields
 
@@ -50,7 +50,6 @@ class Base:
     state: SolvedState  # the base
     at: Linearisation
     effects: Effects
-    switch_states: dict[str, SolvedState]  # states with a switch that were solved for them, by the mechanism
     nuisances: Nuisances
     unknown: dict[str, Floats]  # (n, k), columns of unknown fields, of 1 m
     #: Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
@@ -73,7 +72,7 @@ class Base:
     def for_sensors(self, sensors: Sensors) -> tuple[Nuisances, Effects]:
         """Nuisances as columns over other sensors, in the same coordinates, and what makes effects over them."""
         at = self.at.with_sensors(sensors)
-        effects = Effects(at, SolvedSwitches(self.states, self.state, at.sensors, self.switch_states), self.mesh_errors)
+        effects = self.effects.over(at)
         theta, nuisances = self.state.hypothesis.theta, self.nuisances
         return nuisances_at(
             at, self.states, theta, self.prior, effects, self.mesh_errors, nuisances.anchors, nuisances.fraction
@@ -158,7 +157,6 @@ class BaseFinder:
             state,
             linear.at,
             linear.effects,
-            linear.switch_states,
             nuisances,
             unknown,
             GaussianModel(factor, nuisances.columns),
@@ -214,8 +212,7 @@ class _LinearModel:
     def __init__(self, finder: BaseFinder, state: SolvedState, errors: MeshErrors | None) -> None:
         sensors, states = state.sensors, finder.states
         self.at = state.linearised()
-        self.switch_states: dict[str, SolvedState] = {}
-        self.effects = Effects(self.at, SolvedSwitches(states, state, sensors, self.switch_states), errors)
+        self.effects = Effects(self.at, SolvedSwitches(states, state, {}), errors)
         # first, since it makes the compliance, with which nuisances are products instead of equilibria
         self.lengths = (finder._spacing * beliefs("unknown.lengths")).tolist()
         self.body_forces = body_forces(self.at, self.lengths)
@@ -232,7 +229,7 @@ class _LinearModel:
         self.noise = noise_of(sensors, self.residual, self.nuisances.columns, smooth)
         self.noise_factor = noise_factor(sensors.noise_covariance(self.noise), self.noise)
         self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
-        self.points = tuple(rows for group in rows_of_points(sensors) for rows in group)
+        self.points = sensors.points
 
     def _residual_at_mean(self, state: SolvedState) -> Floats:
         """Residual of the linear model about a state with its tissue, field and motion at their prior mean."""

@@ -66,34 +66,22 @@ class SparseColumns:
 class SolvedSwitches:
     """Effects of switches, such as contact, that have no derivative: states with each are solved, and kept.
 
-    `state`: without the mechanisms. `sensors`: whose response is computed. `solved_states`: states that were solved
-    already, by the mechanism; further ones are added. `instant`: number of the time of the states.
+    `state`: without the mechanisms. `solved_states`: states that were solved already, by the mechanism; further ones
+    are added.
     """
 
-    def __init__(
-        self,
-        states: States,
-        state: SolvedState,
-        sensors: Sensors,
-        solved_states: dict[str, SolvedState],
-        instant: int = -1,
-    ) -> None:
-        self._states, self._state, self._sensors = states, state, sensors
-        self._solved_states, self._instant = solved_states, instant
+    def __init__(self, states: States, state: SolvedState, solved_states: dict[str, SolvedState]) -> None:
+        self._states, self._state, self._solved_states = states, state, solved_states
 
-    def at(self, instant: int, sensors: Sensors) -> SolvedSwitches:
-        """The same of other sensors at the time of a number."""
-        return SolvedSwitches(self._states, self._state, sensors, self._solved_states, instant)
-
-    def effect_of(self, mechanism: Mechanism) -> Floats:
-        """What sensors (n,) record in the state with a mechanism, less that without it."""
+    def effect_of(self, mechanism: Mechanism, sensors: Sensors, instant: int) -> Floats:
+        """What sensors (n,) record in the state with a mechanism, less that without it, at the time of a number."""
         key, state = repr(mechanism), self._state
         if key not in self._solved_states:
             hypothesis = replace(state.hypothesis, mechanisms=(mechanism,))
             # the loads act already: one load step, or the state is taken not to exist
             self._solved_states[key] = self._states.solve(hypothesis, state.u, iterations=EquilibriumOptions.max_newton)
-        solved, without = self._solved_states[key].instants[self._instant], state.instants[self._instant]
-        return self._sensors.answer(solved.u - without.u, solved.reactions - without.reactions)
+        solved, without = self._solved_states[key].instants[instant], state.instants[instant]
+        return sensors.answer(solved.u - without.u, solved.reactions - without.reactions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,20 +124,26 @@ class Effects:
     """Makes the columns of proposals at one state.
 
     `switches`: needed for proposals that are switches. `mesh_errors`: of the state: less compressible tissue locks
-    more, which is part of the effect of a law.
+    more, which is part of the effect of a law. `instant`: number of the time of the state.
     """
 
     def __init__(
-        self, at: Linearisation, switches: SolvedSwitches | None = None, mesh_errors: MeshErrors | None = None
+        self,
+        at: Linearisation,
+        switches: SolvedSwitches | None = None,
+        mesh_errors: MeshErrors | None = None,
+        instant: int = -1,
     ) -> None:
-        self.at = at
-        self.mesh_errors = mesh_errors
-        self._switches = switches
+        self.at, self.mesh_errors, self._switches, self._instant = at, mesh_errors, switches, instant
         self._internal: Floats | None = None
         model = at.system.model
         acting = [m for m in (*model.loads, *model.mechanisms) if isinstance(m, Mechanism) and not m.several]
         # kinds of which a case has only one: a proposed mechanism replaces them
         self._exclusive = {mechanism.kind: mechanism for mechanism in acting}
+
+    def over(self, at: Linearisation) -> Effects:
+        """The same over other sensors at the same state."""
+        return Effects(at, self._switches, self.mesh_errors)
 
     def of(self, proposals: Sequence[Proposal], present: Mechanism | None = None) -> list[Effect]:
         """Columns of each proposal, with what they have in common computed once.
@@ -160,11 +154,11 @@ class Effects:
         # of each state: effects there, its rows among all, with which sign, and their times
         parts: list[tuple[Effects, Any, float, Floats]] = []
         for moment in self.at.moments:
-            switches = None if self._switches is None else self._switches.at(moment.number, moment.at.sensors)
-            here = Effects(moment.at, switches, self.mesh_errors)
+            here = Effects(moment.at, self._switches, self.mesh_errors, moment.number)
             parts.append((here, moment.rows, moment.sign, np.full(len(moment.rows), moment.time)))
         parts = parts or [(self, slice(None), 1.0, self.at.sensors.times)]
-        by_part = [(here._at_one_time(_each_once(bases), present), *where) for here, *where in parts]
+        each_once = list({id(base): base for base in bases}.values())
+        by_part = [(here._at_one_time(each_once, present), *where) for here, *where in parts]
         return [
             self._over_time(proposal, [(effects[id(base)], *where) for effects, *where in by_part])
             for proposal, base in zip(proposals, bases, strict=True)
@@ -197,8 +191,11 @@ class Effects:
 
     def _at_one_time(self, proposals: Sequence[Proposal], present: Mechanism | None) -> dict[int, Effect]:
         """Effects at one state by the identity of their proposals."""
-        courses = self._courses([proposal for proposal in proposals if proposal.pace is not None])
-        instant = self._instantaneous([proposal for proposal in proposals if proposal.history is not None], present)
+        flows = _started([proposal for proposal in proposals if proposal.pace is not None])
+        terms = {key: bound_term(self.at.system, cast(Following, flow)) for key, flow in flows.items()}
+        courses = {key: consolidation(self.at, term) for key, term in terms.items()}
+        fading = _started([proposal for proposal in proposals if proposal.history is not None])
+        instant = dict(zip(fading, self._answers(list(fading.values()), present).T, strict=True))
         stencils = [self._stencil(proposal) for proposal in proposals]
         answers = self._answers([mechanism for mechanisms in stencils for mechanism in mechanisms], present)
         effects, first = [], 0
@@ -212,19 +209,6 @@ class Effects:
             else:
                 effects.append(self._effect(proposal, columns))
         return dict(zip(map(id, proposals), effects, strict=True))
-
-    def _courses(self, proposals: Sequence[Proposal]) -> dict[str, Course]:
-        """Courses of proposals by the mechanism at their starts, each computed once."""
-        started = _started(proposals)
-        system = self.at.system
-        terms = {key: bound_term(system, cast(Following, flow)) for key, flow in started.items()}
-        return {key: consolidation(self.at, term) for key, term in terms.items()}
-
-    def _instantaneous(self, proposals: Sequence[Proposal], present: Mechanism | None) -> dict[str, Floats]:
-        """Effects (n,) of fading proposals at the instant of the load, by the mechanism at their starts."""
-        started = _started(proposals)
-        answers = self._answers(list(started.values()), present)
-        return dict(zip(started, answers.T, strict=True))
 
     def _fading(self, proposal: Proposal, instant: Floats) -> Effect:
         sensors = self.at.sensors
@@ -254,7 +238,7 @@ class Effects:
                 answer = self.at.released(patch.members, patch.held, proposal.make(proposal.mean).lifts)
             else:
                 assert self._switches is not None, "about a fit switches keep their columns"
-                answer = self._switches.effect_of(proposal.make(proposal.mean))
+                answer = self._switches.effect_of(proposal.make(proposal.mean), self.at.sensors, self._instant)
             return Effect(proposal, proposal.mean[0] * answer, proposal.sd[0] * answer[:, None])
         if proposal.follows == "proportional":
             return Effect(proposal, answers @ (proposal.mean / proposal.sd), answers)
@@ -353,11 +337,6 @@ class Effects:
         change = at.internal_forces() - self._internal
         system.set_materials(materials)
         return change
-
-
-def _each_once(proposals: Sequence[Proposal]) -> list[Proposal]:
-    """Proposals without repetition."""
-    return list({id(proposal): proposal for proposal in proposals}.values())
 
 
 def _expanded(columns: Floats, varying: Varying, times: Floats) -> Floats:

@@ -14,11 +14,10 @@ from warpbrain.worlds.body.dictionary import is_linear
 from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, parts_of, width_of
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
-from warpbrain.worlds.body.mesh_share import MeshShare
 from warpbrain.worlds.body.nuisances import LAW, Nuisances, field_columns, law_columns, mesh_by_tissue, tissue_columns
-from warpbrain.worlds.body.refit import Refit
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState
+from warpbrain.worlds.body.weighted_set import MeshShare, Refit
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,10 @@
-"""Fits of sets of causes of one case without linearising: their starts, their noise, and the error of the mesh."""
+"""Fits of sets of causes without linearising: the best point of tissue, stiffness field and mechanisms together.
+
+Gauss-Newton's method on standard normal coordinates: those of tissue, field and mechanisms act through an equilibrium,
+those of other nuisances linearly. Columns are made anew where the coordinates have moved away from. The evidence is
+Laplace's: that of the linear model about the best point, summed over the scale of the noise and over gross errors as in
+screening. A fit is repeated with the noise and the error of the mesh that it arrives at.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +15,374 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
-from warpbrain.inference.marginal import Marginal
+from warpbrain.estimation.finer_mesh import Difference
+from warpbrain.inference.beliefs import belief
+from warpbrain.inference.gross_errors import Marginal
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.simulation.equilibrium import EquilibriumOptions
+from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.fit_search import FitSearch
+from warpbrain.worlds.body.effects import Effect, width_of
+from warpbrain.worlds.body.fit_columns import Layout, columns_about
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors
-from warpbrain.worlds.body.mesh_share import excess_error
-from warpbrain.worlds.body.refit import Refit
-from warpbrain.worlds.body.states import SolvedState
+from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
+from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion
+from warpbrain.worlds.body.states import Hypothesis, SolvedState
+from warpbrain.worlds.body.weighted_set import MeshShare, Refit, evidence_of, excess_error, mesh_share_of
 
+_ITERATIONS, _HALVINGS = 20, 6
+#: How far [standard deviations] coordinates go until columns are made anew.
+_RELINEARISE = 0.3
+#: Step [standard deviations] of a difference between states.
+_DIFFERENCE = 0.05
+#: Earlier states from which the next one is extrapolated at most.
+_KEPT = 9
+#: Steps shorter than this in standard deviations of the prior end the search.
+_SHORT = 0.03
+#: By how much an error of the mesh changes that is worth going on [standard deviations: of the noise, all sensors
+#: together, and of what is not known of that error].
+_MATTERS = 0.3
 #: How often at most a fit is repeated with the error of the mesh, or the gross errors and the noise, of its result.
 _ROUNDS = 3
 #: Change of the log evidence below which the fit is not repeated again.
 _SAME = 0.1
-#: Change of the mesh's error [standard deviations of the noise, all sensors together] with which a fit is repeated.
-_MATTERS = 0.3
 #: What is raised of a set that cannot be fitted.
 CANNOT_BE_FITTED = (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError)
+
+
+class FitSearch:
+    """One fit on its way: the best point so far, and the columns of the linear model about it.
+
+    `mesh_errors`: without the share of mechanisms; None: the mesh is taken for exact. `effects`, `columns`, `screened`:
+    see `warpbrain.worlds.body.fitting.Fitter`. `z` (q + e + k,): coordinates of the best point. `residual` (n,),
+    `columns` (n, q + e + k).
+    """
+
+    def __init__(
+        self,
+        base: Base,
+        mesh_errors: MeshErrors | None,
+        effects: tuple[Effect, ...],
+        columns: Floats,
+        screened: Marginal,
+    ) -> None:
+        self._base, self.mesh_errors, self.effects = base, mesh_errors, effects
+        self._marginal, self._noise = screened, screened.noise
+        nuisances = base.nuisances
+        self._U = columns[:, : columns.shape[1] - width_of(effects)]
+        self._layout = Layout.of(nuisances, self._U.shape[1], effects)
+        # recordings were realigned by a rigid motion already, which keeps its prior cost as coordinates; another one is
+        # no linear change of what moved far
+        self._rigid = RigidMotion(base.states, nuisances)
+        self._linear = self._layout.linear.copy()
+        self._linear[self._rigid.part] = False
+        # nonlinear coordinates and displacements of states of this fit
+        self._solved: list[tuple[Floats, Floats]] = []
+        self._mesh_share: MeshShare | None = None
+        # coefficients (k,) at which that was computed in this fit
+        self._share_computed_at: Floats | None = None
+        # the state that was linearised last, and the coordinates of that of the columns
+        self._nearby = base.at
+        self._linearised_at = np.full(len(self._layout.nonlinear), np.inf)
+        # whether the columns lack a share of the mesh's error that residuals have
+        self._outdated = False
+        # of the last state of this fit that was followed over time
+        self._course: tuple[Floats, ...] = ()
+        self.columns = columns
+        self.state, self.converged = base.state, False
+        self.z, self.residual, self._best = np.zeros(self.columns.shape[1]), np.zeros(len(self._U)), np.inf
+
+    def start(self, starts: Sequence[Floats], nearby: SolvedState) -> None:
+        """Take the best of some coordinates, within limits."""
+        self._best = np.inf
+        for number, start in enumerate(starts, 1):
+            z = self._clipped(start)
+            try:
+                self._accept_if_better(z, *self._evaluate(z, nearby))
+            except (SolveError, InputError):
+                if number == len(starts) and not np.isfinite(self._best):
+                    raise
+
+    def begin_at(self, subset: Refit, about: Linearisation | None = None) -> Floats:
+        """Take the columns for those about a fit with the first of the effects, or all; keep its share of the mesh.
+
+        `about`: of its state, if it was linearised. Returns (q + e + k,): coordinates of that fit.
+        """
+        first, coefficients = self._U.shape[1], np.concatenate(subset.coefficients)
+        z = np.zeros(len(self.z))
+        z[: len(subset.nuisances)] = subset.nuisances
+        # about as large as there
+        part = self._base.nuisances.part(UNKNOWN_MESH)
+        sizes = [float(np.linalg.norm(columns[:, part])) for columns in (subset.columns, self.columns)]
+        z[part] *= sizes[0] / sizes[1] if sizes[1] else 1.0
+        z[first : first + len(coefficients)] = coefficients
+        self._linearised_at, self._nearby = z, about or self._nearby
+        # a place that leads to no state nearby is given up soon: from rest, in load steps, that takes minutes
+        self._solved = [(z[self._layout.nonlinear], subset.state.u)]
+        if subset.mesh_share is not None:
+            share = subset.mesh_share.extended(len(self.z) - first)
+            self._take_mesh_share(share, z[first:])
+            self._outdated = True
+        return z
+
+    def _take_mesh_share(self, share: MeshShare, z: Floats) -> None:
+        """Take a share of the mesh's error for that of the mechanisms, known to a part only, about coefficients (k,).
+
+        On meshes that lock it is as large as the effect itself: there the error does not yet fall with the power of the
+        element size that is assumed.
+        """
+        nuisances, unknown = self._base.nuisances, belief("mesh.share") * share.at(z)[:, None]
+        self._U = nuisances.with_family(MESH_SHARE, self._U, unknown)
+        self.columns = nuisances.with_family(MESH_SHARE, self.columns, unknown)
+        self._mesh_share = share
+
+    def backtrack_to_base(self) -> None:
+        """Move tissue and field toward the base while that is better: far from it the linear model may fail."""
+        base = self.z.copy()
+        coordinates = self._base.nuisances.coordinates(self._base.prior, self._base.state.hypothesis)
+        for part in (self._layout.tissue, self._layout.field):
+            base[part] = coordinates[part]
+        far = self.z
+        for share in (0.5, 0.0):
+            between = base + share * (far - base)
+            if not self._accept_if_better(between, *self._evaluate(between, self.state)):
+                return
+
+    def minimise(self) -> None:
+        """Go to the best point nearby by Gauss-Newton's method, with columns made anew on the way.
+
+        Where something relaxes, columns of a state that does not help are replaced by differences of states: tissue
+        that is several times as stiff at first is no small change of what it is in the end.
+        """
+        self.converged, by_differences = False, False
+        for iteration in range(_ITERATIONS):
+            moved = np.abs(self.z - self._linearised_at)[self._layout.nonlinear].max(initial=0.0)
+            if self._outdated or (iteration > 0 and moved > _RELINEARISE):
+                self._relinearise()
+                if by_differences:
+                    self.columns = self._difference_columns()
+            self.columns = self._rigid.renewed(self.columns, self.state.sensors, self.z)
+            step, current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
+            if np.abs(step).max() < _SHORT:
+                self.converged = True
+                return
+            if not self._line_search(step):
+                if not current and np.abs(step).max() >= 2.0 * _SHORT:
+                    # columns that were made elsewhere may point uphill
+                    self._linearised_at = np.full(len(self.z), np.inf)
+                    continue
+                # what is left is rounding, or no better point lies this way: the last good one stands
+                self.converged = bool(np.abs(step).max() < 2.0 * _SHORT)
+                relaxing = any(effect.proposed.history for effect in self.effects)
+                if self.converged or by_differences or not relaxing:
+                    return
+                by_differences, self._linearised_at = True, np.full(len(self.z), np.inf)
+            if self.converged:
+                return
+
+    def update_noise(self, fit: Refit) -> bool:
+        """Take noise, gross errors and the mesh's unknown error of a result; whether it was fitted with others."""
+        marginal, nuisances = fit.marginal, self._base.nuisances
+        same = marginal.scale == self._marginal.scale and np.array_equal(marginal.gross, self._marginal.gross)
+        same &= marginal.model.noise_factor is self._marginal.model.noise_factor
+        self._marginal, self._noise = marginal, marginal.noise
+        part = nuisances.part(UNKNOWN_MESH)
+        unknown, before = fit.columns[:, part], self.columns[:, part]
+        if np.linalg.norm(unknown - before) > _MATTERS * np.linalg.norm(before):
+            same = False
+            self.residual = self.residual + before @ self.z[part] - unknown @ fit.nuisances[part]
+            self.z = self.z.copy()
+            self.z[part] = fit.nuisances[part]
+            self._U = nuisances.with_family(UNKNOWN_MESH, self._U, unknown)
+            self.columns = nuisances.with_family(UNKNOWN_MESH, self.columns, unknown)
+        if not same:
+            self._best = np.inf
+            self._accept_if_better(self.z, self.state, self.residual)
+        return not same
+
+    def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> bool:
+        """Compute the mechanisms' share of the mesh's error at the best point; whether it is another than was known.
+
+        None is known to be another where a finer mesh does not tell. It is in proportion to the mechanisms: where
+        these have hardly changed it is not computed again.
+        """
+        coefficients, prior = [self.z[part] for part in self._layout.effects], self._base.prior
+        least = _MATTERS * belief("mesh.share")
+        if self._share_computed_at is not None:
+            offsets = [effect.offset(z) for effect, z in zip(self.effects, coefficients, strict=True)]
+            moved = float(np.linalg.norm(self.z[self._layout.coefficients] - self._share_computed_at))
+            if moved <= least * float(np.linalg.norm(np.concatenate(offsets))):
+                return False
+        before, z = self._mesh_share, self.z[self._layout.coefficients]
+        share = mesh_share_of(self.effects, coefficients, self.state, known, finer, prior)
+        self._share_computed_at = z
+        if share is None:
+            return False
+        before_U = self._U
+        self._take_mesh_share(share, z)
+        change, by_coefficients = share.at(z), share.columns()
+        if before is not None:
+            change, by_coefficients = change - before.at(z), by_coefficients - before.columns()
+        self.columns[:, self._layout.coefficients] += by_coefficients
+        self._best = np.inf
+        residual = self.residual - change + (before_U - self._U) @ self.z[: self._U.shape[1]]
+        self._accept_if_better(self.z, self.state, residual)
+        size, changed = (float(np.linalg.norm(self._noise.whitened(each))) for each in (share.at(z), change))
+        return changed > max(_MATTERS, least * size)
+
+    def result(self) -> Refit:
+        """The fit at its best point."""
+        q = self._U.shape[1]
+        linear = self.residual + self.columns @ self.z
+        columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.scale)
+        part, z = self._base.nuisances.part(UNKNOWN_MESH), self.z.copy()
+        z[part] = evidence.coordinates(linear)[part]
+        W = self._noise.whitened(columns)
+        covariance = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
+        # how far the best point would move if the search had gone on is uncertainty, too
+        shift = covariance @ (W.T @ self._noise.whitened(linear)) - z
+        parts = self._layout.effects
+        return Refit(
+            self.effects,
+            self.state,
+            z[:q],
+            tuple(z[part] for part in parts),
+            tuple(covariance[part, part] + np.outer(shift[part], shift[part]) for part in parts),
+            linear - columns @ z,
+            linear,
+            columns,
+            evidence,
+            self.converged,
+            self._mesh_share,
+        )
+
+    def _gauss_newton_step(self, field_stays: bool) -> Floats:
+        """The step; without the stiffness field, whose columns are rough where something relaxes, if that stays.
+
+        Coordinates at a limit that the step would leave stay there (projected Newton, Bertsekas 1982): clipped with the
+        others as they are, the step need not be downhill.
+        """
+        free, limited = np.ones(len(self.z), dtype=bool), np.zeros(len(self.z), dtype=bool)
+        free[self._layout.field] = not field_stays
+        limited[self._layout.tissue] = limited[self._layout.field] = True
+        limited &= np.abs(self.z) >= belief("tissue.farthest") * (1.0 - 1e-9)
+        white = self._noise.whitened(np.column_stack([self.residual, self.columns]))
+        W = white[:, 1:]
+        gradient = W.T @ white[:, 0] - self.z
+        while True:
+            kept, step = np.flatnonzero(free), np.zeros(len(self.z))
+            step[kept] = np.linalg.solve(np.eye(len(kept)) + W[:, kept].T @ W[:, kept], gradient[kept])
+            leaving = free & limited & (step * self.z > 0.0)
+            if not leaving.any():
+                return step
+            free &= ~leaving
+
+    def _line_search(self, step: Floats) -> bool:
+        """Go along a step, halved until it is downhill; whether any of it was."""
+        for _ in range(_HALVINGS):
+            before, trial = self.z, self._clipped(self.z + step)
+            try:
+                better = self._accept_if_better(trial, *self._evaluate(trial, self.state))
+            except (SolveError, InputError):
+                better = False
+            if better:
+                self.converged = bool(np.abs(trial - before).max() < _SHORT)
+                return True
+            step = 0.5 * step
+        return False
+
+    def _accept_if_better(self, z: Floats, state: SolvedState, residual: Floats) -> bool:
+        white = self._noise.whitened(residual)
+        objective = 0.5 * float(white @ white + z @ z)
+        if not objective <= self._best + 1e-9:
+            return False
+        self.z, self.state, self.residual, self._best = z, state, residual, objective
+        return True
+
+    def _clipped(self, z: Floats) -> Floats:
+        clipped, farthest = z.copy(), belief("tissue.farthest")
+        for part in (self._layout.tissue, self._layout.field):
+            clipped[part] = np.clip(clipped[part], -farthest, farthest)
+        return clipped
+
+    def _evaluate(self, z: Floats, nearby: SolvedState) -> tuple[SolvedState, Floats]:
+        """State and residual at coordinates."""
+        base, layout, mesh = self._base, self._layout, self.mesh_errors
+        mechanisms: list[Mechanism] = []
+        patches = []
+        for effect, part in zip(self.effects, layout.effects, strict=True):
+            mechanisms += effect.proposed.acting(effect.coefficients(z[part]))
+            if effect.proposed.patch is not None:
+                patches.append(effect.proposed.patch)
+        theta = base.prior.mean + base.prior.factor @ z[layout.tissue]
+        hypothesis = Hypothesis(theta, z[layout.field], tuple(mechanisms), tuple(patches))
+        error = None if mesh is None else expected(mesh.of(hypothesis, base.prior))
+        state = self._solve(hypothesis, z[layout.nonlinear], nearby, error)
+        self._course = state.course or self._course
+        q = self._U.shape[1]
+        residual = state.sensors.residual - self._U[:, self._linear] @ z[:q][self._linear]
+        residual = residual + self._rigid.change(state.sensors, z)
+        if self._mesh_share is not None:
+            residual = residual - self._mesh_share.at(z[q:])
+        for effect, part in zip(self.effects, layout.effects, strict=True):
+            if effect.proposed.is_there_or_not:
+                # the state has a switch as a whole: its coefficient is how exactly it is simulated
+                residual = residual - effect.columns @ z[part]
+        return state, residual
+
+    def _solve(
+        self, hypothesis: Hypothesis, nonlinear: Floats, nearby: SolvedState, error: Difference | None
+    ) -> SolvedState:
+        """The state at nonlinear coordinates, begun at an extrapolation of those of this fit."""
+        states = self._base.states
+        start, course = (
+            extrapolated(self._solved, nonlinear) if self._solved else nearby.u,
+            nearby.course or self._course,
+        )
+        # where states of this fit are known a step that leads to none nearby is shortened: from rest, in load steps, a
+        # law that stiffens exponentially takes minutes to fail
+        most = EquilibriumOptions.max_newton if self._solved else EquilibriumOptions.max_total_newton
+        try:
+            state = states.solve(hypothesis, start, error, course, most, self._nearby)
+        except SolveError:
+            if self._solved:
+                raise
+            state = states.solve(hypothesis, None, error)
+        self._solved = [*self._solved[-_KEPT:], (nonlinear, state.u)]
+        return state
+
+    def _relinearise(self) -> None:
+        """Make the columns of tissue, field, law and mechanisms anew at the best point."""
+        self.columns, at = columns_about(
+            self.state,
+            self.z,
+            self.columns,
+            self._layout,
+            self.effects,
+            self._base,
+            self.mesh_errors,
+            self._mesh_share,
+        )
+        self._nearby = self._nearby if at is None else at
+        self._linearised_at, self._outdated = self.z, False
+        # laws act linearly: of what they do, that about the new state
+        law = self._layout.law
+        before, self._U = self._U, self._U.copy()
+        self._U[:, law] = self.columns[:, law]
+        self._best = np.inf
+        self._accept_if_better(self.z, self.state, self.residual + (before - self._U)[:, law] @ self.z[law])
+
+    def _difference_columns(self) -> Floats:
+        """Columns with those of tissue and mechanisms as differences between states."""
+        columns = self.columns.copy()
+        numbers = np.arange(len(self.z))
+        for k in (*numbers[self._layout.tissue].tolist(), *numbers[self._layout.coefficients].tolist()):
+            shifted = self.z + _DIFFERENCE * np.eye(1, len(self.z), k)[0]
+            try:
+                columns[:, k] = (self.residual - self._evaluate(shifted, self.state)[1]) / _DIFFERENCE
+            except (SolveError, InputError):
+                continue
+        return columns
 
 
 class Fitter:

@@ -7,34 +7,38 @@ weighed in the linear model about its fit, where what acts already is as large a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.errors import SolveError
+from warpbrain.cases.case import Case
+from warpbrain.cases.enough import too_few_to_diagnose
+from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import Listener
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.inference import GaussianModel, Search, posterior
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
-from warpbrain.threads import in_threads
-from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.causes import causes_of, visible
-from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit
+from warpbrain.threads import in_threads, one_thread_of_blas
+from warpbrain.worlds.body.base import Base, BaseFinder
+from warpbrain.worlds.body.causes import causes_of, not_physics_at, visible
+from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit, candidates_at, dictionary_of
 from warpbrain.worlds.body.effects import Effects
-from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
-from warpbrain.worlds.body.moving import moved_about_fit
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
-from warpbrain.worlds.body.refit import Refit
+from warpbrain.worlds.body.placing import moved_about_fit, weigh, with_refined_places
+from warpbrain.worlds.body.states import States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
-from warpbrain.worlds.body.weighing import weigh, with_refined_places
-from warpbrain.worlds.body.weighted_set import WeightedSet
+from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
 
 #: Places of each cause of which pairs are made, and sets that are weighed with gross errors of their own.
 _PLACES, _SETS = 20, 12
@@ -352,3 +356,70 @@ def _most_probable(screened: Sequence[Hypothesis], singles: bool = True) -> list
     others = screened[_SETS:]
     kept = [other for other in others if not other.causes or (singles and len(other.causes) == 1)]
     return [*screened[:_SETS], *kept]
+
+
+def require_observable(case: Case) -> None:
+    """Raise `InputError` if there are too few recordings."""
+    if case.specimen is not None:
+        raise InputError(f"{case.path}: [specimen]: a specimen is diagnosed test by test")
+    Observations.to_fit(case)
+    if why := too_few_to_diagnose(case):
+        raise InputError(f"{case.path}: {why}")
+
+
+def screened(
+    case: Case,
+    device: str | None = None,
+    listener: Listener | None = None,
+    prior: Gaussian | None = None,
+    *,
+    mesh_error: bool = True,
+    without_nuisances: bool = False,
+    mechanisms: Sequence[str] | None = None,
+    timed: Callable[[str], AbstractContextManager[Any]] = nullcontext,
+) -> HypothesisSearch:
+    """Sets of causes of a case.
+
+    Parameters
+    ----------
+    case : Case
+    device : str, optional
+        Warp device.
+    listener : Listener, optional
+    prior : Gaussian, optional
+        Of the tissues' parameters; that of a diagnosis unless given.
+    mesh_error : bool
+        False: the mesh is taken for exact.
+    without_nuisances : bool
+        Whether mechanisms are credited with what is no physics, too.
+    mechanisms : sequence of str, optional
+        Kinds that are looked for; all by default.
+    timed : callable, optional
+        A context in which each stage is done, by its name.
+
+    Raises
+    ------
+    InputError
+        If there are too few recordings.
+    SolveError
+        If the case as declared has no equilibrium.
+    """
+    require_observable(case)
+    listener = listener or Listener()
+    states = States(case, device)
+    dictionary = dictionary_of(case, mechanisms, instants_of(case, states.times), states.times)
+    spacing = dictionary.situation.spacing
+    with one_thread_of_blas():
+        with timed("base"):
+            base = BaseFinder(states, spacing, mesh_error, without_nuisances, listener, prior).find()
+        with timed("candidates"):
+            candidates = candidates_at(
+                dictionary,
+                base.effects,
+                not_physics_at(base.at, base.nuisances),
+                lambda kind: listener.stage(f"candidate: {kind}"),
+            )
+        search = HypothesisSearch(base, candidates, spacing, listener)
+        with timed("screening"):
+            search.screen()
+    return search

@@ -1,4 +1,4 @@
-"""A case about one state: the response of the sensors to a small force anywhere.
+"""A case about one state: the response of the sensors to a small force anywhere, and to held nodes that are released.
 
 At an equilibrium `u` with tangent stiffness `K`, a further nodal force `g` moves the free components by `K^-1 g` and
 changes the reactions of the held ones by `K_cf K_ff^-1 g_f - g_c`. Of the sensors `H` only
@@ -7,6 +7,14 @@ changes the reactions of the held ones by `K_cf K_ff^-1 g_f - g_c`. Of the senso
 
 is needed, one right-hand side a sensor; after that each cause costs a product with `A`. Sparse factors of 5,000 nodes
 take a fifth of a second, and 100 right-hand sides half of that.
+
+Each patch of a held surface that is released costs a dense solution of its size. The free components are eliminated
+once: with `h` the nodes of the surface and `f` what is free,
+
+    S = K_hh - K_hf K_ff^-1 K_fh
+
+is its stiffness. A patch moves by `-S^-1 R` along the wall, `R` its reactions; nodes that can lift off also leave the
+wall where they are under tension, by an active set (Wriggers, Computational Contact Mechanics, 2nd ed., section 5.3.1).
 """
 
 from __future__ import annotations
@@ -23,20 +31,116 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.mesh import TetMesh, vertex_normals
+from warpbrain.errors import SolveError
+from warpbrain.mesh import TetMesh, tangents, vertex_normals
 from warpbrain.mesh.quality import extent
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.multisecant import toward_equilibrium
 from warpbrain.simulation.system import System
 from warpbrain.threads import fill_columns, in_threads
 from warpbrain.worlds.body.factors import Factors
-from warpbrain.worlds.body.releasing import HeldSurface
 from warpbrain.worlds.body.sensors import Sensors
 
+#: Changes of the active set at most.
+_CHANGES = 20
+#: Displacement, relative to the size of the body, above which too little holds it for a linear solution.
+_FARTHEST = 0.2
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
 #: Columns that one thread computes at a time: of dense forces, and of sparse ones.
 _TOGETHER, _TOGETHER_SPARSE = 64, 8
+
+
+class HeldSurface:
+    """A set of held nodes at a state.
+
+    `at`: about that. `members` (N,): nodes, all of whose components are held. `normals` (N, 3): outward. `size`: of the
+    body [m].
+    """
+
+    def __init__(self, at: Linearisation, members: Bools, normals: Floats, size: float) -> None:
+        stiffness, free = at.stiffness, at.free
+        self.members = np.flatnonzero(members)
+        self._farthest = _FARTHEST * size
+        count = len(self.members)
+        components = np.repeat(members, 3)
+        coupling = stiffness[free][:, components].tocsc()
+        condensed = np.asarray(stiffness[components][:, components].todense())
+        condensed -= at.factors.between(stiffness[components][:, free], coupling)
+        self._coupling = coupling
+        # two tangents and the normal
+        tangent_vectors = tangents(normals[self.members])
+        self._frames = np.concatenate([tangent_vectors, normals[self.members][:, None]], axis=1)
+        rotated = np.einsum("aki,aibj,blj->akbl", self._frames, condensed.reshape(count, 3, count, 3), self._frames)
+        self._S = rotated.reshape(3 * count, 3 * count)
+        self._R = np.einsum("aki,ai->ak", self._frames, at.reactions[self.members])
+        self._released: dict[tuple[bytes, bool], Floats] = {}
+
+    def answers(self, at: Linearisation) -> Floats:
+        """What the sensors of the same state record where each component of `moved` is 1 m: (n, 3 m)."""
+        sensors, free = at.sensors, at.free
+        components = (3 * self.members[:, None] + np.arange(3)).ravel()
+        held = sensors.by_reactions[:, ~free] @ at.stiffness[~free][:, components]
+        direct = np.asarray((sensors.by_displacement[:, components] + held).todense())
+        direct -= (self._coupling.T @ at.compliance[:, free].T).T
+        along = np.einsum("naj,akj->nak", direct.reshape(len(direct), -1, 3), self._frames)
+        return np.asarray(along).reshape(direct.shape)
+
+    def moved(self, patch: Bools, lifts: bool) -> Floats:
+        """Displacement (3 m,) [m] of its nodes, along two tangents and the normal of each, where a patch lets go.
+
+        `patch` (N,). `SolveError` if too little holds the body without the patch.
+        """
+        members = patch[self.members]
+        key = members.tobytes(), lifts
+        if key not in self._released:
+            self._released[key] = self._release(members, lifts)
+        return self._released[key]
+
+    def _release(self, members: Bools, lifts: bool) -> Floats:
+        """Displacement (3 m,) of the nodes where some (m,) let go, their motion along the wall eliminated first."""
+        from scipy.linalg import cho_factor, cho_solve
+
+        count = int(members.sum())
+        nodes = 3 * np.flatnonzero(members)
+        along, normal = np.sort(np.concatenate([nodes, nodes + 1])), nodes + 2
+        coupling, R = self._S[np.ix_(normal, along)], self._R.ravel()
+        displacement = np.zeros(len(R))
+        try:
+            factor = cho_factor(self._S[np.ix_(along, along)], check_finite=False)
+            sliding = -cho_solve(factor, R[along], check_finite=False)
+            displacement[along] = sliding
+            if lifts:
+                by_normal = cho_solve(factor, coupling.T, check_finite=False)
+                stiffness = self._S[np.ix_(normal, normal)] - coupling @ by_normal
+                lifted = self._lifted(stiffness, R[normal] + coupling @ sliding, R[normal] > 0.0)
+                displacement[normal], displacement[along] = lifted, sliding - by_normal @ lifted
+        except np.linalg.LinAlgError:
+            displacement[normal] = np.inf
+        if not np.abs(displacement).max() < self._farthest:
+            raise SolveError(f"letting go of {count} nodes: no equilibrium is near")
+        return displacement
+
+    @staticmethod
+    def _lifted(S: Floats, R: Floats, off: Bools) -> Floats:
+        """Displacement (k,) along the normals of nodes that leave the wall where they are under tension.
+
+        `S` (k, k): stiffness of their motion along the normals, that along the wall eliminated. `R` (k,): reactions
+        along the normals. `off` (k,): those that are off at first.
+        """
+        from scipy.linalg import cho_factor, cho_solve
+
+        for _ in range(_CHANGES):
+            lifted = np.zeros(len(R))
+            if off.any():
+                factor = cho_factor(S[np.ix_(off, off)], check_finite=False)
+                lifted[off] = -cho_solve(factor, R[off], check_finite=False)
+            under_tension = R + S @ lifted > 0.0
+            changed = np.where(off, lifted < 0.0, under_tension)
+            if np.array_equal(changed, off):
+                break
+            off = changed
+        return lifted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,9 +238,11 @@ class Linearisation:
         free = ~system.model.constrained.ravel()
         #: `K` [N/m] on every component, SciPy CSR (3 N, 3 N).
         self.stiffness: Any = K
-        self._free, self._held_free = free, K[~free][:, free]
+        #: Components (3 N,) that nothing holds.
+        self.free: Bools = free
+        self._held_free = K[~free][:, free]
         # Cholesky factors on a GPU need a symmetric matrix
-        self._factors = Factors(K[free][:, free], system.device if skew is None else None, symmetric=skew is None)
+        self.factors = Factors(K[free][:, free], system.device if skew is None else None, symmetric=skew is None)
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:
         """The same state with other sensors, without factorising again."""
@@ -156,7 +262,7 @@ class Linearisation:
     @cached_property
     def _rows(self) -> tuple[Floats, NDArray[np.intp]]:
         """Distinct rows of `A`, and the number of its row for each sensor (n,): several times share one row."""
-        free, sensors = self._free, self.sensors
+        free, sensors = self.free, self.sensors
         by_R = sensors.by_reactions[:, ~free]
         moved = (sensors.by_displacement[:, free] + by_R @ self._held_free).tocsr()
         held = -np.asarray(by_R.todense())
@@ -165,7 +271,7 @@ class Linearisation:
         _, different, which = np.unique(mark, return_index=True, return_inverse=True)
         # Fortran order: products with sparse forces then need no copy
         A = np.empty((len(different), len(free)), order="F")
-        A[:, free] = self._factors.solve(moved[different].T, transposed=True).T
+        A[:, free] = self.factors.solve(moved[different].T, transposed=True).T
         A[:, ~free] = held[different]
         return A, which.ravel()
 
@@ -188,27 +294,15 @@ class Linearisation:
         """A held surface with the responses of the sensors to it, made once."""
         if key not in self._surfaces:
             mesh = self.system.model.mesh
-            self._surfaces[key] = HeldSurface(
-                self.stiffness,
-                self._free,
-                self._factors,
-                held,
-                vertex_normals(mesh),
-                self.reactions,
-                extent(mesh.points),
-            )
+            self._surfaces[key] = HeldSurface(self, held, vertex_normals(mesh), extent(mesh.points))
         if key not in self._surface_responses:
-            sensors = self.sensors
-            answers = self._surfaces[key].answers(
-                self.stiffness, self._free, self.compliance, sensors.by_displacement, sensors.by_reactions
-            )
             # Fortran order: of each patch a few columns are used
-            self._surface_responses[key] = np.asfortranarray(answers)
+            self._surface_responses[key] = np.asfortranarray(self._surfaces[key].answers(self))
         return self._surfaces[key]
 
     def answers(self, forces: Floats) -> Floats:
         """Response (n, ...) of the sensors to nodal forces (..., N, 3) [N]."""
-        flat = np.asarray(forces).reshape(-1, len(self._free))
+        flat = np.asarray(forces).reshape(-1, len(self.free))
         return self.answers_of_columns(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
 
     def answers_of_patches(self, weights: Floats) -> Floats:
@@ -241,13 +335,13 @@ class Linearisation:
             return answers[which]
         forces = forces.toarray() if issparse(forces) else forces
         du = self.displacements(forces)
-        dR = np.where(self._free[:, None], 0.0, self.stiffness @ du - forces)
+        dR = np.where(self.free[:, None], 0.0, self.stiffness @ du - forces)
         return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
 
     def displacements(self, forces: Floats) -> Floats:
         """Of all components (3 N, k) [m] under nodal forces (3 N, k) [N]."""
         du = np.zeros(forces.shape)
-        du[self._free] = self._factors.solve(forces[self._free])
+        du[self.free] = self.factors.solve(forces[self.free])
         return du
 
     def toward_equilibrium(self, system: System, external: Floats, start: Floats, tolerance: float) -> Floats:
@@ -255,7 +349,7 @@ class Linearisation:
 
         See `warpbrain.simulation.multisecant`; the start itself where other nodes are held.
         """
-        if not np.array_equal(system.model.constrained.ravel(), ~self._free):
+        if not np.array_equal(system.model.constrained.ravel(), ~self.free):
             return start
         solve = self.displacements
         return toward_equilibrium(system, external, start, lambda r: solve(r.reshape(-1, 1)).reshape(-1, 3), tolerance)

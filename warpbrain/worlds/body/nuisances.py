@@ -15,7 +15,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.estimation.finer_mesh import Discretisation
 from warpbrain.estimation.parameters import Gaussian
-from warpbrain.estimation.registration import registration_of
+from warpbrain.estimation.registration import moved_back, moved_back_columns, registration_of
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.mooney_rivlin import MooneyRivlin
@@ -143,21 +143,20 @@ def nuisances_at(
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
     """What one standard deviation of each parameter of the tissues changes of what is recorded: (n, p)."""
-    return at.summed(lambda state: _tissue_columns(state, states, theta, prior))
 
+    def about(state: Linearisation) -> Floats:
+        system = state.system
+        forces = np.zeros((len(theta), system.size, 3))
+        for k in range(len(theta)):
+            for sign in (-1.0, 1.0):
+                shifted = theta.copy()
+                shifted[k] += sign * _STEP
+                system.set_model(system.model.with_materials(states.parameters.materials(shifted)))
+                forces[k] -= sign * state.internal_forces() / (2.0 * _STEP)
+        system.set_model(system.model.with_materials(states.parameters.materials(theta)))
+        return state.answers(forces) @ prior.factor
 
-def _tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
-    """The same about one state."""
-    system = at.system
-    forces = np.zeros((len(theta), system.size, 3))
-    for k in range(len(theta)):
-        for sign in (-1.0, 1.0):
-            shifted = theta.copy()
-            shifted[k] += sign * _STEP
-            system.set_model(system.model.with_materials(states.parameters.materials(shifted)))
-            forces[k] -= sign * at.internal_forces() / (2.0 * _STEP)
-    system.set_model(system.model.with_materials(states.parameters.materials(theta)))
-    return at.answers(forces) @ prior.factor
+    return at.summed(about)
 
 
 def field_columns(at: Linearisation, states: States) -> Floats:
@@ -167,7 +166,14 @@ def field_columns(at: Linearisation, states: States) -> Floats:
 
 def law_columns(effects: Effects, states: States) -> Floats:
     """What another Poisson ratio, exponent, share of the second invariant and stiffening change: (n, 4)."""
-    proposals = [other_volume(states), *_other_shape(states)]
+    proposals = [
+        other_volume(states),
+        _always(states, "tissue.exponent"),
+        Proposal.of_one(
+            lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
+        ),
+        Proposal.of_one(lambda share: _Stiffening(share=share), 0.5, belief("tissue.stiffening"), "smooth", 0.5),
+    ]
     return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
 
 
@@ -219,32 +225,21 @@ class _Stiffening(Mechanism):
         return Ogden(moduli, exponents), poisson, formulation
 
 
-def _other_shape(states: States) -> list[Proposal]:
-    return [
-        _always(states, "tissue.exponent"),
-        Proposal.of_one(
-            lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
-        ),
-        Proposal.of_one(lambda share: _Stiffening(share=share), 0.5, belief("tissue.stiffening"), "smooth", 0.5),
-    ]
-
-
 def _known_loads(at: Linearisation) -> Floats:
     """All known loads larger or smaller by one factor, and all prescribed displacements."""
-    columns = at.summed(_known_loads_at)
+
+    def about(state: Linearisation) -> Floats:
+        model = state.system.model
+        columns = np.zeros((len(state.sensors), 2))
+        columns[:, 0] = state.answers(model.external_forces())
+        if model.prescribed.any():
+            forces = (state.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
+            direct = state.sensors.answer(model.prescribed, np.where(model.constrained, forces, 0.0))
+            columns[:, 1] = direct + state.answers(np.where(model.constrained, 0.0, -forces))
+        return belief("loads.size") * columns
+
+    columns = at.summed(about)
     return columns[:, columns.any(axis=0)]
-
-
-def _known_loads_at(at: Linearisation) -> Floats:
-    """The same about one state: (n, 2)."""
-    model = at.system.model
-    columns = [belief("loads.size") * at.answers(model.external_forces()[None]), np.zeros((len(at.sensors), 1))]
-    if model.prescribed.any():
-        forces = (at.stiffness @ model.prescribed.ravel()).reshape(-1, 3)
-        direct = at.sensors.answer(model.prescribed, np.where(model.constrained, forces, 0.0))
-        answer = direct + at.answers(np.where(model.constrained, 0.0, -forces)[None])[:, 0]
-        columns[1] = belief("loads.size") * answer[:, None]
-    return np.concatenate(columns, axis=1)
 
 
 def _displacement(at: Linearisation) -> Floats:
@@ -274,3 +269,51 @@ def _alike(sensors: Sensors, anchors: Floats) -> Floats:
         weights = kernel_columns(sensors.positions[rows], anchors, belief("mesh.alike") * sensors.radius)
         columns[rows] = (weights[:, :, None] * sensors.directions[rows][:, None, :]).reshape(len(rows), -1)
     return columns
+
+
+class RigidMotion:
+    """The motion that recordings are taken to have been moved by, as coordinates of a fit.
+
+    `states`: by whose motion sensors are realigned. `part`: of the coordinates.
+    """
+
+    def __init__(self, states: States, nuisances: Nuisances) -> None:
+        self.part = nuisances.part("registration")
+        self._deviations = registration_of(states.case).deviations
+        self._realigned, self._centre = states.motion, states.centre
+        # columns that explain nothing stay so (`Nuisances.weakened`)
+        self._explains = bool(np.linalg.norm(nuisances.columns[:, self.part]) > 1e-6 * self._deviations.min())
+
+    def change(self, sensors: Sensors, z: Floats) -> Floats:
+        """What another motion than that of the sensors adds to their residuals (n,), at coordinates (q,)."""
+        if not self._explains:
+            return np.zeros(len(sensors))
+        moved = moved_back(self._as_recorded(sensors), self._motion(z), self._centre) - sensors.positions
+        return self._along(sensors, moved[:, :, None])[:, 0]
+
+    def renewed(self, columns: Floats, sensors: Sensors, z: Floats) -> Floats:
+        """Columns (n, q) with those of the motion about coordinates (q,)."""
+        if not self._explains:
+            return columns
+        columns = columns.copy()
+        by_motion = moved_back_columns(self._as_recorded(sensors), self._motion(z), self._centre)
+        columns[:, self.part] = -self._along(sensors, by_motion) * self._deviations
+        return columns
+
+    def _motion(self, z: Floats) -> Floats:
+        return np.asarray(z[self.part] * self._deviations)
+
+    def _as_recorded(self, sensors: Sensors) -> Floats:
+        """Places (n, 3) before they were realigned; NaN of forces."""
+        from scipy.spatial.transform import Rotation
+
+        turned = Rotation.from_rotvec(self._realigned[3:]).apply(sensors.positions - self._centre)
+        return np.asarray(turned + self._centre + self._realigned[:3])
+
+    @staticmethod
+    def _along(sensors: Sensors, vectors: Floats) -> Floats:
+        """Components (n, k) of ways (n, 3, k) in the directions of the sensors; zero of forces."""
+        rows = sensors.is_displacement
+        components = np.zeros((len(sensors), vectors.shape[2]))
+        components[rows] = np.einsum("nj,njk->nk", sensors.directions[rows], vectors[rows])
+        return components

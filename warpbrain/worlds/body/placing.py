@@ -1,46 +1,52 @@
-"""A mechanism between the places of its scan: the cell about the best place, scanned more finely.
+"""Sets of causes in the linear model, with gross errors of their own and places finer than a scan's; moved once fitted.
 
 Each place of a scan stands for a cell about it. So the evidence of the best one becomes the mean over finer places in
 its cell, and the best of these is where a fit begins.
+
+Where a mechanism moves a wall by as much as its own radius, another place and radius may fit better by tens of nats
+than that chosen about the base, in which it deforms nothing yet, and what is left at the wrong one looks like a further
+cause. A linear model about the fit does not show it either: there the mechanism acts where it is. So the state with it
+at another place is computed, all coordinates the same, and is linear about that.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.errors import SolveError
 from warpbrain.inference import GaussianModel
+from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.gross_errors import FurtherColumns, PointRows
-from warpbrain.inference.noise import outliers
+from warpbrain.inference.noise import outliers, scales
 from warpbrain.mesh.quality import principal_axes
 from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.causes import scaled
-from warpbrain.worlds.body.dictionary import switch_effects
-from warpbrain.worlds.body.effects import Effect, Effects
+from warpbrain.worlds.body.causes import BodyCauses, scaled
+from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
+from warpbrain.worlds.body.effects import Effect, Effects, width_of
+from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
+from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
 
 #: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
 _RADII = (0.8, 1.0, 1.25)
-
-
-@dataclass(frozen=True, eq=False)
-class BestInCell:
-    """The best effect of a cell."""
-
-    effect: Effect
-    gain: float  # by how much [nats] the mean of the cell is more probable than its middle
-    log_share: float  # log of the part of the best place in that mean
+#: How often places are looked at anew, how far they are apart in spacings of a scan, and by how much [nats] the linear
+#: model must say that others are better.
+_MOVES, _MOVE, _BETTER = 3, 0.25, 1.0
 
 
 def best_in_cell(
     base: Base, effects: Effects, effect: Effect, size: float, spacing: float, without: GaussianModel, residual: Floats
-) -> BestInCell:
-    """Scan the cell of an effect.
+) -> tuple[Effect, float, float]:
+    """The best effect of the cell of another one.
+
+    And by how much [nats] the mean of the cell is more probable than its middle, and the log of the part of the best
+    place in that mean.
 
     Each place has gross errors of its own: points that a local effect moves far are sound in the right place alone.
 
@@ -67,7 +73,7 @@ def best_in_cell(
     if not effect.proposed.on_surface:
         tried, logs = logs_of(_around(base, best.proposed, 0.25 * spacing))
         best = tried[int(np.argmax(logs))]
-    return BestInCell(best, gain, log_share)
+    return best, gain, log_share
 
 
 def _effects_of(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect]:
@@ -145,3 +151,165 @@ def _middles(base: Base, patch: Patch | None) -> Floats:
     else:
         faces = mesh.boundary[patch.held[mesh.boundary].all(axis=1)]
     return np.asarray(mesh.points[faces].mean(axis=1))
+
+
+def weigh(
+    base: Base,
+    hypothesis: Hypothesis,
+    causes: BodyCauses,
+    screened: GaussianModel,
+    about: WeightedSet | None = None,
+) -> WeightedSet:
+    """A hypothesis of screening in the linear model about the base, or about a fit, with gross errors of its own.
+
+    Screening gives all hypotheses the gross errors of one model. What this one gains by having its own is added to its
+    log evidence: the mean over its likeliest places, since points that a local cause moves far are gross errors where
+    it is thought to be elsewhere.
+
+    `causes`: those that were screened. `screened`: of the rows without them. `about`: a fitted set, whose causes act
+    beside those of the hypothesis; the base, where no cause acts, unless given.
+    """
+    configurations = (hypothesis.best, *hypothesis.elsewhere)
+    weighed = [
+        _weigh_at(base, replace(hypothesis, best=configuration), causes, screened, about)
+        for configuration in configurations
+    ]
+    shares = np.array([configuration.log_density for configuration in configurations])
+    logs = np.array([candidate.hypothesis.log_evidence for candidate in weighed]) + shares
+    log_evidence = float(np.logaddexp.reduce(logs) - np.logaddexp.reduce(shares))
+    best = int(np.argmax(logs))
+    of_places = float(np.logaddexp.reduce([configuration.log_share for configuration in configurations]))
+    log_share = min(float(logs[best] - np.logaddexp.reduce(logs)) + of_places, 0.0)
+    return replace(weighed[best].with_evidence(log_evidence), log_share=log_share)
+
+
+def _weigh_at(
+    base: Base, hypothesis: Hypothesis, causes: BodyCauses, screened: GaussianModel, about: WeightedSet | None
+) -> WeightedSet:
+    """The same as if its best configuration stood for all places."""
+    acting: tuple[Effect, ...]
+    if about is None:
+        start, model_columns, acting = base.residual, base.model.columns, ()
+    else:
+        start, model_columns, acting = about.residual, about.columns, about.effects
+    members = hypothesis.best.members
+    effects = [(member, causes.effect(member)) for member in members]
+    linear = [causes.columns(member) for member, effect in effects if effect is None]
+    added = [effect for _, effect in effects if effect is not None]
+    residual = start - sum((causes.mean(member) for member in members), start=np.zeros(len(start)))
+    blocks = [*linear, *(effect.columns for effect in added)]
+    further = np.column_stack(blocks) if members else np.zeros((len(residual), 0))
+    values, log_prior = scales()
+    log_screened = screened.with_columns(further).log_marginal(residual, values, log_prior)
+    # nuisances, linear causes, effects: those that act already come first
+    split = model_columns.shape[1] - width_of(acting)
+    columns = np.column_stack(
+        [model_columns[:, :split], *linear, model_columns[:, split:], *(effect.columns for effect in added)]
+    )
+    columns, result = evidence_of(base, columns, residual, hypothesis.best.scale)
+    return WeightedSet(
+        replace(hypothesis, log_evidence=hypothesis.log_evidence + result.log_evidence - log_screened),
+        (*acting, *added),
+        residual,
+        columns,
+        result,
+    )
+
+
+def with_refined_places(
+    base: Base, candidate: WeightedSet, spacing: float, source: Effects, placed: int = 0
+) -> WeightedSet:
+    """A set with its mechanisms at the best places within their cells of a scan.
+
+    `spacing`: between the places of the scan [m]. `source`: which makes columns at the state that the set is linear
+    about. `placed`: effects, the first ones, whose places stay: those of the fit that the set is linear about.
+    """
+    effects = list(candidate.effects)
+    placed = len(effects) if candidate.refined else placed
+    for number, (effect, part) in enumerate(zip(candidate.effects, candidate.slices, strict=True)):
+        if number < placed or effect.proposal is None or effect.proposed.elsewhere is None:
+            continue
+        others = np.delete(candidate.columns, np.r_[part], axis=1)
+        without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
+        assert effect.proposed.centre is not None and effect.proposed.radius is not None
+        usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
+        size = float(np.max(effect.proposed.sd / usual.sd))
+        residual = candidate.residual + effect.mean
+        # what lets go has its columns at the base; centres are as far apart as those of a scan's patches
+        at_base = effect.proposed.is_there_or_not
+        apart, about = (BETWEEN * base.at.sensors.radius, base.effects) if at_base else (spacing, source)
+        best, gain, log_share = best_in_cell(base, about, effect, size, apart, without, residual)
+        columns = candidate.columns.copy()
+        columns[:, part] = best.columns
+        residual = residual - best.mean
+        columns, refined = evidence_of(base, columns, residual, candidate.marginal.scale)
+        effects[number] = best
+        candidate = replace(
+            candidate,
+            effects=tuple(effects),
+            residual=residual,
+            columns=columns,
+            marginal=refined,
+            log_share=candidate.log_share + log_share,
+        ).with_evidence(candidate.hypothesis.log_evidence + gain)
+    return replace(candidate, refined=True)
+
+
+def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:
+    """A fitted set, fitted again where its mechanisms are better placed.
+
+    `spacing`: between the places of a scan [m].
+    """
+    for _ in range(_MOVES):
+        assert fitted.refit is not None
+        moved = _moved_once(base, fitter, fitted.refit, _MOVE * spacing)
+        if moved is None:
+            break
+        fitted = _with_fit(fitted, moved, moved.log_evidence - fitted.refit.log_evidence)
+    return fitted
+
+
+def _moved_once(base: Base, fitter: Fitter, refit: Refit, step: float) -> Refit | None:
+    """The fit with one mechanism a step from where it is; None if none is better."""
+    begun = refit
+    tried = [
+        (*refit.effects[:number], effect, *refit.effects[number + 1 :])
+        for number in range(len(refit.effects))
+        for effect in _moved_effects(base, refit.effects[number], step)
+    ]
+    try:
+        # all states are near to that of the fit, whose factors lead to each
+        about = refit.state.linearised() if tried else None
+    except SolveError:
+        about = None
+    for effects in tried:
+        try:
+            begun = max(begun, fitter.begin(effects, refit, about), key=lambda fit: fit.log_evidence)
+        except CANNOT_BE_FITTED:
+            continue
+    if begun.log_evidence < refit.log_evidence + _BETTER:
+        return None
+    try:
+        moved = fitter.fit(begun.effects, begun.columns, [], begun.marginal, begun.state, begun)
+    except CANNOT_BE_FITTED:
+        return None
+    return moved if moved.log_evidence > refit.log_evidence else None
+
+
+def _moved_effects(base: Base, effect: Effect, step: float) -> Iterator[Effect]:
+    """An effect at places a step from where it is, in its own columns; none of what is everywhere, or there or not."""
+    proposal = effect.proposal
+    if proposal is None or proposal.elsewhere is None or proposal.is_there_or_not:
+        return
+    assert proposal.centre is not None and proposal.radius is not None
+    size = float(np.max(proposal.sd / proposal.elsewhere(proposal.centre, proposal.radius).sd))
+    for other in places_about(base, proposal, step):
+        yield replace(scaled(replace(effect, proposal=other), size), columns=effect.columns)
+
+
+def _with_fit(fitted: WeightedSet, refit: Refit, better: float) -> WeightedSet:
+    """A set at another place that was fitted.
+
+    Both places are as probable as each other before anything is recorded: their evidence is added up.
+    """
+    return fitted.fitted(refit).with_evidence(fitted.hypothesis.log_evidence + float(np.logaddexp(0.0, better)))

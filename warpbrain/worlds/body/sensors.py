@@ -17,15 +17,6 @@ from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.location import locate
 
 
-def rows_of_points(sensors: Sensors) -> list[Ints]:
-    """Rows of each recorded point (g, s), those of points with as many rows together; forces have none."""
-    rows = np.flatnonzero(sensors.is_displacement)
-    sizes = np.bincount(sensors.groups[rows], minlength=1)
-    order = rows[np.argsort(sensors.groups[rows], kind="stable")]
-    size_of = sizes[sensors.groups[order]]
-    return [order[size_of == size].reshape(-1, size) for size in np.unique(size_of).tolist()]
-
-
 def kernel_columns(places: Floats, anchors: Floats, reach: float) -> Floats:
     """Kernel columns (k, a) of anchors: a random field of variance one at places (k, 3), correlated over a reach."""
     squares = np.sum((places[:, None] - anchors[None]) ** 2, axis=2)

@@ -1,11 +1,16 @@
-"""States of a case under hypotheses: other tissue, a stiffness field, further mechanisms."""
+"""States of a case under hypotheses: other tissue, a stiffness field, further mechanisms.
+
+Stiffness that varies from place to place within tissues is a nuisance, never a cause: `ln mu(X)` has a normal
+distribution with a squared exponential covariance. Its largest modes are computed on some of the elements and extended
+to all of them (Nystroem's method; Williams and Seeger 2001).
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import cast
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -18,6 +23,7 @@ from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.registration import realigned, registration_of
+from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Following, Mechanism
@@ -32,14 +38,15 @@ from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import bound_term, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.sensors import Sensors
-from warpbrain.worlds.body.stiffness_field import StiffnessField, stiffness_modes
+from warpbrain.worlds.body.sensors import Sensors, spread_points
 from warpbrain.worlds.body.surfaces import with_free_surfaces
 
 #: Out-of-balance force of an equilibrium, relative.
 TOLERANCE = 1e-6
 #: Short steps after a load has come, as parts of the first time that counts.
 _SHORT = (1e-3, 0.1, 0.4)
+#: Most places at which modes are computed.
+_SITES = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -391,3 +398,35 @@ def instants_of(case: Case, times: Sequence[float]) -> int:
     """At how many times something is recorded under loads that came at once and stay: what flows or relaxes shows."""
     constant = len(Moments.of(case, (*times, np.inf)).cases) == 1
     return len(times) if constant and np.isfinite(times).all() else 1
+
+
+def stiffness_modes(mesh: TetMesh) -> Floats:
+    """Modes (m, k) of `ln mu` of each element, each times its standard deviation.
+
+    As few as hold all of its variance but `tissue.field_cut`: what fewer modes leave out is largest at the surfaces,
+    and a cause that is soft or stiff would do its work.
+    """
+    reach = belief("tissue.field_reach") * mesh.radius
+    sites = mesh.centres[spread_points(mesh.centres, 0.5 * reach, _SITES)]
+    values, vectors = np.linalg.eigh(_covariance(sites, sites, reach))
+    values, vectors = values[::-1], vectors[:, ::-1]
+    count = 1 + int(np.searchsorted(np.cumsum(values), (1.0 - belief("tissue.field_cut")) * values.sum()))
+    return np.asarray(_covariance(mesh.centres, sites, reach) @ vectors[:, :count] / np.sqrt(values[:count]))
+
+
+def _covariance(a: Floats, b: Floats, reach: float) -> Floats:
+    squares = np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1)[None] - 2.0 * a @ b.T
+    return np.asarray(belief("tissue.field") ** 2 * np.exp(-0.5 * np.maximum(squares, 0.0) / reach**2))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StiffnessField(Mechanism):
+    """Moduli of each element times `exp(log_factor)`; no user assumes it, so it is in no registry."""
+
+    log_factor: Floats = field(repr=False)  # (m,)
+    kind: ClassVar[str] = "stiffness field"
+    sentence: ClassVar[str] = "Stiffness varies from place to place."
+
+    def stiffness_factor(self, mesh: TetMesh, scale: float) -> Floats:
+        """See `warpbrain.physics.mechanism.Weakening`; a stiffness is there, however little of the load is."""
+        return np.exp(self.log_factor)

@@ -84,7 +84,7 @@ def pressures(at: Linearisation, length: float) -> Floats:
 def _free_of_surface(at: Linearisation) -> Bools:
     """Nodes (N,) on the surface that are not held."""
     mesh = at.system.model.mesh
-    free = ~at.system.model.constrained.reshape(-1, 3).all(axis=1)
+    free: Bools = np.asarray(~at.system.model.constrained.reshape(-1, 3).all(axis=1))
     free[np.setdiff1d(np.arange(len(free)), mesh.boundary)] = False
     return np.asarray(free)
 

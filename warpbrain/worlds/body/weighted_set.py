@@ -1,19 +1,204 @@
-"""A set of causes with its evidence, and the linear model about its most probable point."""
+"""A set of causes of a body with its evidence, the linear model about its most probable point, and its fit.
+
+The evidence is summed over the sizes of what is not known of the mesh's error. One part of that is correlated in space,
+as what a local cause moves is; another is what the mesh does not resolve (`warpbrain.estimation.observations`). The
+first is relative to the displacement under the set, which is that of its causes where these move more than all else. A
+set that explains the recordings leaves small ones; under a wrong set they take up what is left. With one size for all
+sets they would hide causes.
+
+Of what is known of that error a part is the causes', in proportion to their sizes. A finer mesh shows the error of the
+state that is fitted. What of it is beyond the error that tissue alone is known to have is the mechanisms', each of
+which pulls the elements in its own way.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
 
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.errors import SolveError
+from warpbrain.estimation.finer_mesh import Difference
+from warpbrain.estimation.parameters import Gaussian
 from warpbrain.inference import Kind
+from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.causes import Hypothesis
-from warpbrain.inference.marginal import Marginal
+from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, marginal_of, outward
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
-from warpbrain.worlds.body.evidence import evidence_of
-from warpbrain.worlds.body.refit import Refit
+from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
+from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
+from warpbrain.worlds.body.states import SolvedState
+
+#: The sum over sizes ends where a term is below this part of the largest.
+_NEGLIGIBLE = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class MeshShare:
+    """Part of the error of the mesh at coefficients z of all mechanisms: `answer (constant + gradient z)`."""
+
+    answer: Floats  # (n,), at the coefficients for which it was computed
+    gradient: Floats  # (k,)
+    constant: float
+
+    def at(self, z: Floats) -> Floats:
+        """Of coefficients (k,): (n,)."""
+        return self.answer * (self.constant + float(self.gradient @ z))
+
+    def extended(self, count: int) -> MeshShare:
+        """The same where further mechanisms have coefficients after these, `count` in all."""
+        return replace(self, gradient=np.append(self.gradient, np.zeros(count - len(self.gradient))))
+
+    def with_fixed(self, part: slice, z: Floats) -> MeshShare:
+        """The same without some of the coefficients, which stay where they are (j,)."""
+        constant = self.constant + float(self.gradient[part] @ z)
+        return replace(self, gradient=np.delete(self.gradient, part), constant=constant)
+
+    def columns(self, part: slice = slice(None)) -> Floats:
+        """Derivatives (n, k) by the coefficients, or by some of them."""
+        return np.outer(self.answer, self.gradient[part])
+
+
+def excess_error(known: MeshErrors, error: Difference, state: SolvedState, prior: Gaussian) -> Floats:
+    """Error of the mesh (n,) in what is recorded, beyond that which the tissue of a state alone is known to have."""
+    return expected_answer(state.sensors, error.less(known.of(state.hypothesis, prior)))
+
+
+def mesh_share_of(
+    effects: Sequence[Effect],
+    coefficients: Sequence[Floats],
+    state: SolvedState,
+    known: MeshErrors,
+    finer: FinerStates,
+    prior: Gaussian,
+) -> MeshShare | None:
+    """The share of mechanisms at a state; None if a finer mesh does not tell.
+
+    A switch has no size: alone it has a constant share, beside others none.
+
+    `coefficients` (k,): of each effect, in standard deviations about its mean. `state`: with these mechanisms. `known`:
+    of tissue alone. `prior`: of the tissues' parameters.
+    """
+    sized = [not effect.proposed.is_there_or_not for effect in effects]
+    parts = list(zip(sized, effects, coefficients, strict=True))
+    scaled = np.concatenate([has_size * effect.offset(z) for has_size, effect, z in parts])
+    mean = np.concatenate([has_size * effect.offset(np.zeros(len(z))) for has_size, effect, z in parts])
+    square = float(scaled @ scaled)
+    # the finer mesh is solved in the end state alone
+    changing = any(effect.proposed.changes_in_time for effect in effects)
+    if (square < 1e-6 and any(sized)) or changing:
+        return None
+    try:
+        error = finer.error(state.hypothesis, state, ENOUGH)
+    except SolveError:
+        return None
+    gradient = scaled / square if any(sized) else np.zeros(len(scaled))
+    constant = float(gradient @ mean) if any(sized) else 1.0
+    return MeshShare(excess_error(known, error, state, prior), gradient, constant)
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A set of causes at its best point."""
+
+    effects: tuple[Effect, ...]  # of its mechanisms beside those of the case
+    state: SolvedState
+    nuisances: Floats  # (q,), coordinates of the nuisances, and of causes that act linearly
+    coefficients: tuple[Floats, ...]  # (k,), of each effect, in standard deviations about its mean
+    covariances: tuple[Floats, ...]  # (k, k), of these
+    #: (n,): what is left at the best point, linear nuisances and the expected error of the mesh taken off.
+    residual: Floats
+    linear: Floats  # (n,), residual of the linear model about that point, with all coordinates at zero
+    columns: Floats  # (n, q + k), of that model
+    marginal: Marginal  # its Laplace evidence, the scale of the noise and gross errors
+    converged: bool
+    #: Part of the error of the mesh that belongs to its mechanisms, if that is known.
+    mesh_share: MeshShare | None = None
+
+    @property
+    def log_evidence(self) -> float:
+        """Laplace approximation."""
+        return self.marginal.log_evidence
+
+    def without(self, number: int) -> Refit:
+        """The same point without one of its effects, from which a set without it is fitted."""
+        part = column_slices(self.effects, 0)[number]
+        share = self.mesh_share
+
+        def others(values: tuple[Any, ...]) -> tuple[Any, ...]:
+            return values[:number] + values[number + 1 :]
+
+        return replace(
+            self,
+            effects=others(self.effects),
+            coefficients=others(self.coefficients),
+            covariances=others(self.covariances),
+            mesh_share=None if share is None else share.with_fixed(part, self.coefficients[number]),
+        )
+
+
+def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.0) -> tuple[Floats, Marginal]:
+    """Evidence of residuals, and the columns with the most probable size of the smooth part.
+
+    `columns` (n, q): of nuisances and causes. `residual` (n,): less what is expected of the causes. `scale`: a factor
+    on the noise near the most probable one. Returns the columns (n, q), and the marginal with these columns and the
+    most probable noise; its log evidence is the mean over all sizes.
+    """
+    nuisances, fractions = base.nuisances, beliefs("mesh.unknown")
+    part = nuisances.part(UNKNOWN_MESH)
+    # of nothing that moves, or where no displacement was recorded, there is one size
+    moving = nuisances.families[UNKNOWN_MESH].any()
+    fractions = fractions if moving else np.ones(1)
+    others = np.delete(columns, np.r_[part], axis=1) if moving else columns
+    models, relative = [noise.of_noise(others) for noise in base.noises], None
+    inflation: list[Floats | None] = [None] * len(models)
+    if moving:
+        as_given = RowsAtScales(models[0], residual, base.points, columns[:, part]).with_gross_errors(scale)
+        inflation[0] = as_given.inflation
+        moved = _displacement(base, residual - others @ (others.T @ as_given.weighted))
+        relative = moved[:, None] * nuisances.relative
+
+    @cache
+    def rows(noise: int) -> RowsAtScales:
+        return RowsAtScales(models[noise], residual, base.points, relative)
+
+    summed: dict[tuple[int, int], Summed] = {}
+
+    def log_evidence(fraction: int, noise: int) -> float:
+        if (fraction, noise) not in summed:
+            # gross errors are nearly the same whatever the smooth part; what is not resolved may look like some
+            known = next((result for (_, other), result in summed.items() if other == noise), None)
+            near = (scale, inflation[noise]) if known is None else (known.scale, known.inflation)
+            summed[fraction, noise] = rows(noise).summed(float(fractions[fraction]), *near)
+        return summed[fraction, noise].log_evidence
+
+    first = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction))))
+    by_fraction = outward(lambda number: log_evidence(number, 0), first, len(fractions), _NEGLIGIBLE)
+    best = int(np.argmax(by_fraction))
+    by_noise = outward(lambda number: log_evidence(best, number), 0, len(base.noises), _NEGLIGIBLE)
+    noise = int(np.argmax(by_noise))
+    if noise > 0:
+        by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
+        best = int(np.argmax(by_fraction))
+    # as if the evidence were a product of what depends on one size, and on the other
+    if relative is not None:
+        columns = nuisances.with_family(UNKNOWN_MESH, columns, fractions[best] * relative)
+    marginal = marginal_of(base.noises[noise].of_noise(columns), base.points, summed[best, noise])
+    means = [float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs.max()) for logs in (by_fraction, by_noise)]
+    return columns, replace(marginal, log_evidence=marginal.log_evidence + sum(means))
+
+
+def _displacement(base: Base, left: Floats) -> Floats:
+    """Of the rows (n,) [m], all that was recorded of a point, where some is left (n,): no less than at the base."""
+    sensors = base.at.sensors
+    explained = sensors.residual + sensors.computed - left
+    moved = np.sqrt(np.bincount(sensors.groups, explained**2))[sensors.groups]
+    return np.where(sensors.is_displacement, np.maximum(moved, base.nuisances.displacement), 0.0)
 
 
 @dataclass(frozen=True, eq=False)

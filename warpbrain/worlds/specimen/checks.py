@@ -6,17 +6,17 @@ They never choose between causes. One that fails takes a name back, or says that
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.beliefs import beliefs
-from warpbrain.inference.blocks import Blocks
 from warpbrain.inference.causes import Cause, Kind, Place
-from warpbrain.inference.confirm import Confirmation
+from warpbrain.inference.decide import Confirmation
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.predict import Prediction, p_value, predictive_p
+from warpbrain.inference.predict import Prediction, p_value, predict, predictive_p
+from warpbrain.inference.subsets import Blocks
 from warpbrain.physics.words import pascals
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.specimen.fit import Fit
@@ -175,11 +175,12 @@ def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
     rows = fit.rows
     predicted, total = np.full(len(rows), np.nan), 0.0
     for held in folds.held:
-        again, observed = fit.refitted_to(rows & ~held), ~held[rows]
+        again = fit.refitted_to(rows & ~held)
         model = GaussianModel(fit.model.noise_factor, again.columns[rows], fit.scale)
-        mean, _ = model.conditional(again.residual[rows], observed)
-        predicted[held] = (again.stress - again.columns @ again.z)[held] + mean
-        total += model.log_density_of_hidden(again.residual[rows], observed)
+        given = predict(model, again.residual[rows], held[rows].astype(np.int64))
+        # the observed rows are the first block, the held ones the last
+        predicted[held] = fit.forward.protocol.observed[held] - given.errors[held[rows]]
+        total += float(given.log_densities[-1])
     return predicted, total
 
 
@@ -199,16 +200,13 @@ def _placebo_p(about: Linear, name: str, folds: Folds, random: np.random.Generat
         places = []
         for place in cause.places:
             pattern = peaks[:, None] * _pattern(where, place.columns.shape[1], random)
-            places.append(Place(pattern * length / np.sqrt(np.mean(pattern**2)), None, place.weight))
+            places.append(Place(pattern * length / np.sqrt(np.mean(pattern**2))))
         causes.append(Cause(str(number), tuple(places), 0.0, cause.sizes))
     residual = fit.residual[fit.rows]
     total, of_all_rows = np.zeros(len(causes)), _log_densities(fit.model, residual, causes)
     for held in folds.held:
         observed = ~held[fit.rows]
-        kept = [
-            Cause(each.name, tuple(Place(p.columns[observed], None, p.weight) for p in each.places), 0.0, each.sizes)
-            for each in causes
-        ]
+        kept = [replace(each, places=tuple(Place(place.columns[observed]) for place in each.places)) for each in causes]
         total += of_all_rows - _log_densities(fit.model.rows(observed), residual[observed], kept)
     return p_value(total[0], total[1:])
 

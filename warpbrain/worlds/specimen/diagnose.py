@@ -11,8 +11,16 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.confirm import after_checks, if_significant
-from warpbrain.inference.decide import NAMED, NAMED_AND_REST, NOTHING, UNKNOWN, Decision, decide
+from warpbrain.inference.decide import (
+    NAMED,
+    NAMED_AND_REST,
+    NOTHING,
+    UNKNOWN,
+    Decision,
+    after_checks,
+    decide,
+    if_significant,
+)
 from warpbrain.physics.words import Measurement
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.seconds import Seconds
@@ -20,15 +28,21 @@ from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.checks import Checker, grown_errors, score
-from warpbrain.worlds.specimen.fit import Fit, fit
-from warpbrain.worlds.specimen.forward import Forward
+from warpbrain.worlds.specimen.effects import effects_of
+from warpbrain.worlds.specimen.fit import Fit, Forward, fit
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
-from warpbrain.worlds.specimen.measures import next_measurements, smallest_of, values_of, where_it_shows
 from warpbrain.worlds.specimen.protocol import protocol_of
-from warpbrain.worlds.specimen.registered import effects_of
-from warpbrain.worlds.specimen.result import Combination, Ranked, SpecimenDiagnosis
+from warpbrain.worlds.specimen.result import (
+    Combination,
+    Ranked,
+    SpecimenDiagnosis,
+    assumptions_of,
+    next_measurements,
+    smallest_of,
+    values_of,
+    where_it_shows,
+)
 from warpbrain.worlds.specimen.search import CauseSet, Sets
-from warpbrain.worlds.specimen.sentences import assumptions_of
 
 #: Rows below which nothing is concluded; combinations that are told.
 _FEWEST, _TOLD = 15, 12

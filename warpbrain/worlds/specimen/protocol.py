@@ -9,6 +9,13 @@ longer steps (`warpbrain.simulation.history`). What a test is measured by (its l
 path) is that of the whole record in both.
 
 Tests of one mode and one specimen whose times go on from one to the next are a chain: tissue remembers the earlier one.
+
+Noise is independent readings, and a smooth part that a stretch of a curve shares: errors of a curve are alike from row
+to row, of a mean over specimens, of a gauge, of a shape that is not quite what was measured. Taking them for
+independent makes any difference significant. Its scale is unknown and is summed over. How alike two rows are is
+Matern's function of order 5/2: such errors have a slope and a curvature, but not every derivative, as a Gaussian
+function would have it (Stein 1999, Interpolation of Spatial Data, section 1.7). With a Gaussian one a misfit of a fifth
+of a curve is no surprise as long as it is smooth, and one of a twentieth with a bend is.
 """
 
 from __future__ import annotations
@@ -22,6 +29,7 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.specimen import Specimen
+from warpbrain.inference.beliefs import belief
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.history import corners_of, history_of
 
@@ -30,6 +38,8 @@ from warpbrain.simulation.history import corners_of, history_of
 _STEPS, _ROWS, _FIRST = 4, 60, 0.005
 #: Strain at rest, of each mode.
 REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0, "confined": 1.0, "biaxial": 1.0}
+#: Patterns of a test at most, the smoothest.
+_PATTERNS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,3 +259,29 @@ def _kept(test: Test) -> Ints:
     wanted = np.searchsorted(test.time, history.time).clip(0, count - 1)
     corners = np.array(corners_of(test.time, test.strain, 0.02 * test.reach))
     return np.unique(np.concatenate([wanted, corners])).astype(np.int64)
+
+
+def noise_factor(protocol: Protocol) -> Floats:
+    """Lower triangular factor (n, n) of the covariance [Pa^2]."""
+    covariance = np.zeros((len(protocol), len(protocol)))
+    for test, rows in zip(protocol.tests, protocol.rows, strict=True):
+        reading = max(test.sigma, belief("specimen.reading") * test.peak)
+        shared = (belief("specimen.shared") * test.peak) ** 2 * _matern(test, belief("specimen.reach"))
+        covariance[rows, rows] = reading**2 * np.eye(len(test.strain)) + shared
+    return np.asarray(np.linalg.cholesky(covariance))
+
+
+def smooth_patterns(protocol: Protocol, reach: float) -> Floats:
+    """Columns (n, 8 per test at most) of any smooth change of a test, as large as its largest stress."""
+    columns = []
+    for test, rows in zip(protocol.tests, protocol.rows, strict=True):
+        values, vectors = np.linalg.eigh(_matern(test, reach))
+        of_test = np.zeros((len(protocol), min(_PATTERNS, len(values))))
+        of_test[rows] = test.peak * vectors[:, -_PATTERNS:] * np.sqrt(np.maximum(values[-_PATTERNS:], 0.0))
+        columns.append(of_test)
+    return np.concatenate(columns, axis=1)
+
+
+def _matern(test: Test, reach: float) -> Floats:
+    away = np.sqrt(5.0) * np.abs(test.path[:, None] - test.path[None]) / reach
+    return np.asarray((1.0 + away + away**2 / 3.0) * np.exp(-away))

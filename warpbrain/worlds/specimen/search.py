@@ -22,8 +22,7 @@ from warpbrain.inference.causes import Cause, Configuration, Hypothesis, Kind, P
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import Search, posterior
 from warpbrain.worlds.specimen.effects import Effect
-from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit, fit
-from warpbrain.worlds.specimen.forward import Component
+from warpbrain.worlds.specimen.fit import CANNOT_BE, Component, Fit, fit
 
 #: Part of the probability that fitted sets have in the end, fits at most, causes of a set at most, and pairs to which a
 #: third cause is added.

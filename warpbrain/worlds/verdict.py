@@ -1,15 +1,92 @@
-"""The verdict of a diagnosis in sentences, of a body as of a specimen."""
+"""The verdict of a diagnosis, of a body as of a specimen: what all results have, and its sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
+from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
-from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN, Decision
-from warpbrain.inference.probability import percent
+from warpbrain.inference.calibration import percent
+from warpbrain.inference.decide import (
+    CANNOT_SAY,
+    NAMED,
+    NAMED_AND_REST,
+    NOT_PHYSICS,
+    NOTHING,
+    UNKNOWN,
+    Confirmation,
+    Decision,
+)
 from warpbrain.physics.sizes import smallest_in_words
-from warpbrain.physics.words import Smallest
+from warpbrain.physics.words import Measurement, Smallest
+from warpbrain.shown import Shown
+
+#: Causes with their probabilities, and sets of causes.
+Ranked = TypeVar("Ranked")
+Combination = TypeVar("Combination")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Verdict(Shown, Generic[Ranked, Combination]):
+    """What was left out of a case.
+
+    Attributes
+    ----------
+    case : Case
+    decision : Decision
+        After the checks; `by_posterior` before them.
+    doubts : tuple of str
+        Checks that failed, in words.
+    p_value : float
+        Of the hypothesis that nothing is missing.
+    p_left : float or None
+        Of the hypothesis that nothing else is missing; None if nothing is named.
+    named : tuple of Ranked
+        What is named, the most probable first, as it is in the joint fit.
+    ranking : tuple of Ranked
+    rejected : dict of str to str
+        Causes that were not looked for, and why.
+    combinations : tuple of Combination
+        Sets of causes, the most probable first.
+    next_measurement : tuple of Measurement
+    smallest : dict of str to Smallest
+    confirmations : tuple of Confirmation
+        Of each mechanism of the best set.
+    explained : Case or None
+        The case with what was named, ready to run.
+    assumptions, remarks : tuple of str
+    seconds : dict of str to float
+    """
+
+    case: Case
+    decision: Decision
+    by_posterior: Decision
+    doubts: tuple[str, ...]
+    p_value: float
+    p_left: float | None
+    named: tuple[Ranked, ...]
+    ranking: tuple[Ranked, ...]
+    rejected: Mapping[str, str]
+    combinations: tuple[Combination, ...]
+    next_measurement: tuple[Measurement, ...]
+    smallest: Mapping[str, Smallest]
+    confirmations: tuple[Confirmation, ...]
+    explained: Case | None
+    assumptions: tuple[str, ...]
+    remarks: tuple[str, ...]
+    seconds: Mapping[str, float]
+
+    @property
+    def verdict(self) -> str:
+        """One of `warpbrain.inference.decide.VERDICTS`."""
+        return self.decision.verdict
+
+    @property
+    def group(self) -> tuple[str, ...]:
+        """Causes that the data do not discriminate; possible ones if nothing can be said."""
+        return () if self.named else self.decision.causes
 
 
 @dataclass(frozen=True)
