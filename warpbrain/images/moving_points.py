@@ -87,7 +87,8 @@ def move_points(
     place = locate(mesh.points, mesh.tetrahedra, points)
     displacement = MILLIMETRES * place.interpolate(u)
     if middles is not None:
-        displacement = MILLIMETRES * _quadratic(mesh, place.nodes, place.weights, u, middles)
+        # outside corners have another order: there the field takes over
+        displacement = MILLIMETRES * quadratic_interpolant(place.weights, u[place.nodes], middles[place.element])
     outside, of_field = place.distance > 0.0, field.at(file.points)
     displacement[outside] = of_field[outside]
     return MovedPoints(
@@ -97,17 +98,6 @@ def move_points(
         ~field.grid.contains(file.points),
         np.linalg.norm(displacement - of_field, axis=1),
     )
-
-
-def _quadratic(mesh: TetMesh, nodes: np.ndarray, weights: Floats, u: Floats, middles: Floats) -> Floats:
-    """The quadratic interpolant where points are given by corners and weights."""
-    # the tetrahedron that has these corners, and which of its corners each is
-    order = np.argsort(mesh.tetrahedra, axis=1)
-    rows = {tuple(corners): element for element, corners in enumerate(np.sort(mesh.tetrahedra, axis=1).tolist())}
-    elements = np.array([rows[tuple(sorted(corners))] for corners in nodes.tolist()], dtype=np.int64)
-    w = np.empty_like(weights)
-    np.put_along_axis(w, order[elements], np.take_along_axis(weights, np.argsort(nodes, axis=1), axis=1), axis=1)
-    return quadratic_interpolant(w, u[mesh.tetrahedra[elements]], middles[elements])
 
 
 def write_moved(folder: Path, moved: Sequence[MovedPoints]) -> list[str]:

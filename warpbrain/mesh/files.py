@@ -88,7 +88,7 @@ def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str | None 
 def read_mesh_file(path: str | os.PathLike[str], unit: str = "m", tissue: str | None = None) -> MeshInFile:
     """As `read_mesh`, with the numbers that the nodes have in the file."""
     require_kind(path, (str, os.PathLike), "path", "the path of a mesh")
-    return _in_file(Path(path), read_raw(Path(path)), unit, tissue)
+    return mesh_in_file(Path(path), read_raw(Path(path)), unit, tissue)
 
 
 def read_raw(path: Path) -> Any:
@@ -137,12 +137,8 @@ def ends_inside_a_number(path: Path) -> bool:
     return end[-1:].isdigit() and end.isascii() and b"\0" not in end
 
 
-def mesh_of(path: Path, raw: Any, unit: str) -> TetMesh:
+def mesh_in_file(path: Path, raw: Any, unit: str, tissue: str | None = None) -> MeshInFile:
     """The mesh of what `read_raw` gave, with the conventions of this module; errors name `path`."""
-    return _in_file(path, raw, unit, None).mesh
-
-
-def _in_file(path: Path, raw: Any, unit: str, tissue: str | None) -> MeshInFile:
     try:
         return _from_meshio(raw, _scale(unit), tissue)
     except MeshError as error:

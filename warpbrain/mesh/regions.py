@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools
 from warpbrain.mesh.abaqus import MATERIAL_SETS
-from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_of, read_raw
+from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_in_file, read_raw
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
 #: Array that is made of sets of elements, and what `--array` calls them.
@@ -51,7 +51,7 @@ def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithReg
     """
     raw = read_raw(path)
     if not any(block.type in TETRAHEDRA for block in raw.cells):
-        return MeshWithRegions(mesh_of(path, raw, unit), {}, ())
+        return MeshWithRegions(mesh_in_file(path, raw, unit).mesh, {}, ())
     notes: list[str] = []
     if ends_inside_a_number(path):
         notes.append(f"{path.name} ends in a number without a line break: is it cut off?")
@@ -83,7 +83,7 @@ def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithReg
     if chosen is not None and chosen != "tissue":
         raw.cell_data["tissue"] = raw.cell_data[chosen]
     raw.cell_data.pop(SETS, None)
-    return MeshWithRegions(mesh_of(path, raw, unit), names, tuple(notes))
+    return MeshWithRegions(mesh_in_file(path, raw, unit).mesh, names, tuple(notes))
 
 
 def _blocks(raw: Any) -> list[int]:

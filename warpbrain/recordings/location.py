@@ -34,12 +34,15 @@ class Location:
         Distance to the mesh [m], zero inside.
     edge : (n,) array
         Mean length of the edges of the tetrahedron [m].
+    element : (n,) int64 array
+        Number of the tetrahedron; inside the mesh `nodes` are in the order of its corners.
     """
 
     nodes: Ints
     weights: Floats
     distance: Floats
     edge: Floats
+    element: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -58,7 +61,7 @@ class Location:
     def at(self, rows: ArrayLike) -> Location:
         """The location of some of the points, by their numbers."""
         chosen = np.asarray(rows)
-        return Location(self.nodes[chosen], self.weights[chosen], self.distance[chosen], self.edge[chosen])
+        return Location(*(values[chosen] for values in vars(self).values()))
 
 
 def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> Location:
@@ -98,7 +101,7 @@ def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> 
         owner[outside] = tetrahedron[closest.face]
     ends = corners[owner][:, EDGES]
     edge = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).mean(axis=1)
-    return Location(members, weights, distance, edge)
+    return Location(members, weights, distance, edge, owner)
 
 
 def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:

@@ -215,6 +215,15 @@ def _number(cell: str) -> float | None:
         return None
 
 
+def position_of(words: Sequence[str]) -> list[float] | None:
+    """Coordinates, None if they are no finite numbers."""
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        return None
+    return values if all(abs(value) <= LARGEST for value in values) else None
+
+
 def _nearest(name: str, header: Sequence[str]) -> str | None:
     # people add units to names: "x [mm]", "x_mm"
     bare = {re.split(r"[^a-z0-9]", column.lower())[0]: column for column in reversed(header) if column}
