@@ -119,25 +119,24 @@ def _take(
     options: dict[str, str],
     rows: list[tuple[int, str]],
 ) -> None:
+    kind = "NSET" if keyword in ("NODE", "NSET") else "ELSET"
+    of = sets.node_sets if kind == "NSET" else sets.element_sets
+    named = [options[kind]] if options.get(kind) else []
     if keyword == "NODE":
         numbers = [int(text.split(",")[0]) for _, text in rows]
         sets.nodes += numbers
     elif keyword == "ELEMENT":
         numbers = _elements(rows)
         sets.elements.append(numbers)
-        sets.of_elements += [options["ELSET"]] if options.get("ELSET") else []
+        sets.of_elements += named
     elif keyword == "SOLID SECTION":
-        sets.sections += [options["ELSET"]] if options.get("ELSET") else []
+        sets.sections += named
         return
     elif keyword in ("NSET", "ELSET"):
-        of = sets.node_sets if keyword == "NSET" else sets.element_sets
         numbers = _members(rows, "GENERATE" in options, keyword, of, spelling)
     else:
         return
-    name = options.get("NSET" if keyword in ("NODE", "NSET") else "ELSET")
-    if name:
-        of = sets.node_sets if keyword in ("NODE", "NSET") else sets.element_sets
-        kind = "NSET" if of is sets.node_sets else "ELSET"
+    for name in named:
         of.setdefault(spelling.setdefault((kind, name.upper()), name), []).extend(numbers)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.cases.boundary import Boundary, Contact, Displaced, Fixed, Forced, Pressed, Sliding
+from warpbrain.cases.boundary import BOUNDARIES, Boundary, Displaced, Fixed
 from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import BOUNDARY
 from warpbrain.cases.parts.named import Named, read_closed_surface
@@ -30,18 +30,13 @@ def read_boundaries(context: Context, named: Named | None, found: MeshInFile | N
             continue
         values = _values(table)
         if values is not None and nodes is not None:
-            boundaries.append(_CLASSES[table.variant](name=name, nodes=nodes, **values))
+            boundaries.append(BOUNDARIES[table.variant](name=name, nodes=nodes, **values))
     return tuple(boundaries)
-
-
-_CLASSES: dict[str, type[Boundary]] = {
-    known.kind: known for known in (Fixed, Sliding, Displaced, Forced, Pressed, Contact)
-}
 
 
 def _values(table: Reading) -> dict[str, Any] | None:
     """What a boundary has besides name and nodes; None if something of it is wrong."""
-    own = [key for key in BOUNDARY.variants[str(table.variant)] if key.name != "ramp"]
+    own = [key for key in BOUNDARIES[str(table.variant)].keys if key.name != "ramp"]
     if table.variant == Displaced.kind and isinstance(table.get("value"), str):
         if table.has("ramp"):
             table.problem("ramp", "means nothing with a file, which has the times itself")
