@@ -186,14 +186,14 @@ def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
 def _vectors(
     of_points: Mapping[str, Any], of_cells: Mapping[str, Any], tetrahedra: NDArray[np.integer]
 ) -> dict[str, NDArray[np.float64]]:
-    found = {}
+    vectors = {}
     for name, data in of_points.items():
         if _is_vectors(data):
             at_nodes = np.asarray(data, dtype=np.float64)[tetrahedra]
             with np.errstate(invalid="ignore"):
                 against = np.einsum("eaj,ej->ea", at_nodes, at_nodes[:, 0]) < 0.0
-            found[name] = np.where(against[:, :, None], -at_nodes, at_nodes).mean(axis=1)
-    return found | {name: np.asarray(data, dtype=np.float64) for name, data in of_cells.items() if _is_vectors(data)}
+            vectors[name] = np.where(against[:, :, None], -at_nodes, at_nodes).mean(axis=1)
+    return vectors | {name: np.asarray(data, dtype=np.float64) for name, data in of_cells.items() if _is_vectors(data)}
 
 
 def _is_vectors(data: Any) -> bool:
@@ -203,12 +203,12 @@ def _is_vectors(data: Any) -> bool:
 
 def _named(sets: Mapping[str, Any], count: int) -> dict[str, NDArray[np.bool_]]:
     """Sets that a file holds as lists of nodes, as Abaqus' NSET."""
-    found = {}
+    node_sets = {}
     for name, ids in (sets or {}).items():
         members = np.zeros(count, dtype=bool)
         members[np.asarray(ids, dtype=np.int64)] = True
-        found[name] = members
-    return found
+        node_sets[name] = members
+    return node_sets
 
 
 def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[np.bool_]]:

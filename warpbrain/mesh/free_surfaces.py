@@ -70,17 +70,17 @@ def free_parts(mesh: TetMesh, held: Bools, inner: ArrayLike, smallest: float = 0
     origin = np.where(np.asarray(inner, dtype=bool)[faces].all(axis=1), 1, 0)
     origin[in_rows(faces, mesh.cut)] = 2
     areas = np.linalg.norm(face_vectors(mesh.points, faces), axis=1)
-    found = []
+    parts = []
     for kind, name in enumerate(_ORIGINS):
-        own = [
+        pieces = [
             rows
             for surface in np.unique(closed[origin == kind])
             for rows in _pieces(faces, areas, np.flatnonzero((origin == kind) & (closed == surface)), smallest)
         ]
-        for rows in sorted(own, key=lambda rows: -float(areas[rows].sum())):
+        for rows in sorted(pieces, key=lambda rows: -float(areas[rows].sum())):
             middles = mesh.points[faces[rows]].mean(axis=1)
-            found.append(FreePart(name, faces[rows], np.average(middles, axis=0, weights=areas[rows])))
-    return found
+            parts.append(FreePart(name, faces[rows], np.average(middles, axis=0, weights=areas[rows])))
+    return parts
 
 
 def _pieces(faces: Ints, areas: Floats, rows: NDArray[np.int64], smallest: float) -> Iterator[NDArray[np.int64]]:

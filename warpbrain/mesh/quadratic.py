@@ -110,9 +110,9 @@ class QuadraticMesh:
 
     def at_corners(self, forces: Floats) -> Floats:
         """Forces (N, 3) as forces on corners (n, 3), half of a midside node's at each end: the same sum and moments."""
-        found = np.zeros((len(self.corners.points), forces.shape[1]))
-        np.add.at(found, self.ends, 0.5 * forces[:, None, :])
-        return found
+        at_ends = np.zeros((len(self.corners.points), forces.shape[1]))
+        np.add.at(at_ends, self.ends, 0.5 * forces[:, None, :])
+        return at_ends
 
 
 def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> Floats:
@@ -126,5 +126,5 @@ def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> 
 def _middles(corners: int, ends: Ints, edges: NDArray[np.integer]) -> NDArray[np.int64]:
     """Node in the middle of each edge (..., 2), its ends ascending, of all nodes with their `ends`, corners first."""
     factors = np.array([corners, 1])
-    found = np.searchsorted(ends[corners:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
-    return np.asarray(corners + found, dtype=np.int64)
+    edge_numbers = np.searchsorted(ends[corners:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
+    return np.asarray(corners + edge_numbers, dtype=np.int64)

@@ -115,8 +115,8 @@ def _chosen(path: Path, raw: Any, array: str | None) -> str | None:
     """Name of the cell array of the tissues; None if there is none."""
     if array is not None:
         if array not in raw.cell_data:
-            found = ", ".join(sorted(raw.cell_data)) or "none"
-            raise MeshError(f"{path}: no cell array '{array}' for tissue labels; found {found}")
+            names = ", ".join(sorted(raw.cell_data)) or "none"
+            raise MeshError(f"{path}: no cell array '{array}' for tissue labels; found {names}")
         return array
     if "tissue" in raw.cell_data:
         return "tissue"
@@ -159,13 +159,13 @@ def _sets_of_tetrahedra(raw: Any) -> dict[str, Bools]:
 
 def _members(raw: Any, name: str) -> list[Bools]:
     """For each block which cells are in a set."""
-    found = []
+    all_members = []
     for block, ids in zip(raw.cells, raw.cell_sets[name], strict=True):
         members = np.zeros(len(block.data), dtype=bool)
         if ids is not None and len(ids):
             members[np.asarray(ids, dtype=np.int64)] = True
-        found.append(members)
-    return found
+        all_members.append(members)
+    return all_members
 
 
 def _numbered(raw: Any, names: list[str]) -> list[NDArray[np.int32]]:

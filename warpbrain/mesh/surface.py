@@ -165,12 +165,12 @@ def pinched_nodes(faces: ArrayLike) -> Ints:
     triangles = np.asarray(faces)
     sides = triangles[:, SIDES].reshape(-1, 2)
     # number of the triangle's own corner at either end of each side, sides turned so that equal ones look equal
-    own = (3 * np.arange(len(triangles))[:, None, None] + SIDES).reshape(-1, 2)
+    corners = (3 * np.arange(len(triangles))[:, None, None] + SIDES).reshape(-1, 2)
     turned = sides[:, 0] > sides[:, 1]
-    sides[turned], own[turned] = sides[turned, ::-1], own[turned, ::-1]
+    sides[turned], corners[turned] = sides[turned, ::-1], corners[turned, ::-1]
     order = np.lexsort(sides.T)
     same = (sides[order][1:] == sides[order][:-1]).all(axis=1)
-    first, second = own[order][:-1][same], own[order][1:][same]
+    first, second = corners[order][:-1][same], corners[order][1:][same]
     links = np.concatenate([np.stack([first[:, k], second[:, k]], axis=1) for k in (0, 1)])
     fan = connected(links, triangles.size)
     node_of_fan = np.unique(np.stack([triangles.ravel(), fan], axis=1), axis=0)[:, 0]

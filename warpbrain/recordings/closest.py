@@ -51,9 +51,9 @@ class Spheres:
             batches = np.cumsum(counts) // PAIRS
             for batch in np.unique(batches[counts > 0]):
                 chosen = np.flatnonzero((batches == batch) & (counts > 0))
-                found = tree.query_ball_point(points[chosen], within[chosen], return_sorted=False)
+                neighbours = tree.query_ball_point(points[chosen], within[chosen], return_sorted=False)
                 which = np.repeat(chosen, counts[chosen])
-                spheres = ids[np.fromiter(chain.from_iterable(found), dtype=np.int64, count=len(which))]
+                spheres = ids[np.fromiter(chain.from_iterable(neighbours), dtype=np.int64, count=len(which))]
                 apart = np.linalg.norm(points[which] - self._centres[spheres], axis=1)
                 near = apart <= (reach[which] + self._radii[spheres]) * (1.0 + 1e-9)
                 yield which[near], spheres[near]

@@ -115,7 +115,7 @@ def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
     gradients = np.linalg.inv(np.where(flat[:, None, None], np.eye(3), sides)).transpose(0, 2, 1)
     gradients = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1)
     allowed = np.maximum(_WEIGHT, _LENGTH * longest[:, None] * np.linalg.norm(gradients, axis=2))
-    found = np.full(len(points), -1, dtype=np.int64)
+    element = np.full(len(points), -1, dtype=np.int64)
 
     def depth(which: NDArray[np.int64], candidates: NDArray[np.int64]) -> Floats:
         """The least weight, -inf if the point is not inside."""
@@ -128,7 +128,7 @@ def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
     open_ = np.arange(len(points))
     for column in spheres.nearest(points, 6).T:
         hit = depth(open_, column[open_]) >= 0.0
-        found[open_[hit]] = column[open_[hit]]
+        element[open_[hit]] = column[open_[hit]]
         open_ = open_[~hit]
     best = np.full(len(points), -np.inf)
     for which, candidates in spheres.touching(points[open_], np.zeros(len(open_))):
@@ -137,8 +137,8 @@ def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
         order = np.lexsort((candidates, -d, which))
         first = order[np.append(True, which[order][1:] != which[order][:-1])] if len(order) else order
         first = first[d[first] > best[which[first]]]
-        found[which[first]], best[which[first]] = candidates[first], d[first]
-    return found
+        element[which[first]], best[which[first]] = candidates[first], d[first]
+    return element
 
 
 def _shape_functions(corners: Floats, points: Floats) -> Floats:

@@ -52,13 +52,13 @@ def read_vtp(path: Path) -> tuple[Floats, Ints, str | None]:
 
 class _File:
     def __init__(self, data: bytes) -> None:
-        found = _APPENDED.search(data)
+        appended = _APPENDED.search(data)
         self._appended, self._encoding = b"", ""
-        if found:
+        if appended:
             end = data.rindex(b"</AppendedData>")
-            self._encoding = found.group(1).decode()
-            self._appended = data[found.end() : end]
-            data = data[: found.end()] + data[end:]
+            self._encoding = appended.group(1).decode()
+            self._appended = data[appended.end() : end]
+            data = data[: appended.end()] + data[end:]
         try:
             self.root = XML.fromstring(data)
         except XML.ParseError as error:
@@ -107,10 +107,10 @@ class _File:
 
 def _take(data: bytes, count: int, coded: bool) -> bytes:
     """The first `count` bytes of what `data` stands for."""
-    found = base64.b64decode(data[: -(-count // 3) * 4])[:count] if coded else data[:count]
-    if len(found) < count:
+    content = base64.b64decode(data[: -(-count // 3) * 4])[:count] if coded else data[:count]
+    if len(content) < count:
         raise ValueError("the file is cut off")
-    return found
+    return content
 
 
 def _fans(ids: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.int64]:

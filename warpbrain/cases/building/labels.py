@@ -88,8 +88,8 @@ def mesh_labels(
     progress(f"smoothing the labels for elements of {chosen:.3g} mm")
     fields = make_fields(regions, chosen)
     progress("cutting the lattice along the surfaces")
-    cells, found = _without_needles(fields, assignment, chosen)
-    notes = [*regions.notes, *found]
+    cells, lattice_notes = _without_needles(fields, assignment, chosen)
+    notes = [*regions.notes, *lattice_notes]
     progress("meshing")
     made = _made(cells, chosen, notes)
     numbers = np.array([0, *assignment.tissues])

@@ -92,10 +92,10 @@ def _bisect_first(tetrahedra: Ints, labels: Ints, key: Ints, count: int) -> tupl
     old = (pairs < count).all(axis=2)
     wanted = np.where(old, pairs[..., 0] * count + pairs[..., 1], -1)
     at = np.minimum(np.searchsorted(key, wanted), max(len(key) - 1, 0))
-    found = old & (key[at] == wanted) if len(key) else np.zeros_like(old)
-    number = np.where(found, at, len(key))
+    crossed = old & (key[at] == wanted) if len(key) else np.zeros_like(old)
+    number = np.where(crossed, at, len(key))
     local = number.argmin(axis=1)
-    split = np.flatnonzero(found.any(axis=1))
+    split = np.flatnonzero(crossed.any(axis=1))
     new = count + number[split, local[split]]
     halves = [tetrahedra[split].copy() for _ in range(2)]
     for end, half in enumerate(halves):

@@ -36,8 +36,8 @@ def run_mmg(
         if done.returncode == _GAVE_UP:
             return None
         if done.returncode != 0 or not made.exists():
-            said = (done.stderr.strip() or done.stdout.strip() or f"exit status {done.returncode}").splitlines()[-1]
-            raise BuildError(f"MMG could not be run: {said}")
+            message = (done.stderr.strip() or done.stdout.strip() or f"exit status {done.returncode}").splitlines()[-1]
+            raise BuildError(f"MMG could not be run: {message}")
         with np.load(made) as result:
             return result["points"], result["tetrahedra"], result["labels"]
 
