@@ -35,7 +35,6 @@ LEAVES = ["arrays", "errors", "atomic", "frame", "keys", "plugins", "problems", 
 #: Where a kind of mechanism, or a class of one, may stand outside `physics/mechanisms`, and why.
 NAMED = {
     "cases/boundary.py": "[[boundary]] kinds of case.toml",
-    "cases/format/tables.py": "[[boundary]] kinds of case.toml",
     "cases/case.py": "a case's anatomy is what its resection leaves",
     "cases/building/node_sets.py": "name of a node set of a shipped mesh",
     "cases/building/tissue_names.py": "name of labels of tissue that is taken out",

@@ -87,10 +87,10 @@ def _with(case: Case, said: str) -> Case:
 
 def _key(mechanism: type[Mechanism], word: str) -> str:
     keys = list(mechanism.parameters())
-    found = [key for key in keys if key == word] or [key for key in keys if key.endswith(f"_{word}")]
-    if len(found) != 1:
+    matching = [key for key in keys if key == word] or [key for key in keys if key.endswith(f"_{word}")]
+    if len(matching) != 1:
         raise InputError(f"no key '{word}' of {mechanism.kind}: expected one of {', '.join(keys)}")
-    return found[0]
+    return matching[0]
 
 
 def _value(says: Says, key: str, text: str) -> Any:

@@ -9,11 +9,13 @@ from typing import ClassVar
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.keys import Key
 from warpbrain.physics.mechanism import ClosedSurface, Mechanism
 from warpbrain.physics.mechanisms.contact import Contact as SurfaceContact
 from warpbrain.physics.mechanisms.pressure import Pressure
 
 Ramp = Sequence[tuple[float, float]]
+RAMP = Key("ramp", "pairs", "Factor over time [s]; 1 throughout if absent.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +23,8 @@ class Boundary:
     """What all kinds have: a name, and a node set of the case's mesh."""
 
     kind: ClassVar[str]
+    #: What `case.toml` says of this kind besides name and nodes.
+    keys: ClassVar[tuple[Key, ...]] = ()
     #: Whether it acts on faces of the surface, and whether it keeps a part of the body from drifting away.
     on_faces: ClassVar[bool] = False
     holds: ClassVar[bool] = True
@@ -77,6 +81,17 @@ class Displaced(Boundary):
     """
 
     kind: ClassVar[str] = "displacement"
+    keys: ClassVar[tuple[Key, ...]] = (
+        Key(
+            "value",
+            "vector|file",
+            "Displacement, or a .csv of it over time with the columns t, ux, uy, uz.",
+            "units",
+            needed=True,
+            hint="value = [x, y, z]",
+        ),
+        RAMP,
+    )
     times: tuple[float, ...]
     values: tuple[tuple[float, float, float], ...]
     file: str = ""
@@ -101,6 +116,10 @@ class Forced(Boundary):
     """Nodes that share a total force [N] evenly, times a factor over time [s]."""
 
     kind: ClassVar[str] = "force"
+    keys: ClassVar[tuple[Key, ...]] = (
+        Key("total", "vector", "Total force, shared evenly by the nodes.", "N", needed=True),
+        RAMP,
+    )
     holds: ClassVar[bool] = False
     total: tuple[float, float, float]
     ramp: Ramp = field(default=())
@@ -115,6 +134,10 @@ class Pressed(Boundary):
     """Faces of the nodes under a pressure [Pa] that follows them, times a factor over time [s]; positive pushes."""
 
     kind: ClassVar[str] = "pressure"
+    keys: ClassVar[tuple[Key, ...]] = (
+        Key("value", "number", "Pressure on the faces of the nodes, positive pushes.", "Pa", needed=True),
+        RAMP,
+    )
     on_faces: ClassVar[bool] = True
     holds: ClassVar[bool] = False
     value: float
@@ -133,6 +156,10 @@ class Contact(Boundary):
     """Nodes that cannot cross a closed surface."""
 
     kind: ClassVar[str] = "contact"
+    keys: ClassVar[tuple[Key, ...]] = (
+        Key("surface", "file", "Closed surface that the nodes cannot cross.", needed=True),
+        Key("friction", "number", "Coefficient of friction", above=-1e-300, default=0),
+    )
     surface: ClosedSurface
     friction: float = 0.0
 
@@ -142,3 +169,9 @@ class Contact(Boundary):
 
     def sentence(self) -> str:
         return f"The {self.name} cannot cross the surface of {self.surface}; friction {self.friction:g}."
+
+
+#: By the names that `case.toml` gives them.
+BOUNDARIES: dict[str, type[Boundary]] = {
+    kind.kind: kind for kind in (Fixed, Sliding, Displaced, Forced, Pressed, Contact)
+}

@@ -118,8 +118,8 @@ class Case(Shown):
     @property
     def assumptions(self) -> tuple[str, ...]:
         """One sentence for each thing that is assumed to act."""
-        said = tuple(boundary.sentence() for boundary in self.boundaries)
-        return said + tuple(mechanism.sentence + mechanism.detail() for mechanism in self.mechanisms)
+        sentences = tuple(boundary.sentence() for boundary in self.boundaries)
+        return sentences + tuple(mechanism.sentence + mechanism.detail() for mechanism in self.mechanisms)
 
     @property
     def nothing_acts(self) -> bool:

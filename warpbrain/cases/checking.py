@@ -96,51 +96,51 @@ def volume_word(cm3: float) -> str:
 
 
 def _look_again(case: Case, quality: Quality) -> list[str]:
-    found = []
+    remarks = []
     if quality.min_dihedral < SHARP:
-        found.append(
+        remarks.append(
             f"the sharpest tetrahedron has a dihedral angle of {quality.min_dihedral:.2g} degrees: it slows the solver "
             "and spoils the stress around it"
         )
     small = {label: n for label, n in quality.tissue_components.items() if n > 20}
     if small:
         label, count = next(iter(small.items()))
-        found.append(f"tissue {label} is in {count} pieces: a noisy segmentation?")
+        remarks.append(f"tissue {label} is in {count} pieces: a noisy segmentation?")
     for label, tissue in sorted(case.tissues.items()):
         mu = tissue.law.shear_modulus if tissue.law is not None else None
         if mu is not None and not SOFT[0] <= mu <= SOFT[1]:
             kilo = f"; {mu:g} kPa is {1000.0 * mu:g} Pa" if mu < SOFT[0] else ""
-            found.append(f"[tissue.{label}] shear modulus {mu:g} Pa: not that of soft tissue{kilo}")
+            remarks.append(f"[tissue.{label}] shear modulus {mu:g} Pa: not that of soft tissue{kilo}")
     size = extent(case.mesh.points)
     for recording in case.recordings:
         if not isinstance(recording, PointsRecording):
             continue
         largest = float(np.linalg.norm(recording.displacement, axis=1).max())
         if largest > min(LARGEST_SHIFT, 0.5 * size):
-            found.append(f"recording '{recording.name}': a point moves {1000.0 * largest:.3g} mm: is the unit right?")
+            remarks.append(f"recording '{recording.name}': a point moves {1000.0 * largest:.3g} mm: is the unit right?")
         if largest < SMALLEST_SHIFT:
-            found.append(f"recording '{recording.name}': no point moves more than {1000.0 * largest:.2g} mm")
+            remarks.append(f"recording '{recording.name}': no point moves more than {1000.0 * largest:.2g} mm")
         if _wandering(recording):
-            found.append(f"recording '{recording.name}': one id starts at several places; x, y, z are where it began")
+            remarks.append(f"recording '{recording.name}': one id starts at several places; x, y, z are where it began")
         if len(np.unique(recording.points, axis=0)) < len(recording.points) and recording.time is None:
-            found.append(f"recording '{recording.name}': a point is recorded twice")
-    return found
+            remarks.append(f"recording '{recording.name}': a point is recorded twice")
+    return remarks
 
 
 def _nothing_there(case: Case) -> list[str]:
-    found = []
+    remarks = []
     if not case.boundaries and case.specimen is None:
-        found.append("no [[boundary]]: nothing holds the body, so it cannot be simulated")
+        remarks.append("no [[boundary]]: nothing holds the body, so it cannot be simulated")
     if case.nothing_acts and case.specimen is None:
-        found.append(NOTHING_ACTS)
+        remarks.append(NOTHING_ACTS)
     if case.recordings and case.specimen is None:
         fitted = [recording for recording in case.recordings if recording.role == "fit"]
-        found += [why for recording in fitted if (why := too_few_for_noise(case, recording))]
+        remarks += [why for recording in fitted if (why := too_few_for_noise(case, recording))]
         if why := too_few_to_diagnose(case):
-            found.append(f"`diagnose` will refuse: {why}")
+            remarks.append(f"`diagnose` will refuse: {why}")
     if not case.recordings:
-        found.append("no [[recording]]: there is nothing to compare a simulation with")
-    return found
+        remarks.append("no [[recording]]: there is nothing to compare a simulation with")
+    return remarks
 
 
 def _wandering(recording: PointsRecording) -> bool:

@@ -15,14 +15,18 @@ import numpy as np
 from warpbrain.cases.boundary import Boundary, Displaced
 from warpbrain.cases.case import Case
 from warpbrain.physics.load import Load, Ramped
-from warpbrain.physics.mechanism import Mechanism
 from warpbrain.recordings.times import compared_rows, times_of
 
 
 def case_at(case: Case, time: float) -> Case:
     """The case with everything held as it is at a time [s]; infinity is long after everything."""
     boundaries = tuple(_boundary_at(boundary, time) for boundary in case.boundaries)
-    mechanisms = tuple(_mechanism_at(m, time) for m in case.mechanisms if not _absent(m, time))
+    mechanisms = tuple(
+        replace(m, ramp=_held(m.ramp, time)) if m.ramp else m
+        for m in case.mechanisms
+        # another load of its kind has its turn
+        if not (isinstance(m, Load) and not m.several and m.factor(time) == 0.0)
+    )
     return replace(case, boundaries=boundaries, mechanisms=mechanisms)
 
 
@@ -34,15 +38,6 @@ def _boundary_at(boundary: Boundary, time: float) -> Boundary:
         return replace(boundary, times=(0.0,), values=((x, y, z),), file="")
     ramp = getattr(boundary, "ramp", ())
     return replace(boundary, ramp=_held(ramp, time)) if ramp else boundary  # type: ignore[call-arg]
-
-
-def _mechanism_at(mechanism: Mechanism, time: float) -> Mechanism:
-    return replace(mechanism, ramp=_held(mechanism.ramp, time)) if mechanism.ramp else mechanism
-
-
-def _absent(mechanism: Mechanism, time: float) -> bool:
-    """Whether another one of its kind has its turn."""
-    return isinstance(mechanism, Load) and not mechanism.several and mechanism.factor(time) == 0.0
 
 
 def _held(ramp: Any, time: float) -> tuple[tuple[float, float]]:
@@ -58,17 +53,8 @@ def _key(case: Case, time: float) -> tuple[Any, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Times, and the cases at them.
-
-    Attributes
-    ----------
-    times : tuple of float
-        [s], increasing; infinity is the end.
-    cases : tuple of Case
-        What differs; the case itself if nothing does from its end.
-    numbers : tuple of int
-        For each time the number of its case.
-    """
+    """Times [s], increasing, infinity is the end; the cases at them that differ, the case itself if nothing does from
+    its end; and for each time the number of its case."""
 
     times: tuple[float, ...]
     cases: tuple[Case, ...]

@@ -21,9 +21,15 @@ from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
 from warpbrain.keys import Table
 from warpbrain.mesh import write_mesh
-from warpbrain.mesh.vtu import write_vtu
 from warpbrain.physics.mechanism import ClosedSurface, Facts, Mechanism, Removing
-from warpbrain.recordings.recording import Recording
+from warpbrain.recordings.base import (
+    DISPLACEMENT,
+    Recording,
+    column_of_time,
+    columns_of_vectors,
+    write_columns,
+    write_triangles,
+)
 
 _HEAD = "# A case of warpbrain. What its tables and keys mean: docs/case-format.md.\n\n"
 
@@ -121,21 +127,15 @@ def _boundary(folder: Path, boundary: Boundary, frame: Frame) -> dict[str, Any]:
 def _history(folder: Path, boundary: Displaced, frame: Frame) -> str:
     """Write displacements over time; their file, relative to the folder."""
     name = _new_file(folder, "boundaries", boundary.name, ".csv")
-    rows = np.column_stack([boundary.times, frame.file_lengths(boundary.values)]).tolist()
-    with whole_file(folder / name) as temporary:
-        lines = ["t,ux,uy,uz", *(",".join(map(repr, row)) for row in rows)]
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    values = columns_of_vectors(DISPLACEMENT, frame.file_lengths(boundary.values))
+    write_columns(folder / name, column_of_time(np.array(boundary.times)) | values)
     return name
 
 
 def _surface(folder: Path, surface: ClosedSurface, name: str, frame: Frame) -> str:
     """Write a closed surface; its file, relative to the folder."""
-    import meshio
-
     file = _new_file(folder, "surfaces", name, ".vtu")
-    with whole_file(folder / file) as temporary:
-        mesh = meshio.Mesh(frame.file_lengths(surface.points), [("triangle", surface.faces)])
-        write_vtu(temporary, mesh, frame.axes)
+    write_triangles(folder / file, surface.points, surface.faces, frame)
     return file
 
 

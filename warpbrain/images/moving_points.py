@@ -29,18 +29,8 @@ _HEADER = (
 
 @dataclass(frozen=True, eq=False)
 class PointFile:
-    """A file of points.
-
-    Attributes
-    ----------
-    path : Path
-    labels : tuple of str
-    points : (n, 3) array
-        Before [mm, RAS].
-    moved_text : callable
-        From positions after (n, 3) [mm, RAS] to the text of the file that has them.
-    remarks : tuple of str
-    """
+    """A file of labelled points (n, 3), before [mm, RAS]; `moved_text` makes of positions after (n, 3) [mm, RAS] the
+    text of the file that has them."""
 
     path: Path
     labels: tuple[str, ...]
@@ -60,21 +50,10 @@ class PointFile:
 
 @dataclass(frozen=True, eq=False)
 class MovedPoints:
-    """Points of a file and where they have gone.
-
-    Attributes
-    ----------
-    file : PointFile
-    points : (n, 3) array
-        After [mm, RAS].
-    outside : (n,) array
-        How far outside the mesh they were before [mm].
-    beyond : (n,) bool array
-        Beyond the grid: they are taken not to move.
-    apart : (n,) array
-        How far from here the field, and so the transform that is written, puts them [mm]: it is linear between the
-        centres of voxels, and at a wall of tissue the displacement has a kink.
-    """
+    """Points of a file and where they have gone (n, 3) [mm, RAS]; how far outside the mesh they were before (n,) [mm];
+    which were beyond the grid (n,), and are taken not to move; and how far from here the field, and so the transform
+    that is written, puts them (n,) [mm]: it is linear between the centres of voxels, and at a wall of tissue the
+    displacement has a kink."""
 
     file: PointFile
     points: Floats
@@ -84,13 +63,8 @@ class MovedPoints:
 
 
 def read_point_file(path: Path) -> PointFile:
-    """Read a 3D Slicer markup (`.mrk.json`, `.fcsv`) or a BIDS `electrodes.tsv`.
-
-    Raises
-    ------
-    InputError
-        Naming the file, what was found and what was expected.
-    """
+    """Read a 3D Slicer markup (`.mrk.json`, `.fcsv`) or a BIDS `electrodes.tsv`; `InputError` names the file, what was
+    found and what was expected."""
     if not (is_electrodes(path) or is_markup(path)):
         raise InputError(f"{path}: found ending '{path.suffix}', expected .mrk.json, .fcsv or a BIDS electrodes.tsv")
     problems = Problems()
@@ -113,7 +87,8 @@ def move_points(
     place = locate(mesh.points, mesh.tetrahedra, points)
     displacement = MILLIMETRES * place.interpolate(u)
     if middles is not None:
-        displacement = MILLIMETRES * _quadratic(mesh, place.nodes, place.weights, u, middles)
+        # outside corners have another order: there the field takes over
+        displacement = MILLIMETRES * quadratic_interpolant(place.weights, u[place.nodes], middles[place.element])
     outside, of_field = place.distance > 0.0, field.at(file.points)
     displacement[outside] = of_field[outside]
     return MovedPoints(
@@ -123,17 +98,6 @@ def move_points(
         ~field.grid.contains(file.points),
         np.linalg.norm(displacement - of_field, axis=1),
     )
-
-
-def _quadratic(mesh: TetMesh, nodes: np.ndarray, weights: Floats, u: Floats, middles: Floats) -> Floats:
-    """The quadratic interpolant where points are given by corners and weights."""
-    # the tetrahedron that has these corners, and which of its corners each is
-    order = np.argsort(mesh.tetrahedra, axis=1)
-    rows = {tuple(corners): element for element, corners in enumerate(np.sort(mesh.tetrahedra, axis=1).tolist())}
-    elements = np.array([rows[tuple(sorted(corners))] for corners in nodes.tolist()], dtype=np.int64)
-    w = np.empty_like(weights)
-    np.put_along_axis(w, order[elements], np.take_along_axis(weights, np.argsort(nodes, axis=1), axis=1), axis=1)
-    return quadratic_interpolant(w, u[mesh.tetrahedra[elements]], middles[elements])
 
 
 def write_moved(folder: Path, moved: Sequence[MovedPoints]) -> list[str]:

@@ -24,14 +24,9 @@ _EFFORT = 2
 _ROUNDED = 2.0**-13
 
 
-def write_volume(path: Path, values: NDArray[np.generic], grid: Grid) -> None:
-    """Write one value a voxel; whole numbers that 32 bits do not hold become real ones."""
-    _write(path, values, grid)
-
-
 def write_displacement(path: Path, field: DisplacementField) -> None:
     """Write displacements as NIfTI has them: [mm], RAS, at where things were before, five dimensions."""
-    _write(path, _rounded(field.vectors), field.grid, _DISPLACEMENT)
+    write_volume(path, _rounded(field.vectors), field.grid, _DISPLACEMENT)
 
 
 def write_transform(path: Path, field: DisplacementField) -> None:
@@ -41,7 +36,7 @@ def write_transform(path: Path, field: DisplacementField) -> None:
     point at `x` that is given to the same transform goes to `x + field(x)`, the other way.
     """
     signs = np.array(AXES["LPS"], dtype=np.float32)
-    _write(path, _rounded(signs * field.vectors), field.grid, _VECTOR)
+    write_volume(path, _rounded(signs * field.vectors), field.grid, _VECTOR)
 
 
 def _rounded(vectors: Singles) -> Singles:
@@ -49,7 +44,9 @@ def _rounded(vectors: Singles) -> Singles:
     return (np.rint(vectors / np.float32(_ROUNDED)) * np.float32(_ROUNDED))[:, :, :, None, :]
 
 
-def _write(path: Path, values: NDArray[Any], grid: Grid, intent: int = 0) -> None:
+def write_volume(path: Path, values: NDArray[Any], grid: Grid, intent: int = 0) -> None:
+    """Write one value a voxel, or vectors with NIfTI's code of what they are; whole numbers that 32 bits do not hold
+    become real ones."""
     import nibabel
 
     image: Any = nibabel.Nifti1Image(values.astype(_type_for(values)), grid.affine)

@@ -24,19 +24,9 @@ MATERIAL_SETS = "material sets"
 
 @dataclass
 class AbaqusSets:
-    """What a file names.
-
-    Attributes
-    ----------
-    nodes : list of int
-        Numbers of the nodes in the order of the file, which is meshio's.
-    elements : list of lists of int
-        Numbers of the elements of each `*ELEMENT` line, which is a block of meshio's.
-    node_sets, element_sets : dict of str to list of int
-        Numbers of the members.
-    sections, of_elements : list of str
-        Names of the sets that `*SOLID SECTION` gives a material, and of those that `*ELEMENT` lines make.
-    """
+    """What a file names: the numbers of its nodes in the order of the file, which is meshio's; the numbers of the
+    elements of each `*ELEMENT` line, which is a block of meshio's; the numbers of the members of its sets; and the
+    names of the sets that `*SOLID SECTION` gives a material, and of those that `*ELEMENT` lines make."""
 
     nodes: list[int] = field(default_factory=list)
     elements: list[list[int]] = field(default_factory=list)
@@ -48,12 +38,7 @@ class AbaqusSets:
 
 def read_abaqus(path: Path) -> Any:
     """Read a file: a `meshio.Mesh` with its sets; `info[MATERIAL_SETS]` lists which of them may be the materials.
-
-    Raises
-    ------
-    MeshError
-        If a set cannot be understood or has what is not there, or the file includes another one.
-    """
+    `MeshError` if a set cannot be understood or has what is not there, or the file includes another one."""
     import meshio
 
     sets, plain = _sets_and_rest(path.read_text(encoding="utf-8", errors="replace"))
@@ -134,25 +119,24 @@ def _take(
     options: dict[str, str],
     rows: list[tuple[int, str]],
 ) -> None:
+    kind = "NSET" if keyword in ("NODE", "NSET") else "ELSET"
+    of = sets.node_sets if kind == "NSET" else sets.element_sets
+    named = [options[kind]] if options.get(kind) else []
     if keyword == "NODE":
         numbers = [int(text.split(",")[0]) for _, text in rows]
         sets.nodes += numbers
     elif keyword == "ELEMENT":
         numbers = _elements(rows)
         sets.elements.append(numbers)
-        sets.of_elements += [options["ELSET"]] if options.get("ELSET") else []
+        sets.of_elements += named
     elif keyword == "SOLID SECTION":
-        sets.sections += [options["ELSET"]] if options.get("ELSET") else []
+        sets.sections += named
         return
     elif keyword in ("NSET", "ELSET"):
-        of = sets.node_sets if keyword == "NSET" else sets.element_sets
         numbers = _members(rows, "GENERATE" in options, keyword, of, spelling)
     else:
         return
-    name = options.get("NSET" if keyword in ("NODE", "NSET") else "ELSET")
-    if name:
-        of = sets.node_sets if keyword in ("NODE", "NSET") else sets.element_sets
-        kind = "NSET" if of is sets.node_sets else "ELSET"
+    for name in named:
         of.setdefault(spelling.setdefault((kind, name.upper()), name), []).extend(numbers)
 
 

@@ -88,17 +88,12 @@ def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str | None 
 def read_mesh_file(path: str | os.PathLike[str], unit: str = "m", tissue: str | None = None) -> MeshInFile:
     """As `read_mesh`, with the numbers that the nodes have in the file."""
     require_kind(path, (str, os.PathLike), "path", "the path of a mesh")
-    return _in_file(Path(path), read_raw(Path(path)), unit, tissue)
+    return mesh_in_file(Path(path), read_raw(Path(path)), unit, tissue)
 
 
 def read_raw(path: Path) -> Any:
-    """What meshio reads of a file: a `meshio.Mesh` with cells of any kind.
-
-    Raises
-    ------
-    MeshError
-        Naming the file, what was found and what was expected.
-    """
+    """What meshio reads of a file: a `meshio.Mesh` with cells of any kind; `MeshError` names the file, what was found
+    and what was expected."""
     import meshio
 
     if not path.is_file():
@@ -142,12 +137,8 @@ def ends_inside_a_number(path: Path) -> bool:
     return end[-1:].isdigit() and end.isascii() and b"\0" not in end
 
 
-def mesh_of(path: Path, raw: Any, unit: str) -> TetMesh:
+def mesh_in_file(path: Path, raw: Any, unit: str, tissue: str | None = None) -> MeshInFile:
     """The mesh of what `read_raw` gave, with the conventions of this module; errors name `path`."""
-    return _in_file(path, raw, unit, None).mesh
-
-
-def _in_file(path: Path, raw: Any, unit: str, tissue: str | None) -> MeshInFile:
     try:
         return _from_meshio(raw, _scale(unit), tissue)
     except MeshError as error:
@@ -195,14 +186,14 @@ def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
 def _vectors(
     of_points: Mapping[str, Any], of_cells: Mapping[str, Any], tetrahedra: NDArray[np.integer]
 ) -> dict[str, NDArray[np.float64]]:
-    found = {}
+    vectors = {}
     for name, data in of_points.items():
         if _is_vectors(data):
             at_nodes = np.asarray(data, dtype=np.float64)[tetrahedra]
             with np.errstate(invalid="ignore"):
                 against = np.einsum("eaj,ej->ea", at_nodes, at_nodes[:, 0]) < 0.0
-            found[name] = np.where(against[:, :, None], -at_nodes, at_nodes).mean(axis=1)
-    return found | {name: np.asarray(data, dtype=np.float64) for name, data in of_cells.items() if _is_vectors(data)}
+            vectors[name] = np.where(against[:, :, None], -at_nodes, at_nodes).mean(axis=1)
+    return vectors | {name: np.asarray(data, dtype=np.float64) for name, data in of_cells.items() if _is_vectors(data)}
 
 
 def _is_vectors(data: Any) -> bool:
@@ -212,12 +203,12 @@ def _is_vectors(data: Any) -> bool:
 
 def _named(sets: Mapping[str, Any], count: int) -> dict[str, NDArray[np.bool_]]:
     """Sets that a file holds as lists of nodes, as Abaqus' NSET."""
-    found = {}
+    node_sets = {}
     for name, ids in (sets or {}).items():
         members = np.zeros(count, dtype=bool)
         members[np.asarray(ids, dtype=np.int64)] = True
-        found[name] = members
-    return found
+        node_sets[name] = members
+    return node_sets
 
 
 def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[np.bool_]]:

@@ -62,16 +62,16 @@ def nearest_to_origin(corners: Floats) -> Floats:
     a, along = corners[:, 0], corners[:, 1:] - corners[:, :1]
     metric = along @ along.transpose(0, 2, 1)
     inner = np.linalg.solve(metric, -np.einsum("kci,ki->kc", along, a)[..., None])[..., 0]
-    found = np.column_stack([1.0 - inner.sum(axis=1), inner])
-    outside = np.flatnonzero((found < 0.0).any(axis=1))
+    barycentric = np.column_stack([1.0 - inner.sum(axis=1), inner])
+    outside = np.flatnonzero((barycentric < 0.0).any(axis=1))
     # beyond the triangle the nearest point is on a side
     ends = corners[outside][:, SIDES]
     part, distance = _nearest_on_sides(ends)
     side, every = np.argmin(distance, axis=1), np.arange(len(outside))
-    found[outside] = 0.0
-    found[outside, SIDES[side, 0]] = 1.0 - part[every, side]
-    found[outside, SIDES[side, 1]] = part[every, side]
-    return found
+    barycentric[outside] = 0.0
+    barycentric[outside, SIDES[side, 0]] = 1.0 - part[every, side]
+    barycentric[outside, SIDES[side, 1]] = part[every, side]
+    return barycentric
 
 
 def _nearest_on_sides(ends: Floats) -> tuple[Floats, Floats]:

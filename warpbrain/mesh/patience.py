@@ -31,11 +31,11 @@ def patience(path: Path) -> Iterator[None]:
     Elsewhere there is no limit.
     """
     size = path.stat().st_size
-    said = io.StringIO()
+    printed = io.StringIO()
     try:
         with (
-            redirect_stdout(said),
-            redirect_stderr(said),
+            redirect_stdout(printed),
+            redirect_stderr(printed),
             _time(SECONDS + SECONDS_PER_MEGABYTE * size / 1e6),
             _memory(MEMORY + MEMORY_PER_BYTE * size),
         ):

@@ -110,27 +110,15 @@ class QuadraticMesh:
 
     def at_corners(self, forces: Floats) -> Floats:
         """Forces (N, 3) as forces on corners (n, 3), half of a midside node's at each end: the same sum and moments."""
-        found = np.zeros((len(self.corners.points), forces.shape[1]))
-        np.add.at(found, self.ends, 0.5 * forces[:, None, :])
-        return found
+        at_ends = np.zeros((len(self.corners.points), forces.shape[1]))
+        np.add.at(at_ends, self.ends, 0.5 * forces[:, None, :])
+        return at_ends
 
 
 def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> Floats:
-    """A field of quadratic tetrahedra with straight sides at points in them.
-
-    Parameters
-    ----------
-    weights : (n, 4) array
-        Barycentric coordinates of each point.
-    corners : (n, 4, c) array
-        Values at the corners of its tetrahedron.
-    middles : (n, 6, c) array
-        Values in the middle of the edges, in the order of `warpbrain.mesh.surface.EDGES`.
-
-    Returns
-    -------
-    (n, c) array
-    """
+    """A field (n, c) of quadratic tetrahedra with straight sides at points in them, by the points' barycentric
+    coordinates (n, 4) and values at the corners (n, 4, c) and in the middle of the edges (n, 6, c) of each one's
+    tetrahedron, in the order of `warpbrain.mesh.surface.EDGES`."""
     of_corners = np.einsum("na,nac->nc", weights * (2.0 * weights - 1.0), corners)
     return np.asarray(of_corners + np.einsum("na,nac->nc", 4.0 * weights[:, EDGES].prod(axis=2), middles))
 
@@ -138,5 +126,5 @@ def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> 
 def _middles(corners: int, ends: Ints, edges: NDArray[np.integer]) -> NDArray[np.int64]:
     """Node in the middle of each edge (..., 2), its ends ascending, of all nodes with their `ends`, corners first."""
     factors = np.array([corners, 1])
-    found = np.searchsorted(ends[corners:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
-    return np.asarray(corners + found, dtype=np.int64)
+    edge_numbers = np.searchsorted(ends[corners:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
+    return np.asarray(corners + edge_numbers, dtype=np.int64)

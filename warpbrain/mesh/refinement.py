@@ -67,9 +67,9 @@ def _finer_cut(cut: Ints, ends: Ints, finer: TetMesh) -> Ints:
     """Triangles of the finer boundary that lie in triangles of a cut: four of each."""
     faces = finer.boundary
     # of a part at a corner the ends are a, a, a, b, a, c; of that in the middle a, b, b, c, c, a
-    own = np.sort(ends[faces].reshape(-1, 6), axis=1)
-    first, last = own[:, :1], own[:, -1:]
-    between = np.where((own != first) & (own != last), own, -1).max(axis=1, keepdims=True)
+    corners = np.sort(ends[faces].reshape(-1, 6), axis=1)
+    first, last = corners[:, :1], corners[:, -1:]
+    between = np.where((corners != first) & (corners != last), corners, -1).max(axis=1, keepdims=True)
     return np.asarray(faces[in_rows(np.concatenate([first, between, last], axis=1), cut)])
 
 
@@ -88,18 +88,11 @@ def inherited_sets(sets: Mapping[str, Bools], ends: Ints, finer: TetMesh) -> dic
 
 
 def inherited(members: Bools, ends: Ints, surface: Bools) -> Bools:
-    """A set of nodes once there are midpoints.
+    """A set of nodes (n,) once there are midpoints, by the two `ends` (n', 2) between which each node lies in the
+    middle.
 
     A midpoint is in it if both ends of its edge are; of a set of nodes of the surface only if the edge lies on the
-    surface too.
-
-    Parameters
-    ----------
-    members : (n,) bool array
-    ends : (n', 2) int array
-        The two nodes between which each node lies in the middle.
-    surface : (n',) bool array
-        Nodes, midpoints among them, that are of the boundary.
+    `surface` (n',), too, which are the nodes of the boundary, midpoints among them.
     """
     both = members[ends].all(axis=1)
     inside = members & ~surface[: len(members)]
@@ -113,9 +106,9 @@ def _octahedra(points: Floats, nodes: NDArray[np.int64]) -> Ints:
     every = np.arange(len(nodes))[:, None]
     diagonal = nodes[every, _DIAGONALS[shortest]]
     ring = nodes[every, _RINGS[shortest]]
-    found = np.stack([ring, np.roll(ring, -1, axis=1)], axis=2)
-    found = np.concatenate([np.repeat(diagonal[:, None], 4, axis=1), found], axis=2)
-    edges = points[found[:, :, 1:]] - points[found[:, :, :1]]
+    tetrahedra = np.stack([ring, np.roll(ring, -1, axis=1)], axis=2)
+    tetrahedra = np.concatenate([np.repeat(diagonal[:, None], 4, axis=1), tetrahedra], axis=2)
+    edges = points[tetrahedra[:, :, 1:]] - points[tetrahedra[:, :, :1]]
     inverted = np.linalg.det(edges) < 0.0
-    found[inverted] = found[inverted][:, [1, 0, 2, 3]]
-    return np.asarray(found, dtype=np.int32)
+    tetrahedra[inverted] = tetrahedra[inverted][:, [1, 0, 2, 3]]
+    return np.asarray(tetrahedra, dtype=np.int32)

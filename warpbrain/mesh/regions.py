@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools
 from warpbrain.mesh.abaqus import MATERIAL_SETS
-from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_of, read_raw
+from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_in_file, read_raw
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 
 #: Array that is made of sets of elements, and what `--array` calls them.
@@ -35,16 +35,7 @@ _DIMENSION = {"vertex": 0, "line": 1, "line3": 1}
 
 @dataclass(frozen=True, eq=False)
 class MeshWithRegions:
-    """A mesh with what its file names.
-
-    Attributes
-    ----------
-    mesh : TetMesh
-    names : dict of int to str
-        Names of tissues that the file has.
-    notes : tuple of str
-        Where tissues and sets are from.
-    """
+    """A mesh with what its file names: the names of tissues, and notes of where tissues and sets are from."""
 
     mesh: TetMesh
     names: dict[int, str]
@@ -52,24 +43,15 @@ class MeshWithRegions:
 
 
 def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithRegions:
-    """Read a mesh with its tissues and sets.
+    """Read a mesh, with coordinates in "m" or "mm", with its tissues and sets.
 
-    Parameters
-    ----------
-    path : Path
-    unit : {"m", "mm"}
-        Of its coordinates.
-    array : str, optional
-        Cell array of the tissues, or `SETS`; by default ``tissue`` if there is one, else the only one that can be it.
-
-    Raises
-    ------
-    MeshError
-        Naming the file, if it is no mesh, or several arrays could be the tissues; the message lists them.
+    `array` is the cell array of the tissues, or `SETS`; by default ``tissue`` if there is one, else the only one that
+    can be it. `MeshError`, naming the file, if it is no mesh, or several arrays could be the tissues; the message lists
+    them.
     """
     raw = read_raw(path)
     if not any(block.type in TETRAHEDRA for block in raw.cells):
-        return MeshWithRegions(mesh_of(path, raw, unit), {}, ())
+        return MeshWithRegions(mesh_in_file(path, raw, unit).mesh, {}, ())
     notes: list[str] = []
     if ends_inside_a_number(path):
         notes.append(f"{path.name} ends in a number without a line break: is it cut off?")
@@ -101,7 +83,7 @@ def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithReg
     if chosen is not None and chosen != "tissue":
         raw.cell_data["tissue"] = raw.cell_data[chosen]
     raw.cell_data.pop(SETS, None)
-    return MeshWithRegions(mesh_of(path, raw, unit), names, tuple(notes))
+    return MeshWithRegions(mesh_in_file(path, raw, unit).mesh, names, tuple(notes))
 
 
 def _blocks(raw: Any) -> list[int]:
@@ -133,8 +115,8 @@ def _chosen(path: Path, raw: Any, array: str | None) -> str | None:
     """Name of the cell array of the tissues; None if there is none."""
     if array is not None:
         if array not in raw.cell_data:
-            found = ", ".join(sorted(raw.cell_data)) or "none"
-            raise MeshError(f"{path}: no cell array '{array}' for tissue labels; found {found}")
+            names = ", ".join(sorted(raw.cell_data)) or "none"
+            raise MeshError(f"{path}: no cell array '{array}' for tissue labels; found {names}")
         return array
     if "tissue" in raw.cell_data:
         return "tissue"
@@ -177,13 +159,13 @@ def _sets_of_tetrahedra(raw: Any) -> dict[str, Bools]:
 
 def _members(raw: Any, name: str) -> list[Bools]:
     """For each block which cells are in a set."""
-    found = []
+    all_members = []
     for block, ids in zip(raw.cells, raw.cell_sets[name], strict=True):
         members = np.zeros(len(block.data), dtype=bool)
         if ids is not None and len(ids):
             members[np.asarray(ids, dtype=np.int64)] = True
-        found.append(members)
-    return found
+        all_members.append(members)
+    return all_members
 
 
 def _numbered(raw: Any, names: list[str]) -> list[NDArray[np.int32]]:

@@ -32,25 +32,8 @@ def edges_of(faces: ArrayLike) -> NDArray[np.int64]:
 
 
 def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which faces of which tetrahedra coincide.
-
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids.
-
-    Returns
-    -------
-    pairs : (k, 2) int64 array
-        Faces shared by two tetrahedra; face number = 4 * tetrahedron + local face.
-    single : (b,) int64 array
-        Faces that only one tetrahedron has.
-
-    Raises
-    ------
-    ValueError
-        If a face belongs to three or more tetrahedra.
-    """
+    """Which faces of tetrahedra (m, 4) coincide: pairs (k, 2) of faces that two tetrahedra share, and faces (b,) that
+    only one has; face number = 4 * tetrahedron + local face. `ValueError` if a face belongs to three or more."""
     tets = np.asarray(tetrahedra)
     faces = np.sort(tets[:, FACES].reshape(-1, 3), axis=1)
     order = np.lexsort(faces.T[::-1])
@@ -71,18 +54,7 @@ def _corners(tetrahedra: ArrayLike, faces: NDArray[np.int64]) -> Ints:
 
 
 def all_faces(tetrahedra: ArrayLike) -> Ints:
-    """Every triangle of a mesh once, inside and on the boundary.
-
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids.
-
-    Returns
-    -------
-    (k, 3) int32 array
-        Node ids.
-    """
+    """Every triangle (k, 3) of tetrahedra (m, 4) once, inside and on the boundary."""
     pairs, single = paired_faces(tetrahedra)
     return _corners(tetrahedra, np.concatenate([pairs[:, 0], single]))
 
@@ -193,12 +165,12 @@ def pinched_nodes(faces: ArrayLike) -> Ints:
     triangles = np.asarray(faces)
     sides = triangles[:, SIDES].reshape(-1, 2)
     # number of the triangle's own corner at either end of each side, sides turned so that equal ones look equal
-    own = (3 * np.arange(len(triangles))[:, None, None] + SIDES).reshape(-1, 2)
+    corners = (3 * np.arange(len(triangles))[:, None, None] + SIDES).reshape(-1, 2)
     turned = sides[:, 0] > sides[:, 1]
-    sides[turned], own[turned] = sides[turned, ::-1], own[turned, ::-1]
+    sides[turned], corners[turned] = sides[turned, ::-1], corners[turned, ::-1]
     order = np.lexsort(sides.T)
     same = (sides[order][1:] == sides[order][:-1]).all(axis=1)
-    first, second = own[order][:-1][same], own[order][1:][same]
+    first, second = corners[order][:-1][same], corners[order][1:][same]
     links = np.concatenate([np.stack([first[:, k], second[:, k]], axis=1) for k in (0, 1)])
     fan = connected(links, triangles.size)
     node_of_fan = np.unique(np.stack([triangles.ravel(), fan], axis=1), axis=0)[:, 0]
@@ -276,21 +248,12 @@ def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
 
 
 def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.bool_]]:
-    """Angle-weighted normals (Baerentzen and Aanaes 2005) of each triangle's features, and which are on a rim.
+    """Angle-weighted normals (Baerentzen and Aanaes 2005) of the features of triangles (k, 3), oriented outwards, with
+    corners (n, 3): of the face, of its edges ab, bc, ca and of its corners (k, 7, 3), of unit length; and which
+    features are on a rim (k, 7), the edges of one triangle only and their corners, whose normal is that of the face.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-    faces : (k, 3) int array
-        Oriented outwards.
-
-    Returns
-    -------
-    normals : (k, 7, 3) array
-        Unit normals of the face, of its edges ab, bc, ca and of its corners. The closest point `p` of a closed surface
-        to `x` has `x` outside if `(x - p) . n > 0` with the normal of the feature that `p` is on.
-    on_rim : (k, 7) bool array
-        True for an edge of one triangle only and its corners, whose normal is that of the face.
+    The closest point `p` of a closed surface to `x` has `x` outside if `(x - p) . n > 0` with the normal of the feature
+    that `p` is on.
     """
     normals = np.empty((len(faces), 7, 3))
     normals[:, 0] = _unit(face_vectors(points, faces))

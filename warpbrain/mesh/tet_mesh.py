@@ -38,11 +38,11 @@ class MeshError(InputError):
 
 def _ids(mask_or_ids: ArrayLike, limit: int = 5) -> str:
     """First few ids as text, for an error message: ``"3, 7, 12, ... (41 in all)"``."""
-    found = np.asarray(mask_or_ids)
-    if found.dtype == bool:
-        found = np.flatnonzero(found)
-    text = ", ".join(str(int(i)) for i in found[:limit])
-    return f"{text}, ... ({len(found)} in all)" if len(found) > limit else text
+    ids = np.asarray(mask_or_ids)
+    if ids.dtype == bool:
+        ids = np.flatnonzero(ids)
+    text = ", ".join(str(int(i)) for i in ids[:limit])
+    return f"{text}, ... ({len(ids)} in all)" if len(ids) > limit else text
 
 
 def _integers(values: ArrayLike, what: str) -> Ints:
@@ -140,8 +140,8 @@ class TetMesh:
         tissue = np.ones(count, dtype=np.int32) if self.tissue is None else _integers(self.tissue, "tissue labels")
         if tissue.shape != (count,):
             raise MeshError(f"tissue has shape {tissue.shape}, expected one label a tetrahedron: ({count},)")
-        if found := _defects(points, tetrahedra):
-            raise MeshError(*found)
+        if defects := _defects(points, tetrahedra):
+            raise MeshError(*defects)
         for name, value in (("points", points), ("tetrahedra", tetrahedra), ("tissue", tissue)):
             object.__setattr__(self, name, _frozen(value))
         object.__setattr__(self, "node_sets", _sets(self.node_sets, len(points), "node"))
@@ -258,9 +258,9 @@ class TetMesh:
         if removed.all():
             raise MeshError("removing every tetrahedron leaves no mesh")
         # hypotheses about one body take the same part out again and again
-        what = removed.tobytes()
-        if self.shared.get("taken out") != what:
-            self.shared["taken out"], self.shared["left"] = what, (self.node_sets, *self._left(~removed))
+        removed_bytes = removed.tobytes()
+        if self.shared.get("taken out") != removed_bytes:
+            self.shared["taken out"], self.shared["left"] = removed_bytes, (self.node_sets, *self._left(~removed))
         sets, mesh, node_ids, element_ids = self.shared["left"]
         if self.node_sets is not sets:
             mesh = mesh.with_node_sets({name: members[node_ids] for name, members in self.node_sets.items()})
@@ -298,20 +298,8 @@ class TetMesh:
 
 
 def signed_volumes(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
-    """Signed volume of tetrahedra, in the cube of the unit of `points`.
-
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions.
-    tetrahedra : (m, 4) array
-        Node ids.
-
-    Returns
-    -------
-    (m,) array
-        Positive where the tetrahedron is positively oriented.
-    """
+    """Volume (m,) of tetrahedra (m, 4) with nodes (n, 3), in the cube of their unit; positive where positively
+    oriented."""
     corner = np.asarray(points, dtype=np.float64)[np.asarray(tetrahedra)]
     a, b, c = (corner[:, i] - corner[:, 0] for i in (1, 2, 3))
     return np.asarray(np.einsum("ij,ij->i", np.cross(a, b), c) / 6.0)
@@ -319,27 +307,27 @@ def signed_volumes(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
 
 def _defects(points: Floats, tetrahedra: Ints) -> list[str]:
     """Everything that makes points and tetrahedra no body, one line each."""
-    found = []
+    defects = []
     bad = np.asarray(~(np.abs(points) <= LARGEST).all(axis=1))
     if bad.any():
-        found.append(f"{bad.sum()} node(s) with a coordinate that is not finite: node {_ids(bad)}")
+        defects.append(f"{bad.sum()} node(s) with a coordinate that is not finite: node {_ids(bad)}")
     count = len(points)
     outside = ((tetrahedra < 0) | (tetrahedra >= count)).any(axis=1)
     if outside.any():
         first = int(np.flatnonzero(outside)[0])
-        found.append(
+        defects.append(
             f"{outside.sum()} tetrahedra name a node that does not exist (nodes are 0 to {count - 1}): "
             f"tetrahedron {_ids(outside)}; the first has nodes {tetrahedra[first].tolist()}"
         )
     ordered = np.sort(tetrahedra, axis=1)
     repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
     if repeated.any():
-        found.append(f"{repeated.sum()} tetrahedra name a node twice: tetrahedron {_ids(repeated)}")
+        defects.append(f"{repeated.sum()} tetrahedra name a node twice: tetrahedron {_ids(repeated)}")
     unused = np.bincount(tetrahedra[~outside].ravel(), minlength=count) == 0
     if unused.any():
-        found.append(f"{unused.sum()} node(s) belong to no tetrahedron: node {_ids(unused)}; take them out")
+        defects.append(f"{unused.sum()} node(s) belong to no tetrahedron: node {_ids(unused)}; take them out")
     whole = np.flatnonzero(~outside & ~repeated)
-    return found + _flat_or_inverted(points, tetrahedra[whole], whole, bad)
+    return defects + _flat_or_inverted(points, tetrahedra[whole], whole, bad)
 
 
 def _flat_or_inverted(points: Floats, tetrahedra: Ints, numbers: NDArray[np.int64], bad: Bools) -> list[str]:
@@ -351,15 +339,15 @@ def _flat_or_inverted(points: Floats, tetrahedra: Ints, numbers: NDArray[np.int6
         # flat to rounding: such a volume has no sign that means anything
         flat = measurable & (np.abs(volumes) <= 1e-12 * longest**3)
         inverted = measurable & ~flat & (volumes < 0)
-    found = []
+    defects = []
     if flat.any():
-        found.append(f"{flat.sum()} tetrahedra have zero volume: tetrahedron {_ids(numbers[flat])}")
+        defects.append(f"{flat.sum()} tetrahedra have zero volume: tetrahedron {_ids(numbers[flat])}")
     if inverted.any():
-        found.append(
+        defects.append(
             f"{inverted.sum()} tetrahedra are inverted (negative volume): tetrahedron {_ids(numbers[inverted])}; "
             "swap two nodes of each"
         )
-    return found
+    return defects
 
 
 def ordered(mesh: TetMesh) -> TetMesh:

@@ -16,10 +16,16 @@ from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.surface import Ints
+from warpbrain.mesh.vtu import write_vtu
 from warpbrain.problems import Problems
+from warpbrain.recordings.text import collected
 
 #: Columns of a file.
 Columns = dict[str, Floats | tuple[str, ...]]
+#: Fields of a recording by name, in SI units and RAS axes, and how many SI units one of the file's is, in which `sigma`
+#: is.
+Content = tuple[dict[str, Any], float]
 
 POSITION = ("x", "y", "z")
 DISPLACEMENT = ("ux", "uy", "uz")
@@ -90,6 +96,16 @@ class Recording:
         Recording or None
             None if there were problems.
         """
+        with collected(path, problems) as found:
+            content = cls._read(path, frame, found, given)
+        if content is None or found:
+            return None
+        values, unit = content
+        return cls(sigma=None if sigma is None else unit * sigma, **given, **values)
+
+    @classmethod
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
+        """What a file holds, None if there were problems; what is no field is taken out of `given`."""
         raise NotImplementedError
 
     @classmethod
@@ -126,13 +142,8 @@ class Recording:
         return {}
 
     def check(self, mesh: TetMesh, path: Path, problems: Problems) -> None:
-        """Note as problems what cannot have been recorded of a body (its mesh at rest, without what was resected).
-
-        Raises
-        ------
-        InputError
-            If the mesh has nothing that it could have been recorded of.
-        """
+        """Note as problems what cannot have been recorded of a body (its mesh at rest, without what was resected);
+        `InputError` if the mesh has nothing that it could have been recorded of."""
 
     @property
     def ending(self) -> str:
@@ -144,21 +155,11 @@ class Recording:
         raise NotImplementedError
 
     def write(self, path: Path, frame: Frame) -> None:
-        """Write a file that reading gives back, whole or not at all.
+        """Write a file that reading gives back, whole or not at all; `frame` is its unit and axes.
 
         Numbers are written with all their digits: in metres reading gives the same ones back, in mm the same to
         rounding. What stands in `case.toml` (name, role, sigma, node set, boundary, mode) is not in the file.
-
-        Parameters
-        ----------
-        path : Path
-        frame : Frame
-            Unit and axes of the file.
-
-        Raises
-        ------
-        InputError
-            If the ending is not that of such a recording, or the file cannot be written.
+        `InputError` if the ending is not that of such a recording, or the file cannot be written.
         """
         path = Path(path)
         if path.suffix.lower() != self.ending:
@@ -167,11 +168,7 @@ class Recording:
         self._write(path, frame)
 
     def _write(self, path: Path, frame: Frame) -> None:
-        columns = self.columns(frame)
-        values = [column if isinstance(column, tuple) else column.tolist() for column in columns.values()]
-        with whole_file(path) as scratch, scratch.open("w", encoding="utf-8", newline="") as file:
-            file.write(",".join(columns) + "\n")
-            csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC).writerows(zip(*values, strict=True))
+        write_columns(path, self.columns(frame))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -196,6 +193,22 @@ class TrackedPoints:
     ids: tuple[str, ...] | None = None
     sigmas: Floats | None = None
     weights: Floats | None = None
+
+
+def write_columns(path: Path, columns: Columns) -> None:
+    """Write a table that `warpbrain.recordings.tables.read_table` gives back, numbers with all their digits."""
+    values = [column if isinstance(column, tuple) else column.tolist() for column in columns.values()]
+    with whole_file(path) as scratch, scratch.open("w", encoding="utf-8", newline="") as file:
+        file.write(",".join(columns) + "\n")
+        csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC).writerows(zip(*values, strict=True))
+
+
+def write_triangles(path: Path, points: Floats, faces: Ints, frame: Frame) -> None:
+    """Write a surface with points (n, 3) [m, RAS] and triangles (k, 3) as VTU."""
+    import meshio
+
+    with whole_file(path) as scratch:
+        write_vtu(scratch, meshio.Mesh(frame.file_lengths(points), [("triangle", faces)]), frame.axes)
 
 
 def column_of_time(time: Floats | None) -> Columns:

@@ -21,15 +21,9 @@ PAIRS = 1_000_000
 
 
 class Spheres:
-    """Which of some spheres points touch: a search among millions of triangles or tetrahedra becomes one among dozens.
-
-    They are sorted by size so that few large ones do not widen the search for all others.
-
-    Parameters
-    ----------
-    centres : (m, 3) array
-    radii : (m,) array
-    """
+    """Which of some spheres, with centres (m, 3) and radii (m,), points touch: a search among millions of triangles or
+    tetrahedra becomes one among dozens. They are sorted by size so that few large ones do not widen the search for all
+    others."""
 
     def __init__(self, centres: Floats, radii: Floats) -> None:
         from scipy.spatial import cKDTree
@@ -57,9 +51,9 @@ class Spheres:
             batches = np.cumsum(counts) // PAIRS
             for batch in np.unique(batches[counts > 0]):
                 chosen = np.flatnonzero((batches == batch) & (counts > 0))
-                found = tree.query_ball_point(points[chosen], within[chosen], return_sorted=False)
+                neighbours = tree.query_ball_point(points[chosen], within[chosen], return_sorted=False)
                 which = np.repeat(chosen, counts[chosen])
-                spheres = ids[np.fromiter(chain.from_iterable(found), dtype=np.int64, count=len(which))]
+                spheres = ids[np.fromiter(chain.from_iterable(neighbours), dtype=np.int64, count=len(which))]
                 apart = np.linalg.norm(points[which] - self._centres[spheres], axis=1)
                 near = apart <= (reach[which] + self._radii[spheres]) * (1.0 + 1e-9)
                 yield which[near], spheres[near]
@@ -67,19 +61,8 @@ class Spheres:
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoints:
-    """Closest points of a surface.
-
-    Attributes
-    ----------
-    position : (n, 3) array
-        Where they are.
-    face : (n,) int32 array
-        Triangle on which each lies; of several, the one with the smallest number.
-    weights : (n, 3) array
-        Barycentric coordinates there: not negative, their sum is 1.
-    distance : (n,) array
-        From the given point.
-    """
+    """Closest points of a surface: where they are (n, 3), the triangle on which each lies (n,), of several the one with
+    the smallest number, barycentric coordinates there (n, 3), not negative and of sum 1, and the distance (n,)."""
 
     position: Floats
     face: Ints
@@ -95,20 +78,8 @@ class ClosestPoints:
 
 
 def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> ClosestPoints:
-    """Closest points of a surface, exact to rounding; triangles without area count as the segments they are.
-
-    Parameters
-    ----------
-    points : (n, 3) array
-    vertices : (v, 3) array
-    faces : (k, 3) array
-        Ids of vertices.
-
-    Raises
-    ------
-    InputError
-        If there are no faces.
-    """
+    """Points of a surface with vertices (v, 3) and faces (k, 3) that are closest to points (n, 3), exact to rounding;
+    triangles without area count as the segments they are. `InputError` if there are no faces."""
     xyz = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     triangles = np.asarray(faces)
     if len(triangles) == 0:

@@ -6,7 +6,6 @@ https://bids-specification.readthedocs.io/en/stable/modality-specific-files/intr
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.problems import Problems
-from warpbrain.recordings.tables import LARGEST
+from warpbrain.recordings.tables import position_of
 from warpbrain.recordings.text import lines_of, read_text, shown
 
 ENDING = "electrodes.tsv"
@@ -29,23 +28,8 @@ _NOTHING = "n/a"
 
 @dataclass(frozen=True, eq=False)
 class Electrodes:
-    """Electrodes of a file.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        Of those that have a position.
-    points : (n, 3) array
-        [m, RAS]
-    header : list of str
-        Columns.
-    cells : list of rows
-        All rows as text.
-    rows : (n,) int array
-        Which rows have a position.
-    metres : float
-        Of one unit of the file.
-    """
+    """Electrodes of a file: labels and points (n, 3) [m, RAS] of those that have a position, its columns, all its rows
+    as text, which rows (n,) have a position, and the metres of one unit of it."""
 
     labels: tuple[str, ...]
     points: Floats
@@ -92,8 +76,7 @@ def read_electrodes(path: Path, problems: Problems) -> Electrodes | None:
         words = [row[header.index(axis)].strip() for axis in "xyz"]
         if all(word.lower() == _NOTHING for word in words):
             continue
-        values = [_number(word) for word in words]
-        if not all(abs(value) <= LARGEST for value in values):
+        if (values := position_of(words)) is None:
             problems.add(path, f"row {number + 2}", f"found position {shown(' '.join(words))}, expected finite numbers")
             continue
         names.append(row[header.index("name")].strip())
@@ -105,13 +88,6 @@ def read_electrodes(path: Path, problems: Problems) -> Electrodes | None:
     if metres is None or len(problems.found) > before:
         return None
     return Electrodes(tuple(names), metres * np.array(points), header, cells, np.array(rows), metres)
-
-
-def _number(word: str) -> float:
-    try:
-        return float(word)
-    except ValueError:
-        return math.nan
 
 
 def _unit(path: Path, problems: Problems) -> float | None:

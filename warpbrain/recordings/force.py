@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,9 +12,8 @@ from warpbrain.arrays import Floats
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.problems import Problems
-from warpbrain.recordings.base import REFERENCE, Columns, Recording
+from warpbrain.recordings.base import REFERENCE, Columns, Content, Recording
 from warpbrain.recordings.tables import read_csv
-from warpbrain.recordings.text import collected
 
 FORCE = ("fx", "fy", "fz")
 
@@ -46,28 +45,23 @@ class ForceRecording(Recording):
     torque: Floats | None = None
 
     @classmethod
-    def read(
-        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
-    ) -> Self | None:
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
         """Read ``.csv``: columns ``t`` [s] and one or more of ``fx``, ``fy``, ``fz`` [N] and ``torque`` [N m].
 
-        See `Recording.read`; `sigma` is of the force, or of the torque if that is all there is.
+        `sigma` is of the force, or of the torque if that is all there is.
         """
-        with collected(path, problems) as found:
-            table = read_csv(path, found, ("t", *FORCE, "torque"))
-            if table is None:
-                return None
-            recorded = [column for column in FORCE if column in table]
-            if not recorded and "torque" not in table:
-                table.require("fx")
-            time = table.times(strictly=True) if table.require("t") else None
-            force = np.full((len(table), 3), np.nan)
-            for column in recorded:
-                force[:, FORCE.index(column)] = table.numbers(column)
-            torque = table.numbers("torque") if "torque" in table else None
-        if time is None or found:
+        table = read_csv(path, problems, ("t", *FORCE, "torque"))
+        if table is None:
             return None
-        return cls(time=time, force=frame.directions(force), torque=torque, sigma=sigma, **given)
+        recorded = [column for column in FORCE if column in table]
+        if not recorded and "torque" not in table:
+            table.require("fx")
+        time = table.times(strictly=True) if table.require("t") else None
+        force = np.full((len(table), 3), np.nan)
+        for column in recorded:
+            force[:, FORCE.index(column)] = table.numbers(column)
+        torque = table.numbers("torque") if "torque" in table else None
+        return {"time": time, "force": frame.directions(force), "torque": torque}, 1.0
 
     @property
     def count(self) -> int:

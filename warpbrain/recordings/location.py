@@ -34,12 +34,15 @@ class Location:
         Distance to the mesh [m], zero inside.
     edge : (n,) array
         Mean length of the edges of the tetrahedron [m].
+    element : (n,) int64 array
+        Number of the tetrahedron; inside the mesh `nodes` are in the order of its corners.
     """
 
     nodes: Ints
     weights: Floats
     distance: Floats
     edge: Floats
+    element: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -58,7 +61,7 @@ class Location:
     def at(self, rows: ArrayLike) -> Location:
         """The location of some of the points, by their numbers."""
         chosen = np.asarray(rows)
-        return Location(self.nodes[chosen], self.weights[chosen], self.distance[chosen], self.edge[chosen])
+        return Location(*(values[chosen] for values in vars(self).values()))
 
 
 def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> Location:
@@ -98,7 +101,7 @@ def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> 
         owner[outside] = tetrahedron[closest.face]
     ends = corners[owner][:, EDGES]
     edge = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).mean(axis=1)
-    return Location(members, weights, distance, edge)
+    return Location(members, weights, distance, edge, owner)
 
 
 def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
@@ -112,7 +115,7 @@ def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
     gradients = np.linalg.inv(np.where(flat[:, None, None], np.eye(3), sides)).transpose(0, 2, 1)
     gradients = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1)
     allowed = np.maximum(_WEIGHT, _LENGTH * longest[:, None] * np.linalg.norm(gradients, axis=2))
-    found = np.full(len(points), -1, dtype=np.int64)
+    element = np.full(len(points), -1, dtype=np.int64)
 
     def depth(which: NDArray[np.int64], candidates: NDArray[np.int64]) -> Floats:
         """The least weight, -inf if the point is not inside."""
@@ -125,7 +128,7 @@ def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
     open_ = np.arange(len(points))
     for column in spheres.nearest(points, 6).T:
         hit = depth(open_, column[open_]) >= 0.0
-        found[open_[hit]] = column[open_[hit]]
+        element[open_[hit]] = column[open_[hit]]
         open_ = open_[~hit]
     best = np.full(len(points), -np.inf)
     for which, candidates in spheres.touching(points[open_], np.zeros(len(open_))):
@@ -134,8 +137,8 @@ def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
         order = np.lexsort((candidates, -d, which))
         first = order[np.append(True, which[order][1:] != which[order][:-1])] if len(order) else order
         first = first[d[first] > best[which[first]]]
-        found[which[first]], best[which[first]] = candidates[first], d[first]
-    return found
+        element[which[first]], best[which[first]] = candidates[first], d[first]
+    return element
 
 
 def _shape_functions(corners: Floats, points: Floats) -> Floats:

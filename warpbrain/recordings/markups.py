@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.frame import Frame
 from warpbrain.problems import Problems
-from warpbrain.recordings.tables import LARGEST
+from warpbrain.recordings.tables import position_of
 from warpbrain.recordings.text import lines_of, read_text, shown
 
 ENDINGS = (".mrk.json", ".json", ".fcsv")
@@ -32,17 +31,8 @@ COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 
 @dataclass(frozen=True, eq=False)
 class Markup:
-    """Control points.
-
-    Attributes
-    ----------
-    points : (n, 3) array
-        [m, RAS]
-    labels : tuple of str
-        May be empty.
-    moved_text : callable
-        From other positions (n, 3) [m, RAS] to the text of the file that has them; all else in it stays as it is.
-    """
+    """Control points (n, 3) [m, RAS] and their labels, which may be empty; `moved_text` makes of other positions (n, 3)
+    [m, RAS] the text of the file that has them, all else in it as it was."""
 
     points: Floats
     labels: tuple[str, ...]
@@ -174,11 +164,7 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
                 continue
             where = [columns.index(name) for name in ("x", "y", "z")]
             words = [fields[column].strip() for column in where]
-            try:
-                position = [float(word) for word in words]
-            except ValueError:
-                position = [math.nan]
-            if not all(abs(value) <= LARGEST for value in position):
+            if (position := position_of(words)) is None:
                 problems.add(path, f"row {row}", f"found position {shown(','.join(words))}, expected finite numbers")
                 continue
             positions.append(position)

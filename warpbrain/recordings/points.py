@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,13 +20,13 @@ from warpbrain.recordings.base import (
     POSITION,
     REFERENCE,
     Columns,
+    Content,
     Recording,
     TrackedPoints,
     column_of_time,
     columns_of_vectors,
 )
 from warpbrain.recordings.inside import check_points_inside, check_possible
-from warpbrain.recordings.text import collected
 from warpbrain.recordings.tracked_points import tracked_points
 
 
@@ -58,22 +58,16 @@ class PointsRecording(TrackedPoints, Recording):
     moved_file: str | None = None
 
     @classmethod
-    def read(
-        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
-    ) -> Self | None:
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
         """Read ``.csv``, ``.tag``, a pair of 3D Slicer markups (``.mrk.json``, ``.fcsv``), or an ending that another
-        package reads (`warpbrain.recordings.tracked_points.Reader`); see `Recording.read`.
+        package reads (`warpbrain.recordings.tracked_points.Reader`).
 
         A CSV file has columns ``x,y,z``, ``ux,uy,uz`` and perhaps ``t`` [s], ``id``, ``sigma`` and ``weight``; ``.tag``
         and markups are in mm and in their own axes. `moved` is the markup with the same labels where the points have
         gone: needed if `path` is a markup, and refused if not.
         """
-        noise = None if sigma is None else frame.metres * sigma
-        with collected(path, problems) as found:
-            tracked = tracked_points(path, frame, given.pop("moved", None), found)
-            if tracked is None or found:
-                return None
-            return cls(sigma=noise, **given, **vars(tracked))
+        tracked = tracked_points(path, frame, given.pop("moved", None), problems)
+        return None if tracked is None else (vars(tracked), frame.metres)
 
     @property
     def count(self) -> int:
@@ -110,24 +104,12 @@ class PointsRecording(TrackedPoints, Recording):
 
 
 def distinct_rows(recording: PointsRecording, rows: Ints) -> tuple[Ints, Floats]:
-    """Rows without copies of others, and their weights.
+    """Of rows (k,) those without copies of others (m,), the first of each in the order in which they were given, and
+    their weights (m,): sums of the weights of each and its copies; rows without a weight have that of one.
 
     A copy is of the same place and the same time, went as far, and has the same noise, to the last bit. Taken for rows
     of their own, two of half a weight would not be one: a gross error would have to strike each by itself, and what
     neighbours share grows with the noise of each.
-
-    Parameters
-    ----------
-    recording : PointsRecording
-    rows : (k,) int array
-        Those to look at.
-
-    Returns
-    -------
-    rows : (m,) int64 array
-        The first of each, in the order in which they were given.
-    weights : (m,) array
-        Sums of the weights of each and its copies; rows without a weight have that of one.
     """
     weights = np.ones(len(rows)) if recording.weights is None else recording.weights[rows]
     columns_of = [recording.points, recording.displacement, recording.time, recording.sigmas]

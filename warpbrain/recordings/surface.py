@@ -4,32 +4,31 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import Ints
-from warpbrain.mesh.vtu import write_vtu
 from warpbrain.problems import Problems
 from warpbrain.recordings.base import (
     POSITION,
     REFERENCE,
     Columns,
+    Content,
     Recording,
     column_of_time,
     columns_of_vectors,
+    write_triangles,
 )
 from warpbrain.recordings.inside import check_possible, check_surface_near
 from warpbrain.recordings.markups import is_markup, read_markup
 from warpbrain.recordings.surfaces import read_surface_mesh
 from warpbrain.recordings.tables import Table, read_table
-from warpbrain.recordings.text import collected
 
 NORMAL = ("nx", "ny", "nz")
 
@@ -61,38 +60,28 @@ class SurfaceRecording(Recording):
     faces: Ints | None = None
 
     @classmethod
-    def read(
-        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
-    ) -> Self | None:
-        """Read ``.csv``, a 3D Slicer markup or a surface mesh; see `Recording.read`.
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
+        """Read ``.csv``, a 3D Slicer markup or a surface mesh.
 
         A CSV file has columns ``x,y,z`` and perhaps ``t`` [s] and ``nx,ny,nz``; of a mesh (``.vtp``, ``.stl``,
         ``.ply``, ``.obj``, ``.vtu``, ...) points and triangles are taken. Axes that a mesh states itself take
         precedence, and a markup is in mm and its own.
         """
-        points: Floats | None = None
-        normals = faces = time = None
-        with collected(path, problems) as found:
-            if path.suffix.lower() == ".csv":
-                table = read_table(path, found, (*POSITION, *NORMAL, "t"))
-                if table is not None and table.require(*POSITION):
-                    points = frame.lengths(table.vectors(*POSITION))
-                    normals = _normals(table, frame)
-                    time = table.times(strictly=False) if "t" in table else None
-            elif is_markup(path):
-                markup = read_markup(path, found)
-                points = markup.points if markup is not None else None
-            else:
-                mesh = read_surface_mesh(path, found)
-                if mesh is not None:
-                    if mesh.axes not in (None, frame.axes):
-                        found.remark(path, f"the file says that its axes are {mesh.axes}, which counts for it")
-                    points = Frame(frame.unit, mesh.axes or frame.axes).lengths(mesh.points)
-                    faces = mesh.faces
-        if points is None or found:
-            return None
-        noise = None if sigma is None else frame.metres * sigma
-        return cls(sigma=noise, points=points, normals=normals, faces=faces, time=time, **given)
+        values: dict[str, Any] = {}
+        if path.suffix.lower() == ".csv":
+            table = read_table(path, problems, (*POSITION, *NORMAL, "t"))
+            if table is not None and table.require(*POSITION):
+                values = {"points": frame.lengths(table.vectors(*POSITION)), "normals": _normals(table, frame)}
+                values["time"] = table.times(strictly=False) if "t" in table else None
+        elif is_markup(path):
+            if (markup := read_markup(path, problems)) is not None:
+                values = {"points": markup.points}
+        elif (mesh := read_surface_mesh(path, problems)) is not None:
+            if mesh.axes not in (None, frame.axes):
+                problems.remark(path, f"the file says that its axes are {mesh.axes}, which counts for it")
+            points = Frame(frame.unit, mesh.axes or frame.axes).lengths(mesh.points)
+            values = {"points": points, "faces": mesh.faces}
+        return (values, frame.metres) if values else None
 
     @property
     def count(self) -> int:
@@ -120,13 +109,9 @@ class SurfaceRecording(Recording):
         if self.faces is None:
             super()._write(path, frame)
             return
-        import meshio
-
         if self.time is not None or self.normals is not None:
             raise InputError(f"{path}: a surface with triangles is written without times and normals; leave them out")
-        mesh = meshio.Mesh(frame.file_lengths(self.points), [("triangle", self.faces)])
-        with whole_file(path) as scratch:
-            write_vtu(scratch, mesh, frame.axes)
+        write_triangles(path, self.points, self.faces, frame)
 
 
 def _normals(table: Table, frame: Frame) -> Floats | None:

@@ -57,7 +57,14 @@ def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh | None:
         return None
     before = len(problems.found)
     try:
-        raw = _from_vtp(path) if path.suffix.lower() == ".vtp" else _from_meshio(path, problems)
+        if path.suffix.lower() == ".vtp":
+            from warpbrain.recordings.vtp import read_vtp
+
+            with patience(path):
+                points, faces, axes = read_vtp(path)
+            raw: SurfaceMesh | None = SurfaceMesh(points, faces if len(faces) else None, axes)
+        else:
+            raw = _from_meshio(path, problems)
     except Exception as error:  # whatever the parsers raise
         detail = " ".join(str(error).split())[:100] or type(error).__name__
         cure = "is the file whole? .vtp, .stl, .ply, .obj and .vtu can be read"
@@ -68,14 +75,6 @@ def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh | None:
     if ends_inside_a_number(path):
         problems.remark(path, "the last line ends in a number without a line break: is the file cut off?")
     return _checked(raw, path, problems)
-
-
-def _from_vtp(path: Path) -> SurfaceMesh:
-    from warpbrain.recordings.vtp import read_vtp
-
-    with patience(path):
-        points, faces, axes = read_vtp(path)
-    return SurfaceMesh(points, faces if len(faces) else None, axes)
 
 
 def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:

@@ -27,16 +27,7 @@ LARGEST = 1e12
 class Table:
     """A table as it was read: cells that are asked for are checked, and what is wrong is added to `problems`.
 
-    Parameters
-    ----------
-    path : Path
-    header : list of str
-        Names of the columns.
-    cells : list of rows
-        Each as long as the header.
-    rows : list of int
-        Line in the file of each row, counted from 1.
-    problems : Problems
+    Each row of `cells` is as long as the header; `rows` are their lines in the file, counted from 1.
     """
 
     def __init__(
@@ -137,20 +128,10 @@ class Table:
 
 
 def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table | None:
-    """Read a CSV file.
+    """Read a CSV file; None if there is no table to speak of: no readable text, no header or no rows.
 
-    Parameters
-    ----------
-    path : Path
-    problems : Problems
-        Gets everything that is wrong; rows that are too long or too short are left out of the table.
-    known : sequence of str
-        Columns that mean something: none of them may be there twice.
-
-    Returns
-    -------
-    Table or None
-        None if there is no table to speak of: no readable text, no header or no rows.
+    Rows that are too long or too short are left out of the table, which is a problem as all that is wrong. `known` are
+    the columns that mean something: none of them may be there twice.
     """
     text = read_text(path, problems)
     if text is None:
@@ -232,6 +213,15 @@ def _number(cell: str) -> float | None:
         return float(cell)
     except ValueError:
         return None
+
+
+def position_of(words: Sequence[str]) -> list[float] | None:
+    """Coordinates, None if they are no finite numbers."""
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        return None
+    return values if all(abs(value) <= LARGEST for value in values) else None
 
 
 def _nearest(name: str, header: Sequence[str]) -> str | None:

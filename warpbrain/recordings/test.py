@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,9 +14,8 @@ from warpbrain.errors import InputError
 from warpbrain.frame import PASCALS, Frame
 from warpbrain.keys import Key
 from warpbrain.problems import Problems
-from warpbrain.recordings.base import Columns, Recording, column_of_time
+from warpbrain.recordings.base import Columns, Content, Recording, column_of_time
 from warpbrain.recordings.tables import Table, read_csv
-from warpbrain.recordings.text import collected
 
 #: What a test of each mode may have recorded: imposed, response.
 QUANTITIES = {
@@ -91,10 +90,8 @@ class TestRecording(Recording):
     control: str = "displacement"
 
     @classmethod
-    def read(
-        cls, path: Path, frame: Frame, problems: Problems, *, sigma: float | None = None, **given: Any
-    ) -> Self | None:
-        """Read ``.csv``: columns of one pair of `QUANTITIES` of the mode, and perhaps ``t`` [s]; see `Recording.read`.
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
+        """Read ``.csv``: columns of one pair of `QUANTITIES` of the mode, and perhaps ``t`` [s].
 
         They are ``displacement`` (in the unit of `frame`) and ``force`` [N], ``stretch`` and ``stress``, or ``angle``
         [rad] and ``torque`` [N m]; `unit` is that of a stress, of `PASCALS`, and `stress` what it is, see
@@ -104,30 +101,20 @@ class TestRecording(Recording):
         stress, unit = given.pop("stress", "nominal"), given.pop("unit", "Pa")
         # what is so if a key is absent
         given |= {"specimen": given.get("specimen") or "", "axis": given.get("axis") or Z}
-        with collected(path, problems) as found:
-            table = read_csv(path, found, ("t", *(column for pair in QUANTITIES[mode] for column in pair)))
-            pair = _pair(table, mode, found) if table is not None else None
-            if table is None or pair is None:
-                return None
-            time = table.times(strictly=True) if "t" in table else None
-            if pair[0] == "stretch":
-                imposed = table.bounded("stretch", 0.0, itself=False)
-            else:
-                imposed = table.numbers(pair[0]) * (frame.metres if pair[0] == "displacement" else 1.0)
-            response = table.numbers(pair[1])
-            if pair[1] == "stress":
-                response = PASCALS[unit] * nominal_stress(mode, imposed, response, stress)
-        if found:
+        table = read_csv(path, problems, ("t", *(column for pair in QUANTITIES[mode] for column in pair)))
+        pair = _pair(table, mode, problems) if table is not None else None
+        if table is None or pair is None:
             return None
+        time = table.times(strictly=True) if "t" in table else None
+        if pair[0] == "stretch":
+            imposed = table.bounded("stretch", 0.0, itself=False)
+        else:
+            imposed = table.numbers(pair[0]) * (frame.metres if pair[0] == "displacement" else 1.0)
+        response = table.numbers(pair[1])
+        if pair[1] == "stress":
+            response = PASCALS[unit] * nominal_stress(mode, imposed, response, stress)
         of_answer = {"stress": PASCALS[unit], "displacement": frame.metres}.get(pair[control != "force"], 1.0)
-        return cls(
-            sigma=None if sigma is None else of_answer * sigma,
-            quantities=pair,
-            imposed=imposed,
-            response=response,
-            time=time,
-            **given,
-        )
+        return {"quantities": pair, "imposed": imposed, "response": response, "time": time}, of_answer
 
     @classmethod
     def fault_of_keys(cls, given: Mapping[str, Any]) -> tuple[str, str] | None:
@@ -216,11 +203,7 @@ def turn_of(axis: tuple[float, float, float], sheared: tuple[float, float, float
     """Rotation `R` (3, 3) of a tissue in a machine: `R axis` is along z, and `R sheared` between x and z.
 
     Without `sheared` the machine's x is what of the tissue's is across the axis, or of its y where that is little.
-
-    Raises
-    ------
-    InputError
-        If one of them is zero, or they are one direction.
+    `InputError` if one of them is zero, or they are one direction.
     """
     z = np.array(axis, dtype=np.float64)
     if not np.linalg.norm(z) > 0.0:

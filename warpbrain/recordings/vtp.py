@@ -25,14 +25,10 @@ _APPENDED = re.compile(rb"<AppendedData[^>]*?encoding=\"(\w+)\"[^>]*>\s*_")
 
 
 def read_vtp(path: Path) -> tuple[Floats, Ints, str | None]:
-    """Points (n, 3), triangles (k, 3) and the axes that the file states (a field ``SPACE``, as Slicer writes it).
+    """Points (n, 3), triangles (k, 3) and the axes that the file states (a field ``SPACE``, as Slicer writes it);
+    `ValueError` with what is wrong, if it is no such file.
 
     Polygons are cut into fans of triangles, strips into their triangles; vertices and lines are left out.
-
-    Raises
-    ------
-    ValueError
-        With what is wrong, if it is no such file.
     """
     file = _File(path.read_bytes())
     points: list[Floats] = [np.empty((0, 3))]
@@ -56,13 +52,13 @@ def read_vtp(path: Path) -> tuple[Floats, Ints, str | None]:
 
 class _File:
     def __init__(self, data: bytes) -> None:
-        found = _APPENDED.search(data)
+        appended = _APPENDED.search(data)
         self._appended, self._encoding = b"", ""
-        if found:
+        if appended:
             end = data.rindex(b"</AppendedData>")
-            self._encoding = found.group(1).decode()
-            self._appended = data[found.end() : end]
-            data = data[: found.end()] + data[end:]
+            self._encoding = appended.group(1).decode()
+            self._appended = data[appended.end() : end]
+            data = data[: appended.end()] + data[end:]
         try:
             self.root = XML.fromstring(data)
         except XML.ParseError as error:
@@ -111,10 +107,10 @@ class _File:
 
 def _take(data: bytes, count: int, coded: bool) -> bytes:
     """The first `count` bytes of what `data` stands for."""
-    found = base64.b64decode(data[: -(-count // 3) * 4])[:count] if coded else data[:count]
-    if len(found) < count:
+    content = base64.b64decode(data[: -(-count // 3) * 4])[:count] if coded else data[:count]
+    if len(content) < count:
         raise ValueError("the file is cut off")
-    return found
+    return content
 
 
 def _fans(ids: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.int64]:

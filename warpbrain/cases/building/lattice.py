@@ -43,24 +43,11 @@ SNAP = 0.06
 def cut(
     points: Floats, tetrahedra: Ints, labels: Ints, field: Callable[[Floats], Floats]
 ) -> tuple[Floats, Ints, Ints, Bools]:
-    """Split every edge that crosses the zero level, there.
+    """Split every edge of tetrahedra (m, 4) with nodes (n, 3) that crosses the zero level of a field, there: the field
+    takes positions (k, 3) to values (k,), and labels (m,) are handed down to the pieces. Returns points, tetrahedra and
+    labels of the cut mesh, conforming and positively oriented if the given one is, and for each tetrahedron whether the
+    field is positive there.
 
-    Parameters
-    ----------
-    points, tetrahedra : (n, 3) and (m, 4) arrays
-    labels : (m,) array
-        Handed down to the pieces.
-    field : callable
-        From positions (k, 3) to values (k,).
-
-    Returns
-    -------
-    points, tetrahedra, labels, positive
-        The cut mesh, conforming and positively oriented if the given one is, and for each tetrahedron whether the field
-        is positive there.
-
-    Notes
-    -----
     Bisecting an edge splits every tetrahedron around it in two, which keeps the mesh conforming whatever the order.
     Here the crossed edges are bisected in order of their number. One tetrahedron has at most four of them and each
     piece inherits those that are left, so four rounds over all tetrahedra at once do all of it.
@@ -105,10 +92,10 @@ def _bisect_first(tetrahedra: Ints, labels: Ints, key: Ints, count: int) -> tupl
     old = (pairs < count).all(axis=2)
     wanted = np.where(old, pairs[..., 0] * count + pairs[..., 1], -1)
     at = np.minimum(np.searchsorted(key, wanted), max(len(key) - 1, 0))
-    found = old & (key[at] == wanted) if len(key) else np.zeros_like(old)
-    number = np.where(found, at, len(key))
+    crossed = old & (key[at] == wanted) if len(key) else np.zeros_like(old)
+    number = np.where(crossed, at, len(key))
     local = number.argmin(axis=1)
-    split = np.flatnonzero(found.any(axis=1))
+    split = np.flatnonzero(crossed.any(axis=1))
     new = count + number[split, local[split]]
     halves = [tetrahedra[split].copy() for _ in range(2)]
     for end, half in enumerate(halves):

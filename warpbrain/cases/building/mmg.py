@@ -36,8 +36,8 @@ def run_mmg(
         if done.returncode == _GAVE_UP:
             return None
         if done.returncode != 0 or not made.exists():
-            said = (done.stderr.strip() or done.stdout.strip() or f"exit status {done.returncode}").splitlines()[-1]
-            raise BuildError(f"MMG could not be run: {said}")
+            message = (done.stderr.strip() or done.stdout.strip() or f"exit status {done.returncode}").splitlines()[-1]
+            raise BuildError(f"MMG could not be run: {message}")
         with np.load(made) as result:
             return result["points"], result["tetrahedra"], result["labels"]
 
@@ -113,16 +113,9 @@ def remesh(cells: Cells, edge: float) -> Cells | None:
 def fit_size(cells: Cells, size: Size, edge: float, good: Callable[[Cells], Cells | None]) -> Cells:
     """Find the edge length that gives the wanted count, and a mesh there that is good.
 
-    Parameters
-    ----------
-    cells : Cells
-        Fine mesh to start every trial from.
-    size : Size
-    edge : float
-        First guess of the largest edge [mm].
-    good : callable
-        Finishes a mesh of the right size; None if it is not good enough. The first good one met is returned; the search
-        is deterministic.
+    Every trial starts from the fine mesh; `edge` is a first guess of the largest edge [mm]. `good` finishes a mesh of
+    the right size, and gives None if it is not good enough. The first good one met is returned; the search is
+    deterministic.
     """
     goal = 0.5 * (size.at_least + size.at_most)
     seen: list[tuple[float, int]] = []

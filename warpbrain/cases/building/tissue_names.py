@@ -23,30 +23,12 @@ MOST_UNNAMED = 8
 MOST_TISSUES = 40
 #: Name of tissue that was or is to be taken out.
 RESECTION = "resection"
-_USUAL = {
-    "grey": "grey matter",
-    "gray": "grey matter",
-    "gray matter": "grey matter",
-    "grey matter": "grey matter",
-    "white": "white matter",
-    "white matter": "white matter",
-    RESECTION: RESECTION,
-}
+_USUAL = dict.fromkeys(("grey", "gray", "grey matter", "gray matter"), "grey matter")
+_USUAL |= {**dict.fromkeys(("white", "white matter"), "white matter"), RESECTION: RESECTION}
 #: Names that the literature or other programs use; one that is nearly one of them was meant for it.
 _KNOWN = (
-    *(
-        "grey matter",
-        "gray matter",
-        "white matter",
-        "grey",
-        "gray",
-        "white",
-        "cerebellum",
-        "brain stem",
-        "brainstem",
-        "thalamus",
-    ),
-    *("hippocampus", "lesion", "tumour", "tumor", "oedema", "edema", RESECTION, "brain"),
+    *("grey matter", "gray matter", "white matter", "grey", "gray", "white", "cerebellum", "brain stem", "brainstem"),
+    *("thalamus", "hippocampus", "lesion", "tumour", "tumor", "oedema", "edema", RESECTION, "brain"),
 )
 #: From which likeness on a name is taken for a misspelt one.
 _LIKE = 0.75

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from warpbrain.cases.boundary import BOUNDARIES, RAMP
 from warpbrain.frame import AXES, METRES
 from warpbrain.keys import Key, Table
 from warpbrain.physics.laws import FORMULATIONS, LAWS, Law
@@ -100,8 +101,6 @@ BODY = Table(
     ),
 )
 
-_RAMP = Key("ramp", "pairs", "Factor over time [s]; 1 throughout if absent.")
-
 BOUNDARY = Table(
     "boundary",
     "What is assumed to act on a set of nodes.",
@@ -114,37 +113,8 @@ BOUNDARY = Table(
             needed=True,
         ),
     ),
-    by=Key(
-        "kind",
-        "text",
-        "What is assumed.",
-        needed=True,
-        choices=("fixed", "sliding", "displacement", "force", "pressure", "contact"),
-    ),
-    variants={
-        "fixed": (),
-        "sliding": (),
-        "displacement": (
-            Key(
-                "value",
-                "vector|file",
-                "Displacement, or a .csv of it over time with the columns t, ux, uy, uz.",
-                "units",
-                needed=True,
-                hint="value = [x, y, z]",
-            ),
-            _RAMP,
-        ),
-        "force": (Key("total", "vector", "Total force, shared evenly by the nodes.", "N", needed=True), _RAMP),
-        "pressure": (
-            Key("value", "number", "Pressure on the faces of the nodes, positive pushes.", "Pa", needed=True),
-            _RAMP,
-        ),
-        "contact": (
-            Key("surface", "file", "Closed surface that the nodes cannot cross.", needed=True),
-            Key("friction", "number", "Coefficient of friction", above=-1e-300, default=0),
-        ),
-    },
+    by=Key("kind", "text", "What is assumed.", needed=True, choices=tuple(BOUNDARIES)),
+    variants={kind: boundary.keys for kind, boundary in BOUNDARIES.items()},
     several=True,
 )
 
@@ -159,7 +129,7 @@ def _mechanism_keys(mechanism: type[Mechanism]) -> tuple[Key, ...]:
         kind, needed = _KIND.get(says.kind, says.kind), name in mechanism.required()
         limits = (says.above, says.below)
         keys.append(Key(name, kind, mechanism.described(name), unit, needed, says.choices, *limits, si=says.si))
-    return (*keys, _RAMP)
+    return (*keys, RAMP)
 
 
 MECHANISM = Table(

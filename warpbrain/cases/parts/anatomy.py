@@ -32,8 +32,8 @@ def read_anatomy(context: Context) -> tuple[str, MeshInFile | None, Specimen | N
         return "", MeshInFile(mesh, np.arange(len(mesh.points)), len(mesh.points)), specimen
     table = context.table(MESH)
     path = table.path("file")
-    found = None if path is None else _read_mesh(context, path, table.get("tissue"))
-    return table.get("file") or "", found, None
+    in_file = None if path is None else _read_mesh(context, path, table.get("tissue"))
+    return table.get("file") or "", in_file, None
 
 
 def _read_specimen(context: Context) -> Specimen | None:
@@ -57,23 +57,23 @@ def _read_specimen(context: Context) -> Specimen | None:
 
 def _read_mesh(context: Context, path: Path, tissue: str | None) -> MeshInFile | None:
     try:
-        found = read_mesh_file(path, context.frame.unit, tissue)
+        in_file = read_mesh_file(path, context.frame.unit, tissue)
     except MeshError as error:
         for message in error.messages:
             context.problems.add(path, "", message.removeprefix(f"{path}: "))
         return None
     if ends_inside_a_number(path):
         context.problems.remark(path, "the last line ends in a number without a line break: is the file cut off?")
-    mesh = found.mesh
+    mesh = in_file.mesh
     if not np.all(context.frame.signs > 0):
         # both axes conventions are right-handed: turning two axes keeps the orientation of the elements
         turned = {name: context.frame.directions(vectors) for name, vectors in mesh.element_vectors.items()}
         mesh = replace(mesh, points=context.frame.directions(mesh.points), element_vectors=turned)
-    if left := found.file_nodes - len(mesh.points):
+    if left := in_file.file_nodes - len(mesh.points):
         context.problems.remark(
             path, f"tetrahedra of second order: their corners are used, {left} nodes on edges are not"
         )
-    return _sound(context, path, replace(found, mesh=mesh))
+    return _sound(context, path, replace(in_file, mesh=mesh))
 
 
 def _sound(context: Context, path: Path, found: MeshInFile) -> MeshInFile | None:

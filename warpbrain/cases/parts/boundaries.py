@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.cases.boundary import Boundary, Contact, Displaced, Fixed, Forced, Pressed, Sliding
+from warpbrain.cases.boundary import BOUNDARIES, Boundary, Displaced, Fixed
 from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import BOUNDARY
 from warpbrain.cases.parts.named import Named, read_closed_surface
@@ -30,29 +30,24 @@ def read_boundaries(context: Context, named: Named | None, found: MeshInFile | N
             continue
         values = _values(table)
         if values is not None and nodes is not None:
-            boundaries.append(_CLASSES[table.variant](name=name, nodes=nodes, **values))
+            boundaries.append(BOUNDARIES[table.variant](name=name, nodes=nodes, **values))
     return tuple(boundaries)
-
-
-_CLASSES: dict[str, type[Boundary]] = {
-    known.kind: known for known in (Fixed, Sliding, Displaced, Forced, Pressed, Contact)
-}
 
 
 def _values(table: Reading) -> dict[str, Any] | None:
     """What a boundary has besides name and nodes; None if something of it is wrong."""
-    own = [key for key in BOUNDARY.variants[str(table.variant)] if key.name != "ramp"]
+    keys = [key for key in BOUNDARIES[str(table.variant)].keys if key.name != "ramp"]
     if table.variant == Displaced.kind and isinstance(table.get("value"), str):
         if table.has("ramp"):
             table.problem("ramp", "means nothing with a file, which has the times itself")
         return _history(table)
     ramp = table.ramp() if "ramp" in table.keys else ()
-    if ramp is None or any(key.needed and not table.has(key.name) for key in own):
+    if ramp is None or any(key.needed and not table.has(key.name) for key in keys):
         return None
     if table.variant == Displaced.kind:
         times, factors = zip(*ramp, strict=True) if ramp else ((0.0,), (1.0,))
         return {"times": tuple(times), "values": _triples(np.outer(factors, table.si("value")))}
-    values = {key.name: table.si(key.name) for key in own}
+    values = {key.name: table.si(key.name) for key in keys}
     if "surface" in values:
         path, frame = table.path("surface"), table.context.frame
         surface = None if path is None else read_closed_surface(path, values["surface"], frame, table.problems)
@@ -115,13 +110,13 @@ def check_together(context: Context, mesh: TetMesh, boundaries: tuple[Boundary, 
             held |= mesh.node_sets[boundary.nodes]
     sizes = np.bincount(part)
     for number in np.argsort(sizes):
-        own = mesh.tetrahedra[part == number]
-        if not held[own].any():
+        cells = mesh.tetrahedra[part == number]
+        if not held[cells].any():
             first = int(np.flatnonzero(part == number)[0])
             context.problems.add(
                 context.file,
                 "[mesh]",
-                f"the mesh is in {len(sizes)} parts that no face connects, and nothing holds the one of {len(own)} "
+                f"the mesh is in {len(sizes)} parts that no face connects, and nothing holds the one of {len(cells)} "
                 f"tetrahedra (first: tetrahedron {first})",
                 "join the parts, leave this one out, or hold it by a [[boundary]]",
             )

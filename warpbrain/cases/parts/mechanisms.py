@@ -20,19 +20,9 @@ _CURES = {"gravity_axis": "gravity_axis = [0, -1, 0] for a patient who lies on t
 def read_mechanisms(
     context: Context, named: Named | None, axis: tuple[float, float, float] | None, density: float
 ) -> tuple[Mechanism, ...]:
-    """Mechanisms in the order of the file, as far as they are right.
-
-    Parameters
-    ----------
-    context : Context
-    named : Named or None
-        The mesh and what can be named; gains what the mechanisms name. None if there is no mesh.
-    axis : (float, float, float) or None
-        Where 'down' is.
-    density : float
-        [kg/m3]
-    """
-    found: dict[int, Mechanism] = {}
+    """Mechanisms in the order of the file, as far as they are right. `named` gains what they name, and is None if there
+    is no mesh; the axis is where 'down' is, the density is in kg/m3."""
+    acting: dict[int, Mechanism] = {}
     kinds: set[str] = set()
     # all others act on what is left by those that remove elements
     tables = [(place, t.variant, t) for place, t in enumerate(context.lists(MECHANISM)) if t.variant is not None]
@@ -48,14 +38,14 @@ def read_mechanisms(
         if any(map(table.wrong, mechanism.parameters())) or any(value is None for value in values.values()):
             continue
         try:
-            facts = Facts(named.mesh, axis, density, tuple(m for m in found.values() if isinstance(m, Removing)))
-            found[place] = mechanism.of_case(values | {"ramp": ramp}, facts)
+            facts = Facts(named.mesh, axis, density, tuple(m for m in acting.values() if isinstance(m, Removing)))
+            acting[place] = mechanism.of_case(values | {"ramp": ramp}, facts)
         except ParameterError as error:
             _note(context, table, error)
         except InputError as error:
             table.problem("kind", str(error))
-    _require_turns(tables, found)
-    return tuple(found[place] for place in sorted(found))
+    _require_turns(tables, acting)
+    return tuple(acting[place] for place in sorted(acting))
 
 
 def _require_turns(tables: Sequence[tuple[int, str, Reading]], found: Mapping[int, Mechanism]) -> None:
