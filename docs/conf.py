@@ -15,8 +15,11 @@ import pyvista
 from docutils import nodes
 from sphinx.util.docutils import SphinxDirective
 
-ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(Path(__file__).parent))
+from figure_records import read_records
+
+ROOT = Path(__file__).parents[1]
+
 # gallery scripts run in processes of their own kind: no window, one picture style
 pyvista.OFF_SCREEN = True
 pyvista.BUILDING_GALLERY = True
@@ -95,6 +98,16 @@ def linked_elsewhere(app: Any, name: str, source: list[str]) -> None:
     source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)", shown, source[0])
 
 
+def say_what_made_figures(app: Any, tree: nodes.document) -> None:
+    """After a page is parsed: below each picture of docs/figures stand the command that made it and the date."""
+    for image in list(tree.findall(nodes.image)):
+        folder, _, name = image["uri"].rpartition("/")
+        if folder.endswith("figures"):
+            command, date = read_records()[name]
+            caption = nodes.paragraph("", "", nodes.literal("", command), nodes.Text(f", {date}"), classes=["made"])
+            image.parent.parent.insert(image.parent.parent.index(image.parent) + 1, caption)
+
+
 class Docstring(SphinxDirective):
     """What a module says of itself below its first paragraph, in Markdown: equations stand where they are computed."""
 
@@ -111,3 +124,4 @@ def setup(app: Any) -> None:
     """Called by Sphinx."""
     app.add_directive("docstring", Docstring)
     app.connect("source-read", linked_elsewhere)
+    app.connect("doctree-read", say_what_made_figures)
