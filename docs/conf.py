@@ -8,6 +8,7 @@ import inspect
 import os
 import re
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +27,11 @@ pyvista.BUILDING_GALLERY = True
 os.environ.setdefault("MPLBACKEND", "agg")
 
 project = "warpbrain"
-author = "warpbrain maintainers"
-copyright = "warpbrain maintainers, Apache-2.0"
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+author = ", ".join(person["name"] for person in PROJECT["authors"])
+copyright = f"{author}, {PROJECT['license']}"
+# where files of the repository are read by people, once it is published
+REPOSITORY = PROJECT.get("urls", {}).get("Repository")
 try:
     release = importlib.metadata.version("warpbrain")
 except importlib.metadata.PackageNotFoundError:
@@ -80,7 +84,8 @@ sphinx_gallery_conf = {
 
 
 def linked_elsewhere(app: Any, name: str, source: list[str]) -> None:
-    """Before a page is parsed: `[text](../path)` becomes the text with the path of the file in the repository."""
+    """Before a page is parsed: `[text](../path)` becomes a link into the published repository, or without one the text
+    with the path of the file in it."""
     page = Path(app.env.doc2path(name))
     if page.suffix != ".md":
         return
@@ -93,6 +98,8 @@ def linked_elsewhere(app: Any, name: str, source: list[str]) -> None:
         if file.is_relative_to(ROOT / "docs") or not file.is_relative_to(ROOT):
             return found[0]
         path = file.relative_to(ROOT).as_posix()
+        if REPOSITORY:
+            return f"[{text}]({REPOSITORY}/blob/HEAD/{path})"
         return text if path in text else f"{text} (`{path}` of the repository)"
 
     source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)", shown, source[0])

@@ -11,7 +11,7 @@ from figure_records import read_records
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "warpbrain"
 #: Folders with pages; the root has pages of its own.
-FOLDERS = ("docs", "bench", "concealed", "paper", "referee", "tests", "warpbrain")
+FOLDERS = ("docs", "bench", "concealed", "packaging", "paper", "referee", "tests", "warpbrain")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
 
 
