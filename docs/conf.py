@@ -8,6 +8,7 @@ import inspect
 import os
 import re
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +16,22 @@ import pyvista
 from docutils import nodes
 from sphinx.util.docutils import SphinxDirective
 
-ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(Path(__file__).parent))
+from figure_records import read_records
+
+ROOT = Path(__file__).parents[1]
+
 # gallery scripts run in processes of their own kind: no window, one picture style
 pyvista.OFF_SCREEN = True
 pyvista.BUILDING_GALLERY = True
 os.environ.setdefault("MPLBACKEND", "agg")
 
 project = "warpbrain"
-author = "warpbrain maintainers"
-copyright = "warpbrain maintainers, Apache-2.0"
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+author = ", ".join(person["name"] for person in PROJECT["authors"])
+copyright = f"{author}, {PROJECT['license']}"
+# where files of the repository are read by people, once it is published
+REPOSITORY = PROJECT.get("urls", {}).get("Repository")
 try:
     release = importlib.metadata.version("warpbrain")
 except importlib.metadata.PackageNotFoundError:
@@ -77,7 +84,8 @@ sphinx_gallery_conf = {
 
 
 def linked_elsewhere(app: Any, name: str, source: list[str]) -> None:
-    """Before a page is parsed: `[text](../path)` becomes the text with the path of the file in the repository."""
+    """Before a page is parsed: `[text](../path)` becomes a link into the published repository, or without one the text
+    with the path of the file in it."""
     page = Path(app.env.doc2path(name))
     if page.suffix != ".md":
         return
@@ -90,9 +98,21 @@ def linked_elsewhere(app: Any, name: str, source: list[str]) -> None:
         if file.is_relative_to(ROOT / "docs") or not file.is_relative_to(ROOT):
             return found[0]
         path = file.relative_to(ROOT).as_posix()
+        if REPOSITORY:
+            return f"[{text}]({REPOSITORY}/blob/HEAD/{path})"
         return text if path in text else f"{text} (`{path}` of the repository)"
 
     source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(([^)\s]+)\)", shown, source[0])
+
+
+def say_what_made_figures(app: Any, tree: nodes.document) -> None:
+    """After a page is parsed: below each picture of docs/figures stand the command that made it and the date."""
+    for image in list(tree.findall(nodes.image)):
+        folder, _, name = image["uri"].rpartition("/")
+        if folder.endswith("figures"):
+            command, date = read_records()[name]
+            caption = nodes.paragraph("", "", nodes.literal("", command), nodes.Text(f", {date}"), classes=["made"])
+            image.parent.parent.insert(image.parent.parent.index(image.parent) + 1, caption)
 
 
 class Docstring(SphinxDirective):
@@ -111,3 +131,4 @@ def setup(app: Any) -> None:
     """Called by Sphinx."""
     app.add_directive("docstring", Docstring)
     app.connect("source-read", linked_elsewhere)
+    app.connect("doctree-read", say_what_made_figures)

@@ -8,12 +8,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+from figure_records import record
 from PIL import Image
 
 from warpbrain.gp.trained import trained
 from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
 
 FIGURES = Path(__file__).parent / "figures"
+COMMAND = "python docs/make_figures.py"
 #: Pictures of runs, of ensembles and of cases, by file.
 RUNS = {"0614.png": ["--case", "0614"]}
 ENSEMBLES = {"0529-spread.png": ["--case", "0529", "--tissue", "single", "--grid"]}
@@ -44,6 +46,7 @@ def main() -> None:
             shutil.copy(Path(folder) / made, FIGURES / name)
     for name, arguments in CASES.items():
         _warpbrain("cases", "show", *arguments, "--out", str(FIGURES / name))
+    record(COMMAND, [*RUNS, *ENSEMBLES, *ESTIMATES, *CASES])
     draw_generative_model()
 
 
@@ -72,6 +75,7 @@ def draw_generative_model() -> None:
         with Image.open(FIGURES / name) as image:
             small = image.convert("RGB").resize((WIDTH, round(image.height * WIDTH / image.width)), Image.LANCZOS)
         small.quantize(PALETTE, dither=Image.Dither.NONE).save(FIGURES / name, optimize=True)
+    record(COMMAND, pictures)
 
 
 def _warpbrain(*arguments: str) -> None:

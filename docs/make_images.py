@@ -19,6 +19,7 @@ matplotlib.use("Agg")
 
 import nibabel
 import numpy as np
+from figure_records import record
 from make_figures import FIGURES, few_colours
 from matplotlib import pyplot
 from numpy.typing import NDArray
@@ -42,6 +43,7 @@ def main(folder: Path) -> None:
         drawn = Path(place) / "scan.png"
         draw_scan(folder, drawn)
         few_colours(drawn, FIGURES / "there-and-back-scan.png")
+    record("python docs/make_images.py", ["there-and-back.png", "there-and-back-scan.png"])
 
 
 def draw_scan(folder: Path, picture: Path) -> None:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from figure_records import record
 from matplotlib import colormaps
 from matplotlib.colors import to_rgb
 from mechanism_pages import (
@@ -84,6 +85,7 @@ def draw(case: Case, kind: str) -> Effect:
     file = _figure(kind)
     write_picture(file, case, mesh, difference, kind)
     _shrink(file)
+    record("python docs/make_mechanisms.py", [file.name])
     worst = int(sizes.argmax())
     x = tuple(round(1000.0 * float(x), 1) for x in mesh.points[worst])
     largest = round(1000.0 * float(sizes[worst]), 3)

@@ -11,6 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from figure_records import record
 from PIL import Image
 
 FIGURES = Path(__file__).parent / "figures"
@@ -31,7 +32,9 @@ def main(folder: Path) -> None:
             arguments = [command, "--case", "0529", "--out", str(folder / command)]
             subprocess.run([sys.executable, "-m", "warpbrain", *arguments], check=True)
         for width, height in WINDOWS.items():
-            photograph(page, FIGURES / f"report-{command}-{width}.png", width, height)
+            picture = FIGURES / f"report-{command}-{width}.png"
+            photograph(page, picture, width, height)
+            record("python docs/make_reports.py", [picture.name])
 
 
 def photograph(page: Path, picture: Path, width: int, height: int) -> None:

@@ -1,15 +1,17 @@
 """Pages for people: what they link to, and the files that the house names, are there."""
 
+import datetime
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from figure_records import read_records
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "warpbrain"
 #: Folders with pages; the root has pages of its own.
-FOLDERS = ("docs", "bench", "concealed", "paper", "referee", "tests", "warpbrain")
+FOLDERS = ("docs", "bench", "concealed", "packaging", "paper", "referee", "tests", "warpbrain")
 PAGES = sorted([*ROOT.glob("*.md"), *(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md"))])
 
 
@@ -39,6 +41,14 @@ def test_links_lead_somewhere(page):
 @pytest.mark.parametrize("picture", sorted((ROOT / "docs" / "figures").iterdir()), ids=lambda path: path.name)
 def test_every_picture_is_on_a_page(picture):
     assert any(f"figures/{picture.name})" in page.read_text(encoding="utf-8") for page in PAGES)
+
+
+def test_every_picture_has_the_command_that_made_it_and_its_date():
+    records = read_records()
+    assert set(records) == {picture.name for picture in (ROOT / "docs" / "figures").iterdir()}
+    for command, date in records.values():
+        assert (ROOT / command.split()[1]).is_file(), command
+        assert datetime.date.fromisoformat(date) <= datetime.date.today()
 
 
 def named_files() -> Iterator[str]:

@@ -25,6 +25,28 @@ def test_the_conda_recipe_needs_the_same():
     assert recipe["about"]["summary"] == PROJECT["description"]
 
 
+def test_authors_and_address_are_those_of_the_project():
+    """What cannot read pyproject.toml names the same people, and the same repository once it is published."""
+    yaml = pytest.importorskip("yaml")
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    paper = yaml.safe_load((ROOT / "paper" / "paper.md").read_text(encoding="utf-8").split("---")[1])
+    recipe = yaml.safe_load((ROOT / "packaging" / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
+    names = [person["name"] for person in PROJECT["authors"]]
+    assert [person["name"] for person in paper["authors"]] == names
+    cited = [who.get("name") or f"{who['given-names']} {who['family-names']}" for who in citation["authors"]]
+    assert cited == names
+    address = PROJECT.get("urls", {}).get("Repository")
+    assert citation.get("repository-code") == recipe["about"].get("repository") == address
+
+
+def test_the_image_of_apptainer_is_that_of_docker():
+    docker = (ROOT / "packaging" / "Dockerfile").read_text(encoding="utf-8")
+    apptainer = (ROOT / "packaging" / "warpbrain.def").read_text(encoding="utf-8")
+    for pattern in (r"^F(?:ROM|rom:) (python:\S+)$", r"install -y --no-install-recommends ([\w ]+\w)"):
+        of_docker, of_apptainer = (re.findall(pattern, text, re.MULTILINE) for text in (docker, apptainer))
+        assert of_docker == of_apptainer and len(of_docker) == 1
+
+
 def test_a_release_is_tested_with_every_python_that_is_declared():
     yaml = pytest.importorskip("yaml")
     workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "release.yml").read_text(encoding="utf-8"))

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from common import FIGURES, Floats, arguments, declared, diagnose, draw, recorded_test, row, write_results
+from common import Floats, arguments, declared, diagnose, draw, keep_figure, recorded_test, row, write_results
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
@@ -81,7 +81,7 @@ def main() -> None:
             draw(axis, found, number, "time", ("refitted", "explained"))
     axes[0, 0].legend(frameon=False, fontsize=8)
     write_results("real_adhesive", rows)
-    figure.savefig(FIGURES / "real-adhesive.png", dpi=150)
+    keep_figure(figure, "real-adhesive.png", __file__)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from common import FIGURES, arguments, declared, diagnose, draw, recorded_test, row, write_results
+from common import arguments, declared, diagnose, draw, keep_figure, recorded_test, row, write_results
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
@@ -59,7 +59,7 @@ def main() -> None:
     lines = {line.get_label(): line for axis in axes.flat for line in axis.get_legend_handles_labels()[0]}
     axes[0, 1].legend(handles=list(lines.values()), frameon=False, fontsize=8, loc="lower right")
     write_results("real_brain_regions", rows)
-    figure.savefig(FIGURES / "real-brain-regions.png", dpi=150)
+    keep_figure(figure, "real-brain-regions.png", __file__)
 
 
 if __name__ == "__main__":

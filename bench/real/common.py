@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import platform
+import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from warpbrain.cases.case import Case, Tissue
@@ -30,12 +32,21 @@ from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
+sys.path.append(str(Path(__file__).resolve().parents[2] / "docs"))
+from figure_records import record
+
 Floats = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS, FIGURES = ROOT / "bench" / "results", ROOT / "docs" / "figures"
 #: Okabe and Ito's colours, dark to light.
 BLACK, BLUE, VERMILION, ORANGE, SKY = "#000000", "#0072B2", "#D55E00", "#E69F00", "#56B4E9"
+
+
+def keep_figure(figure: Figure, name: str, script: str) -> None:
+    """Save a figure of docs/proof-recordings.md, and write down which script made it."""
+    figure.savefig(FIGURES / name, dpi=150)
+    record(f"python bench/real/{Path(script).name} FOLDER", [name])
 
 
 def arguments(what: str) -> argparse.Namespace:

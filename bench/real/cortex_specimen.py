@@ -11,7 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from common import FIGURES, arguments, declared, diagnose, draw, recorded_test, row, write_results
+from common import arguments, declared, diagnose, draw, keep_figure, recorded_test, row, write_results
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
@@ -48,7 +48,7 @@ def main() -> None:
     for number, axis in enumerate(axes.ravel()):
         draw(axis, found, number, "time", ("refitted", "explained"))
     axes[0, 0].legend(frameon=False, fontsize=8)
-    figure.savefig(FIGURES / "real-cortex-specimen.png", dpi=150)
+    keep_figure(figure, "real-cortex-specimen.png", __file__)
 
 
 if __name__ == "__main__":
