@@ -14,6 +14,7 @@ from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import Smallest, Value
 from warpbrain.worlds.body.causes import SENTENCES
+from warpbrain.worlds.verdict import Words, verdict_in_words
 
 #: What each verdict says, whatever its numbers.
 SAID = {
@@ -95,7 +96,8 @@ def test_every_verdict_is_said(verdict, data):
         named=ranking[:several],
         group=() if several else kinds,
         ranking=ranking,
-        p_value=0.02,
+        p_value=data.draw(st.sampled_from([0.02, 1.0])) if verdict == "cannot say" else 0.02,
+        alpha=0.05,
         combinations=[SimpleNamespace(causes=(), probability=data.draw(chances))],
         smallest=seen,
         fit=fit,
@@ -109,6 +111,19 @@ def test_every_verdict_is_said(verdict, data):
         said = mechanisms()[kind].sentence if kind in mechanisms() else SENTENCES[kind]
         # within another sentence it begins with a small letter
         assert said[1:].rstrip(".") in text
+
+
+@pytest.mark.parametrize(("nothing", "chance"), [(0.02, "below 3 %"), (0.4, "40 %")])
+def test_a_p_value_that_sees_nothing_is_no_reason_for_something_missing(nothing, chance):
+    words = Words("these data", "", "", [], "", [], ["tissue drains"], nothing)
+    unseen = verdict_in_words(Decision("cannot say", ("drainage",)), 1.0, 0.05, {}, words)
+    check(unseen)
+    assert unseen.startswith("Something may be missing, but these data cannot say what.")
+    # what doubts is the posterior, and the p-value is said of data, not of a cause
+    assert f"The posterior probability that nothing is missing is {chance}," in unseen
+    assert "yet these data do not contradict it (p = 1)." in unseen and "missing (p" not in unseen
+    seen = verdict_in_words(Decision("cannot say", ("drainage",)), 0.01, 0.05, {}, words)
+    assert seen.startswith(f"Something {'is' if nothing < 0.1 else 'may be'} missing (p = 0.01), but these data")
 
 
 def one(kind, *values, **more):

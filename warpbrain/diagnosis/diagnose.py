@@ -142,6 +142,7 @@ class Diagnosing:
             by_posterior=by_posterior,
             doubts=checked.doubts,
             p_value=p_value,
+            alpha=options.alpha,
             p_left=checked.p_left,
             named=ranking.named(best, named),
             ranking=ranked,

@@ -24,7 +24,7 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import SENTENCES
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.weighted_set import WeightedSet
-from warpbrain.worlds.verdict import Verdict, Words, clause, grounds, missing_in_words, verdict_in_words
+from warpbrain.worlds.verdict import Verdict, Words, clause, grounds, verdict_in_words
 
 #: Sets of causes: without any, and with all that is named.
 REFITTED, EXPLAINED = "refitted", "explained"
@@ -197,7 +197,6 @@ def sentence_of(diagnosis: Diagnosis) -> str:
     chances = {ranked.kind: ranked.probability for ranked in ranking}
     least = belief("checks.perhaps")
     likely = [ranked for ranked in ranking if ranked.kind != UNKNOWN and ranked.probability > least][:2]
-    nothing = sum(each.probability for each in diagnosis.combinations if not each.causes)
     errors = None if fit.explained is None else (length(fit.explained[1]), length(fit.refitted[1]))
     words = Words(
         data="these data",
@@ -207,10 +206,11 @@ def sentence_of(diagnosis: Diagnosis) -> str:
         grounds=grounds([ranked.probability for ranked in named], "points", errors),
         members=[(sentence_of_kind(kind), chances.get(kind, 0.0)) for kind in diagnosis.group if kind != UNKNOWN],
         perhaps=[clause(sentence_of_kind(ranked.kind)) for ranked in likely],
-        missing=missing_in_words(nothing, all(ranked.physics for ranked in likely)),
+        nothing_acts=sum(each.probability for each in diagnosis.combinations if not each.causes),
+        only_physics=all(ranked.physics for ranked in likely),
         rest=_traits(diagnosis),
     )
-    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.smallest, words)
+    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.alpha, diagnosis.smallest, words)
     return " ".join([sentence, *diagnosis.doubts])
 
 

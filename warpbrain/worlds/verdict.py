@@ -39,8 +39,8 @@ class Verdict(Shown, Generic[Ranked, Combination]):
         After the checks; `by_posterior` before them.
     doubts : tuple of str
         Checks that failed, in words.
-    p_value : float
-        Of the hypothesis that nothing is missing.
+    p_value, alpha : float
+        Of the hypothesis that nothing is missing; a claim is significant up to `alpha`.
     p_left : float or None
         Of the hypothesis that nothing else is missing; None if nothing is named.
     named : tuple of Ranked
@@ -65,6 +65,7 @@ class Verdict(Shown, Generic[Ranked, Combination]):
     by_posterior: Decision
     doubts: tuple[str, ...]
     p_value: float
+    alpha: float
     p_left: float | None
     named: tuple[Ranked, ...]
     ranking: tuple[Ranked, ...]
@@ -100,12 +101,15 @@ class Words:
     grounds: str  # a sentence: why
     members: Sequence[tuple[str, float]]  # sentence and probability of each cause of the verdict that has a name
     perhaps: Sequence[str]  # clauses of what may act, where nothing can be said
-    missing: str  # `missing_in_words`
+    nothing_acts: float  # posterior probability that no cause acts
+    only_physics: bool = True  # whether an error of registration, mesh, loads or the like is unlikely
     rest: str = ""  # what is known of what has no name: a sentence after a space
 
 
-def verdict_in_words(decision: Decision, p_value: float, smallest: Mapping[str, Smallest], words: Words) -> str:
-    """The verdict for people: whole sentences."""
+def verdict_in_words(
+    decision: Decision, p_value: float, alpha: float, smallest: Mapping[str, Smallest], words: Words
+) -> str:
+    """The verdict for people: whole sentences; a claim is significant where `p_value <= alpha`."""
     p, verdict, data = f"p = {p_value:.2g}", decision.verdict, words.data
     if verdict == NOTHING:
         seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in smallest.items())
@@ -125,20 +129,18 @@ def verdict_in_words(decision: Decision, p_value: float, smallest: Mapping[str, 
         )
     if verdict == CANNOT_SAY:
         perhaps = f" Perhaps: {'; or '.join(words.perhaps)}." if words.perhaps else ""
-        return f"{words.missing} ({p}), but {data} cannot say what.{perhaps}"
+        missing = "missing" if words.only_physics else "wrong or missing"
+        if p_value > alpha:
+            # such a p-value is no reason to say that something is missing: the posterior is
+            return (
+                f"Something may be {missing}, but {data} cannot say what. The posterior probability that nothing is "
+                f"{missing} is {percent(words.nothing_acts)}, yet {data} do not contradict it ({p}).{perhaps}"
+            )
+        surely = "may be" if words.nothing_acts > belief("checks.perhaps") else "is"
+        return f"Something {surely} {missing} ({p}), but {data} cannot say what.{perhaps}"
     which = "; or ".join(f"{clause(sentence)} ({percent(probability)})" for sentence, probability in words.members)
     other = "; or something without a name" if UNKNOWN in decision.causes else ""
     return f"Something is missing ({p}), and {data} do not tell which of these it is: {which}{other}."
-
-
-def missing_in_words(nothing: float, only_physics: bool = True) -> str:
-    """Whether something is missing, as the beginning of a sentence that names no cause.
-
-    `nothing`: posterior probability that no cause acts. `only_physics`: False if an error of registration, mesh, loads
-    or the like is likely, too.
-    """
-    surely = "may be" if nothing > belief("checks.perhaps") else "is"
-    return f"Something {surely} {'' if only_physics else 'wrong or '}missing"
 
 
 def grounds(probabilities: Sequence[float], held_out: str, errors: tuple[str, str] | None) -> str:

@@ -87,7 +87,7 @@ def _pictures(
 
 
 def _facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
-    facts = [("p, nothing missing", f"{summary['p_value']:.2g}")]
+    facts = [("p-value if nothing were missing", f"{summary['p_value']:.2g}")]
     if named := summary["mechanisms"]:
         facts.insert(0, ("mechanism", " and ".join(mechanism["mechanism"] for mechanism in named)))
         facts.append(("probability", " and ".join(percent(mechanism["probability"]) for mechanism in named)))

@@ -123,6 +123,7 @@ class DiagnosingSpecimen:
             by_posterior=by_posterior,
             doubts=doubts,
             p_value=p_value,
+            alpha=options.alpha,
             p_left=checked.p_left,
             named=tuple(replace(ranked[name], values=values_of(best, name)) for name in names),
             ranking=ranking,

@@ -21,7 +21,7 @@ from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.glued_ends import ELEMENTS
 from warpbrain.worlds.specimen.protocol import REST, Protocol, Test, noise_factor
 from warpbrain.worlds.specimen.search import Linear
-from warpbrain.worlds.verdict import Verdict, Words, clause, grounds, missing_in_words, verdict_in_words
+from warpbrain.worlds.verdict import Verdict, Words, clause, grounds, verdict_in_words
 
 #: Of a cause no more numbers are said in a sentence.
 _VALUES = 6
@@ -142,9 +142,9 @@ def sentence_of(diagnosis: SpecimenDiagnosis) -> str:
         grounds=grounds([cause.probability for cause in named], "tests", (errors[0], errors[-1])),
         members=[(cause.sentence, cause.probability) for cause in members],
         perhaps=[f"{clause(cause.sentence)} ({percent(cause.probability)})" for cause in members],
-        missing=missing_in_words(sum(each.probability for each in diagnosis.combinations if not each.causes)),
+        nothing_acts=sum(each.probability for each in diagnosis.combinations if not each.causes),
     )
-    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.smallest, words)
+    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.alpha, diagnosis.smallest, words)
     return " ".join([sentence, *diagnosis.doubts])
 
 
