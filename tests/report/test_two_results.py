@@ -59,16 +59,16 @@ def test_an_affine_motion_is_the_same_on_any_mesh(verify):
     first, second = block(2), box((7, 5, 3), (0.04, 0.05, 0.06))
     step = np.array([1e-3, 0.0, 0.0])
     found = difference(state(first, first.points @ gradient.T), state(second, second.points @ gradient.T + step))
-    assert (found.same_mesh, found.outside, found.nodes) == (False, 0, 27)
-    off = max(abs(found.root_mean_square_mm - 1.0), abs(found.largest_mm - 1.0))
+    assert (found["same_mesh"], found["outside"], found["nodes"]) == (False, 0, 27)
+    off = max(abs(found["root_mean_square_mm"] - 1.0), abs(found["largest_mm"] - 1.0))
     verify("difference of two results on other meshes, affine motions 1 mm apart", "analytic", off, 1e-12, "mm")
 
 
 def test_nodes_that_are_in_one_body_only_are_counted(tmp_path):
     first, second = box((4, 4, 4), (0.04, 0.04, 0.04)), box((4, 4, 4), (0.04, 0.04, 0.02))
     found = difference(state(first, 0.0 * first.points), state(second, 0.0 * second.points + [0.0, 2e-3, 0.0]))
-    assert (found.nodes, found.outside) == (75, 50)
-    assert found.second_mm == pytest.approx(2.0)
+    assert (found["nodes"], found["outside"]) == (75, 50)
+    assert found["second_mm"] == pytest.approx(2.0)
     away = box((1, 1, 1), (0.01, 0.01, 0.01))
     far = type(away)(away.points + 1.0, away.tetrahedra)
     with pytest.raises(InputError, match="the bodies are nowhere in one place"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +23,8 @@ _NO_INPUT = ("tissues", "left_out", "title", "file", "first_step", "history", "r
 _INPUTS = ("solution", "options", "prior", "method", "seed", "chosen", "course", "device", "workers")
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """A number of a result, with the interval (low, high) that holds it with 95 % if there is one."""
-
-    value: float
-    unit: str
-    interval: tuple[float, float] | None = None
+#: A number of a result, its unit, and the interval (low, high) that holds it with 95 % if there is one.
+Quantity = tuple[float, str, tuple[float, float] | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,46 +51,34 @@ class SavedResult:
     def errors(self) -> dict[str, Quantity]:
         """Root mean square differences from what was recorded, by what they are of."""
         by_name: dict[str, Quantity] = {}
-
-        def add(name: str, unit: str, before: float, after: float, interval: tuple[float, float] | None = None) -> None:
-            by_name[f"{name}, nothing moved"] = Quantity(before, unit)
-            by_name[name] = Quantity(after, unit, interval)
-
+        nothing = ", nothing moved"
         for entry in (self.summary.get("recordings") or {}).get("compared", []):
-            add(entry["name"], entry["unit"], entry["before"]["root_mean_square"], entry["after"]["root_mean_square"])
+            for name, key in ((f"{entry['name']}{nothing}", "before"), (entry["name"], "after")):
+                by_name[name] = entry[key]["root_mean_square"], entry["unit"], None
         for entry in self.summary.get("predictions", []):
-            add(entry["name"], entry["unit"], entry["root_mean_square_before"], entry["root_mean_square_of_run"])
-            by_name[f"{entry['name']}, moved back"] = Quantity(entry["root_mean_square_after"], entry["unit"])
+            for name, key in ((nothing, "before"), ("", "of_run"), (", moved back", "after")):
+                by_name[entry["name"] + name] = entry[f"root_mean_square_{key}"], entry["unit"], None
         for name, entry in ((self.summary.get("result") or {}).get("rmse_at_recordings") or {}).items():
             after = entry["after"]
-            add(name, entry["unit"], entry["before"], after["p50"], (after["p05"], after["p95"]))
+            by_name[name + nothing] = entry["before"], entry["unit"], None
+            by_name[name] = after["p50"], entry["unit"], (after["p05"], after["p95"])
         for kind, where in (("rmse_m", "all fitted"), ("heldout_rmse_m", "held out"), ("check_rmse_m", "check")):
             for stage, value in ((self.summary.get("fit") or {}).get(kind) or {}).items():
                 if value is not None:
-                    by_name[f"{where}, {stage}"] = Quantity(MILLIMETRES * value, "mm")
+                    by_name[f"{where}, {stage}"] = MILLIMETRES * value, "mm", None
         return by_name
 
     def tissue(self) -> dict[str, Quantity]:
         """Parameters of the tissues, by tissue and name."""
         by_name: dict[str, Quantity] = {}
         for parameter in ((self.summary.get("case") or {}).get("tissues") or {}).values():
-            by_name[f"{parameter['name']}, shear modulus"] = Quantity(parameter["shear_modulus_Pa"], "Pa")
-        estimated = [
-            *(
-                (parameter, "estimate", "")
-                for parameter in self.summary.get("parameters") or []
-                if self.command == "estimate"
-            ),
-            *(
-                (parameter, "middle", ", over what may act")
-                for parameter in (self.summary.get("nothing_else") or {}).get("tissue") or []
-            ),
-        ]
-        for parameter, key, more in estimated:
-            low, high = parameter["interval_95"]
-            by_name[f"{parameter['tissue']}, {parameter['name']}{more}"] = Quantity(
-                parameter[key], parameter["unit"], (low, high)
-            )
+            by_name[f"{parameter['name']}, shear modulus"] = parameter["shear_modulus_Pa"], "Pa", None
+        estimated = (self.summary.get("parameters") or []) if self.command == "estimate" else []
+        averaged = (self.summary.get("nothing_else") or {}).get("tissue") or []
+        for parameters, key, more in ((estimated, "estimate", ""), (averaged, "middle", ", over what may act")):
+            for parameter in parameters:
+                name, (low, high) = f"{parameter['tissue']}, {parameter['name']}{more}", parameter["interval_95"]
+                by_name[name] = parameter[key], parameter["unit"], (low, high)
         return by_name
 
 
@@ -140,26 +123,11 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, str]]:
 _SAME = 1e-6
 
 
-@dataclass(frozen=True)
-class Difference:
-    """How far the displacement of the second result is from that of the first, in the first's body."""
+def difference(first: SavedState, second: SavedState) -> dict[str, Any]:
+    """How far the displacement of the second result is from that of the first, in the first's body.
 
-    #: Over the nodes that are in both bodies; the root mean square by the volume that belongs to each.
-    root_mean_square_mm: float
-    largest_mm: float
-    #: Where it is largest, RAS.
-    at_mm: tuple[float, float, float]
-    #: Root mean square of either displacement there.
-    first_mm: float
-    second_mm: float
-    #: How many are compared, and how many are not in the second body.
-    nodes: int
-    outside: int
-    same_mesh: bool
-
-
-def difference(first: SavedState, second: SavedState) -> Difference:
-    """Compare two deformed bodies.
+    Over the ``nodes`` that are in both bodies, ``outside`` those that are not in the second: root mean squares, by the
+    volume that belongs to each node, of the difference and of either displacement there, and where it is largest (RAS).
 
     Raises
     ------
@@ -188,29 +156,27 @@ def difference(first: SavedState, second: SavedState) -> Difference:
 
     apart = np.linalg.norm(there - first.u, axis=1)
     worst = int(np.flatnonzero(inside)[apart[inside].argmax()])
-    x, y, z = (MILLIMETRES * mesh.points[worst]).tolist()
-    return Difference(
-        root_mean_square_mm=root_mean_square(there - first.u),
-        largest_mm=MILLIMETRES * float(apart[worst]),
-        at_mm=(x, y, z),
-        first_mm=root_mean_square(first.u),
-        second_mm=root_mean_square(there),
-        nodes=int(np.count_nonzero(inside)),
-        outside=int(np.count_nonzero(~inside)),
-        same_mesh=same,
-    )
+    return {
+        "root_mean_square_mm": root_mean_square(there - first.u),
+        "largest_mm": MILLIMETRES * float(apart[worst]),
+        "at_mm": (MILLIMETRES * mesh.points[worst]).tolist(),
+        "first_mm": root_mean_square(first.u),
+        "second_mm": root_mean_square(there),
+        "nodes": int(np.count_nonzero(inside)),
+        "outside": int(np.count_nonzero(~inside)),
+        "same_mesh": same,
+    }
 
 
 def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
     """Everything that is compared, as plain values; RMSE are of the simulation alone, but those "moved back"."""
     inputs, two = first.inputs(), second.inputs()
     names = dict.fromkeys([*inputs, *two])
-    bodies = first.state is not None and second.state is not None
     return {
         "folders": [str(first.folder), str(second.folder)],
         "inputs_that_differ": {n: [inputs.get(n), two.get(n)] for n in names if inputs.get(n) != two.get(n)},
         "rmse": _pairs(first.errors(), second.errors()),
-        "displacement": asdict(difference(first.state, second.state)) if bodies else None,  # type: ignore[arg-type]
+        "displacement": None if first.state is None or second.state is None else difference(first.state, second.state),
         "tissue": _pairs(first.tissue(), second.tissue()),
         # of a diagnosis, in a word and in a sentence
         **{key: [result.summary.get(key) or None for result in (first, second)] for key in ("verdict", "sentence")},
@@ -220,10 +186,10 @@ def describe_two(first: SavedResult, second: SavedResult) -> dict[str, Any]:
 def _pairs(first: dict[str, Quantity], two: dict[str, Quantity]) -> dict[str, Any]:
     pairs = {}
     for name in dict.fromkeys([*first, *two]):
-        both = [first.get(name), two.get(name)]
+        both = [quantities.get(name) for quantities in (first, two)]
         pairs[name] = {
-            "unit": next(each.unit for each in both if each is not None),
-            "values": [None if each is None else each.value for each in both],
-            "intervals_95": [None if each is None else each.interval for each in both],
+            "unit": next(quantity[1] for quantity in both if quantity is not None),
+            "values": [quantity and quantity[0] for quantity in both],
+            "intervals_95": [quantity and quantity[2] for quantity in both],
         }
     return pairs

@@ -1,7 +1,7 @@
 """What the pictures share: colours, figures and their files, where an anatomy is cut, how a cut is held and framed.
 
-Drawn with matplotlib alone: a cut needs no renderer, so a picture comes out the same on a laptop, a server without a
-display and a machine without graphics libraries. Cuts are shown as a radiologist holds them: the patient's left is on
+Drawn with matplotlib: a cut needs no renderer, so a picture comes out the same on a laptop, a server without a display
+and a machine without graphics libraries. Cuts are shown as a radiologist holds them: the patient's left is on
 the right of the picture.
 """
 
