@@ -13,10 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.lines import Line2D
-from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
@@ -201,6 +198,8 @@ def _crosses(axes: Any, at: Floats, number: int) -> None:
 
 def _arrows(axes: Any, start: Floats, along: Floats, number: int) -> None:
     """Arrows in picture coordinates, dark within a light rim to stand out from tissue and dots."""
+    from matplotlib.patheffects import withStroke
+
     axes.quiver(
         *start.T,
         *along.T,
@@ -223,6 +222,8 @@ def _arrows(axes: Any, start: Floats, along: Floats, number: int) -> None:
 
 def _draw_open(axes: Any, scene: _Scene) -> str:
     """The body with a corner cut out and all that was recorded; why it is not rendered, or nothing."""
+    from scipy.spatial import KDTree
+
     arrows = f"; all {scene.arrows} arrows, seen through the tissue" if scene.arrows else ""
     axes.set_title(f"a corner cut out{arrows}", fontsize=11)
     try:
@@ -317,7 +318,7 @@ def _first(entries: list[tuple[Any, str]]) -> list[tuple[Any, str]]:
 
 
 def _mark(**style: Any) -> Any:
-    return Line2D([], [], **{"linestyle": "none", **style})
+    return views.line(**{"linestyle": "none", **style})
 
 
 def _short(name: str) -> str:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import gaussian_kde, norm
 
 from warpbrain.arrays import Floats
 from warpbrain.estimation.posterior import Marginal, Posterior, Prediction
@@ -38,6 +37,8 @@ def _side_by_side(count: int, narrow: bool, height: float, size: tuple[float, fl
 
 
 def _draw_marginal(axes: Any, marginal: Marginal, prior: Floats, draws: Floats | None) -> None:
+    from scipy.stats import gaussian_kde, norm
+
     modulus = marginal.parameter.is_modulus
     low, high = np.percentile(prior, [0.5, 99.5])
     low, high = min(low, marginal.interval[0]), max(high, marginal.interval[1])

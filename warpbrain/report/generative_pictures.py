@@ -11,10 +11,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator, StrMethodFormatter
 
 from warpbrain.arrays import Floats
 from warpbrain.gp.literature.study import ANATOMIES, METHODS, OFFSET, Study, invariant
@@ -109,12 +105,12 @@ def draw_extrapolation(model: Process, other: Process, group: str | None = None)
     figure = _groups(model, group, 6.2, draw, [f"strain energy + {OFFSET:g} [Pa]"])
     names = [f"{process.name}, {process.variant}" for process in (model, other)]
     entries = [
-        (Line2D([], [], **_THIN), "studies"),
-        (Patch(facecolor=_GROUND), "stretches of these"),
-        (Line2D([], [], **_MEAN), f"{names[0]}: mean"),
-        (Patch(**_BAND), "its 95 %"),
-        (Line2D([], [], **_OTHER_MEAN), f"{names[1]}: mean"),
-        (Patch(**{**_OTHER_BAND, "linewidth": 0.6}), "its 95 %"),
+        (views.line(**_THIN), "studies"),
+        (views.patch(facecolor=_GROUND), "stretches of these"),
+        (views.line(**_MEAN), f"{names[0]}: mean"),
+        (views.patch(**_BAND), "its 95 %"),
+        (views.line(**_OTHER_MEAN), f"{names[1]}: mean"),
+        (views.patch(**{**_OTHER_BAND, "linewidth": 0.6}), "its 95 %"),
     ]
     views.legend(figure, entries, loc="outside lower center", ncols=3, fontsize=_TEXT)
     return figure
@@ -157,11 +153,11 @@ def draw_draws(model: Process, group: str | None = None, seed: int = 0) -> Any:
     names = ["energy [Pa]", "secant modulus [Pa]"] if group is None else [_ENERGY, "secant shear modulus [Pa]"]
     figure = _groups(model, group, 9.4, draw, names, _SMALL)
     entries = [
-        (Line2D([], [], **_MIDDLE), "mean of the logarithm"),
-        (Patch(**_50), "50 % of new studies"),
-        (Patch(**_95), "95 %"),
-        (Line2D([], [], **_DRAW), "draws"),
-        (Line2D([], [], **_STUDY), "studies"),
+        (views.line(**_MIDDLE), "mean of the logarithm"),
+        (views.patch(**_50), "50 % of new studies"),
+        (views.patch(**_95), "95 %"),
+        (views.line(**_DRAW), "draws"),
+        (views.line(**_STUDY), "studies"),
     ]
     views.legend(figure, entries, loc="outside lower center", ncols=5, fontsize=_TEXT)
     return figure
@@ -177,6 +173,8 @@ def _groups(
 ) -> Any:
     """A figure that `draw(group, *panels)` fills, with a panel a group for each vertical axis: those of one group side
     by side, or a row of panels for every method and a column for every anatomy, `height` inches high."""
+    from matplotlib.figure import Figure
+
     if group is not None:
         figure = Figure(figsize=(_WIDTH, 3.6), layout="constrained")
         panels = list(figure.subplots(1, len(names), squeeze=False)[0])
@@ -292,6 +290,8 @@ def logarithmic(axes: Any, low: float, high: float) -> None:
 
     It shows a factor of two at least: a spread of one part in a hundred is to look like one.
     """
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator, StrMethodFormatter
+
     middle = (low * high) ** 0.5
     low, high = min(low, middle / 2.0**0.5), max(high, middle * 2.0**0.5)
     axes.set_yscale("log")

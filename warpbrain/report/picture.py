@@ -9,11 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import to_rgb
-from matplotlib.lines import Line2D
-from scipy.spatial import cKDTree
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.mesh import TetMesh
@@ -95,6 +90,8 @@ def pictures_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str],
 
 def taken_out(whole: TetMesh, mesh: TetMesh) -> Bools:
     """Elements (m,) of the anatomy that are not in what is left of it."""
+    from scipy.spatial import cKDTree
+
     if len(whole.tetrahedra) == len(mesh.tetrahedra):
         return np.zeros(len(whole.tetrahedra), dtype=bool)
     near = 1e-9 * float(np.ptp(whole.points, axis=0).max())
@@ -103,6 +100,9 @@ def taken_out(whole: TetMesh, mesh: TetMesh) -> Bools:
 
 def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Scene:
     """What is drawn of a deformed body; see `pictures_of`."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_rgb
+
     sizes = MILLIMETRES * np.linalg.norm(u, axis=1)
     size = MILLIMETRES * float(np.ptp(whole.points, axis=0).max())
     resected = taken_out(whole, mesh)
@@ -200,6 +200,8 @@ def draw(
     except RenderingError as error:
         path.unlink(missing_ok=True)
         return str(error)
+    from matplotlib.cm import ScalarMappable
+
     scene, lines = pictures.scene, len(subtitles) + 1
     high = 9.8 + 0.24 * lines
     figure, axes = views.panels(2, 3, (13.8, high))
@@ -213,7 +215,7 @@ def draw(
     label = "displacement [mm]; red: where it was before"
     figure.colorbar(shades, ax=axes, location="bottom", shrink=0.7, aspect=45, pad=0.01, label=label)
     entries = views.tissue_entries(names, whole, pictures.resected)
-    entries += [(Line2D([], [], color=colour, linewidth=2.5), name) for name, colour in arrow_colours(scene).items()]
+    entries += [(views.line(color=colour, linewidth=2.5), name) for name, colour in arrow_colours(scene).items()]
     views.legend(figure, entries, loc="outside lower center", fontsize=9, ncols=6)
     views.save(figure, path, "\n".join([title, *subtitles]), y=1.0 - 0.08 / high, va="top")
     return pictures

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.lines import Line2D
 
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
@@ -162,11 +161,11 @@ def tests_figure(tests: Sequence[Tested], most: int) -> Any:
         axes.set_axis_off()
     roles = {test.recording.role for test in tests}
     entries = [
-        (Line2D([], [], color=colour, marker=marker, linestyle=""), f"recorded, {role}")
+        (views.line(color=colour, marker=marker, linestyle=""), f"recorded, {role}")
         for role, (colour, marker) in _STYLES.items()
         if role in roles
     ]
-    entries.append((Line2D([], [], color=BLACK, marker=".", linewidth=1.5), "simulated (dots: computed states)"))
+    entries.append((views.line(color=BLACK, marker=".", linewidth=1.5), "simulated (dots: computed states)"))
     views.legend(figure, entries, loc="outside lower center", ncols=1 if most == 1 else 3, fontsize=9)
     return figure
 

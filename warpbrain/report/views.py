@@ -16,10 +16,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch, PathPatch
-from matplotlib.path import Path as Shape
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats
@@ -52,6 +48,8 @@ def panels(
     rows: int, columns: int, size: tuple[float, float], layout: Any = "constrained", **options: Any
 ) -> tuple[Any, list[Any]]:
     """A figure of that size [inch] and its panels, row by row."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=size, layout=layout, facecolor="white")
     return figure, list(figure.subplots(rows, columns, squeeze=False, **options).ravel())
 
@@ -159,6 +157,8 @@ def element_colours(mesh: TetMesh, resected: Bools, names: Mapping[int, str] | N
 
 def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float = 0.4) -> None:
     """Fill a cut with the colours of its elements; a rim of the same colour hides the seams between them."""
+    from matplotlib.collections import PolyCollection
+
     shown = colours[section.elements].tolist()
     polygons = [in_view(p) for p in section.polygons]
     axes.add_collection(PolyCollection(polygons, facecolors=shown, edgecolors=shown, linewidths=rim))
@@ -166,6 +166,8 @@ def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float =
 
 def draw_scalars(axes: Any, section: Cut, top: float, cmap: Any = "viridis", **options: Any) -> Any:
     """Colour a cut by what it carries, from 0 to `top`; returns what a colour bar is made of."""
+    from matplotlib.collections import PolyCollection
+
     style = {"edgecolors": "face", "linewidths": 0.4, **options}
     drawn = PolyCollection([in_view(p) for p in section.polygons], array=section.values, cmap=cmap, **style)
     drawn.set_clim(0.0, top)
@@ -182,12 +184,17 @@ def draw_values(axes: Any, mesh: TetMesh, values: Floats, view: View, place: flo
 
 def draw_level(axes: Any, section: Cut, level: float, colour: str, zorder: float = 2.0) -> None:
     """A line where the values that a cut carries are at a level."""
+    from matplotlib.collections import LineCollection
+
     segments = in_view(level_line(section, level))
     axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=2.2, zorder=zorder))
 
 
 def draw_part(axes: Any, section: Cut, part: Bools, **style: Any) -> None:
     """Fill some polygons (k,) of a cut as one shape, so that a hatching goes on from one to the next."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Shape
+
     if part.any():
         chosen = [Shape(in_view(p), closed=False) for p, here in zip(section.polygons, part, strict=True) if here]
         axes.add_artist(PathPatch(Shape.make_compound_path(*chosen), **style))
@@ -201,6 +208,8 @@ def draw_hatching(axes: Any, section: Cut, mesh: TetMesh, nodes: Any, hatch: str
 
 def draw_outline(axes: Any, mesh: TetMesh, view: View, place: float, colour: str = TISSUE_EDGE) -> None:
     """Draw where the surface of a body crosses the plane of a cut."""
+    from matplotlib.collections import LineCollection
+
     segments = in_view(outline(mesh.points, mesh.boundary, view.axis, place))
     axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=0.9))
 
@@ -233,7 +242,7 @@ def bare(axes: Any) -> None:
 def tissue_entries(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> list[tuple[Any, str]]:
     """Legend entries of the tissues that something is left of, and of what was resected."""
     return [
-        (Patch(facecolor=colour) if colour == RESECTED else Patch(facecolor=colour, edgecolor=TISSUE_EDGE), name)
+        (patch(facecolor=colour) if colour == RESECTED else patch(facecolor=colour, edgecolor=TISSUE_EDGE), name)
         for name, colour in tissue_legend(names, mesh, resected)
     ]
 
@@ -244,6 +253,20 @@ def tissue_legend(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> l
     colours = sorted(tissue_colours(names, mesh).items())
     entries = [(names.get(label, str(label)), colour) for label, colour in colours if label in left]
     return entries + ([("resected", RESECTED)] if resected.any() else [])
+
+
+def line(**style: Any) -> Any:
+    """A line or a mark of a legend; nothing to be seen without a style."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **style)
+
+
+def patch(**style: Any) -> Any:
+    """A patch of a legend."""
+    from matplotlib.patches import Patch
+
+    return Patch(**style)
 
 
 def legend(figure: Any, entries: Sequence[tuple[Any, str]], **options: Any) -> list[Any]:

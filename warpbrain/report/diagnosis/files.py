@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.atomic import UNFINISHED, whole_file
@@ -80,6 +79,8 @@ def seen(where: ScoreMap, mesh: TetMesh) -> dict[str, Any]:
 
 def nearest_site(where: ScoreMap, mesh: TetMesh) -> Ints:
     """Index (n,) of the place of the map that is nearest to each node."""
+    from scipy.spatial import cKDTree
+
     return np.asarray(cKDTree(where.sites).query(mesh.points)[1])
 
 

@@ -7,8 +7,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from matplotlib.patches import Circle
-from matplotlib.ticker import MaxNLocator
 
 from warpbrain.arrays import Floats
 from warpbrain.diagnosis.result import Diagnosis
@@ -96,6 +94,8 @@ class Anatomy:
 
 def map_figure(anatomy: Anatomy) -> str:
     """Scores as colours, with the threshold of significance as a line and the located ball as a dashed circle."""
+    from matplotlib.patches import Circle
+
     threshold, where = anatomy.threshold, anatomy.summary["map"]
     extent = np.ptp(anatomy.mesh.points, axis=0)
     tallest = max(float(extent[view.plane[1]] / extent[view.plane[0]]) for view in VIEWS)
@@ -209,6 +209,8 @@ def view_of(anatomy: Anatomy, recorded: Recorded | None) -> View:
 
 def agreement_figure(summary: dict[str, Any], recorded: Recorded) -> str:
     """Observed beside computed, one panel a state, on common scales: every component of a displacement."""
+    from matplotlib.ticker import MaxNLocator
+
     shown, observed = recorded.states, recorded["observed"][recorded.counted]
     computed = {state: recorded[state][recorded.counted] for state in shown}
     ends = np.concatenate([observed, *computed.values()])

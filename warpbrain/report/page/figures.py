@@ -8,8 +8,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from markupsafe import Markup
-from matplotlib import colormaps
-from matplotlib.colors import LinearSegmentedColormap
 
 from warpbrain.report import views
 from warpbrain.report.page import part
@@ -66,5 +64,8 @@ def data(kind: str, stream: io.BytesIO) -> str:
 
 def shades() -> Any:
     """Colours of a map from light to dark: grey print shows them, and arrows of any colour stand out of them."""
+    from matplotlib import colormaps
+    from matplotlib.colors import LinearSegmentedColormap
+
     # from the second lightest on: what is light is still there
     return LinearSegmentedColormap.from_list("shades", colormaps["bone_r"]([0.04, 0.2, 0.35, 0.5, 0.65, 0.8]))
