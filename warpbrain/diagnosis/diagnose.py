@@ -44,6 +44,8 @@ from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: Sets of causes that a diagnosis lists.
 _LISTED = 20
+#: How often a verdict is checked, if its checks change what is probable.
+_ROUNDS = 3
 #: Why a cause was not weighed.
 _INVISIBLE = "nothing that was recorded would tell of it, however large it were"
 
@@ -116,10 +118,14 @@ class Diagnosing:
         nothing = search.nothing
         with self.seconds.of("significance"):
             p_value = confirming.p_of_nothing(nothing)
-        by_posterior = _decided(search)
         self.listener.stage("checks")
         with self.seconds.of("checks"):
-            checked = self._checked(search, confirming, if_significant(by_posterior, p_value, options.alpha))
+            for _ in range(_ROUNDS):
+                by_posterior = _decided(search)
+                checked = self._checked(search, confirming, if_significant(by_posterior, p_value, options.alpha))
+                # checks fit sets without what is named: where these are better than was thought the verdict is another
+                if _decided(search) == by_posterior:
+                    break
             best, named = checked.best, checked.named
             weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
             blocks = confirming.held_out_for(best)

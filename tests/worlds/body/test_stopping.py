@@ -17,10 +17,10 @@ def weighted(log_evidence, *names, fitted=False, failure=""):
     return WeightedSet(hypothesis, (), nothing, np.zeros((0, 0)), None, object() if fitted else None, failure)
 
 
-def following(*sets, expanded=()):
+def following(*sets, expanded=(), rivals=True):
     probabilities = calibration().probabilities([candidate.hypothesis for candidate in sets])
     ordered = [sets[k] for k in np.argsort(-probabilities)]
-    chosen = next_to_fit(ordered, np.sort(probabilities)[::-1], {frozenset(names) for names in expanded})
+    chosen = next_to_fit(ordered, np.sort(probabilities)[::-1], {frozenset(names) for names in expanded}, rivals)
     return chosen and sorted(chosen.names)
 
 
@@ -37,11 +37,29 @@ def test_the_set_that_a_name_rests_on_is_fitted_though_the_name_alone_was():
     assert following(*sets, settled, expanded=[("pressure",), ("registration",)]) is None
 
 
+def test_what_an_unknown_rests_on_is_fitted_and_then_that_without_it():
+    # a rigid motion is no linear change: in the linear model it is a smaller one and an unknown force
+    nothing, both = weighted(0.0, fitted=True), ("registration", "unknown")
+    assert following(nothing, weighted(-5.0, "registration"), weighted(60.0, *both)) == sorted(both)
+    assert following(nothing, weighted(-5.0, "registration"), weighted(60.0, *both, fitted=True)) == ["registration"]
+    fitted = weighted(-5.0, "registration", fitted=True)
+    assert following(nothing, fitted, weighted(60.0, *both, fitted=True)) is None
+
+
 def test_a_named_mechanism_is_fitted_then_expanded_then_left():
     nothing = weighted(0.0, fitted=True)
     assert following(nothing, weighted(30.0, "pressure")) == ["pressure"]
     assert following(nothing, weighted(30.0, "pressure", fitted=True)) == ["pressure"]
     assert following(nothing, weighted(30.0, "pressure", fitted=True), expanded=[("pressure",)]) is None
+
+
+def test_after_many_fits_only_what_the_verdict_rests_on_is_fitted():
+    nothing, both = weighted(0.0, fitted=True), ("registration", "unknown")
+    assert following(nothing, weighted(60.0, *both), rivals=False) == sorted(both)
+    rival = weighted(24.0, "traction")
+    named = weighted(30.0, "pressure", fitted=True)
+    assert following(nothing, named, rival, expanded=[("pressure",)]) == ["traction"]
+    assert following(nothing, named, rival, expanded=[("pressure",)], rivals=False) is None
 
 
 def test_nothing_is_fitted_where_no_fit_can_change_the_verdict():

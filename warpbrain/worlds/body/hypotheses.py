@@ -46,7 +46,7 @@ _PLACES, _SETS = 20, 12
 _ELSEWHERE = 2
 #: Places of each cause whose columns are made anew about a fit.
 _PLACES_ABOUT_FIT = 8
-#: How often at most a set is fitted, or its supersets are weighed.
+#: How often at most a set is fitted, or its supersets are weighed; twice as often what the verdict rests on.
 _MOST = 10
 #: By how much [nats] another optimum is better that is worth a fit.
 _BETTER = 1.0
@@ -139,8 +139,9 @@ class HypothesisSearch:
         self._fit(frozenset())
         while not alone and (single := far_from_linear(list(self._sets.values()), self._bend)) is not None:
             self._fit(single.names)
-        for _ in range(0 if alone else _MOST):
-            chosen = next_to_fit(self.weighted_sets, self.probabilities, {*self._expanded, *self._unstable})
+        for number in range(0 if alone else 2 * _MOST):
+            expanded = {*self._expanded, *self._unstable}
+            chosen = next_to_fit(self.weighted_sets, self.probabilities, expanded, rivals=number < _MOST)
             if chosen is None:
                 return
             if chosen.refit is None:

@@ -1,8 +1,8 @@
 """Which set of causes is worth fitting next: the value of information of a fit for the verdict.
 
 A fit costs many equilibria, and tells by how much the evidence of a set differs from that in the linear model. It is
-worth that where the verdict of least expected loss could be regretted once this is known. Of the set that the verdict
-names a fit is always made. Where a body moves far the linear model says little of any cause: `bend_of`.
+worth that where the verdict of least expected loss could be regretted once this is known. Of the set that a name or an
+unknown rests on a fit is always made. Where a body moves far the linear model says little of any cause: `bend_of`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis
-from warpbrain.inference.decide import Decision, decide
+from warpbrain.inference.decide import UNKNOWN, Decision, decide
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -24,19 +24,24 @@ _NEGLIGIBLE = 0.005
 
 
 def next_to_fit(
-    sets: Sequence[WeightedSet], probabilities: Floats, expanded: Collection[frozenset[str]]
+    sets: Sequence[WeightedSet],
+    probabilities: Floats,
+    expanded: Collection[frozenset[str]],
+    rivals: bool = True,
 ) -> WeightedSet | None:
     """The set that is fitted next, or whose supersets are weighed next if it is fitted; None to stop.
 
     `sets`: the most probable first. `probabilities` (s,). `expanded`: fitted sets whose supersets were weighed about
-    their fit.
+    their fit. `rivals`: False if only what the verdict rests on is still worth it.
     """
     decision, _ = _decide(sets)
     named = [candidate for candidate in sets if frozenset(candidate.mechanisms) == frozenset(decision.causes)]
     if named and named[0].mechanisms and not _is_settled(named, expanded):
         chosen = named[0]
-    elif part := _part_not_fitted(decision, sets):
+    elif part := _part_not_fitted(decision, sets) or _unknown_not_fitted(decision, sets):
         return part
+    elif not rivals:
+        return None
     else:
         open_sets = _not_fitted(sets, probabilities)
         matters = (candidate for candidate in open_sets if _may_be_regretted(candidate, sets, decision))
@@ -106,6 +111,19 @@ def _part_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> Weighte
     parts = (candidate for candidate in sets if candidate.names < named and len(candidate.names) == len(named) - 1)
     open_parts = (part for part in parts if part.names and part.refit is None and not part.failure)
     return next(open_parts, None)
+
+
+def _unknown_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> WeightedSet | None:
+    """The set that a verdict of an unknown rests on, or that without it, if it was not fitted; None if they were.
+
+    What a rigid motion does to second order looks like an unknown force in the linear model.
+    """
+    if decision.verdict != UNKNOWN:
+        return None
+    without_names = (candidate for candidate in sets if UNKNOWN in candidate.names and not candidate.mechanisms)
+    likely = next(without_names).names
+    parts = (candidate for candidate in sets if candidate.names in (likely, likely - {UNKNOWN}))
+    return next((part for part in parts if part.refit is None and not part.failure), None)
 
 
 def _not_fitted(sets: Sequence[WeightedSet], probabilities: Floats) -> Iterator[WeightedSet]:
