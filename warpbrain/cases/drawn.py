@@ -13,8 +13,18 @@ from warpbrain.gp.sampling import DrawnLaws, draw_laws, law_of_curve
 
 @dataclass(frozen=True)
 class FromPrior:
-    """Which laws of a case are the generative model's: the case with these laws, the tissues whose laws they are, and
-    the draw with one law for each of these; None if the laws are those of the middle curves."""
+    """Which laws of a case are the generative model's.
+
+    Attributes
+    ----------
+    case : Case
+        With these laws.
+    model : Process
+    labels : tuple of int
+        Tissues whose laws they are.
+    drawn : DrawnLaws or None
+        With one law for each of these tissues; None if the laws are those of the middle curves.
+    """
 
     case: Case
     model: Process
@@ -71,8 +81,13 @@ def with_prior_draw(case: Case, number: int, seed: int = 0, model: Process | Non
 
 
 def with_prior_middle(case: Case, model: Process | None = None) -> FromPrior:
-    """The case with the laws of tissues that say `mu = "prior"` from the middle curves of their groups; `InputError`
-    with file, tissue and key, if the model has seen no study of a group."""
+    """The case with the laws of tissues that say `mu = "prior"` from the middle curves of their groups.
+
+    Raises
+    ------
+    InputError
+        With file, tissue and key, if the model has seen no study of a group.
+    """
     asked = _default(model)
     labels = tuple(label for label, tissue in sorted(case.tissues.items()) if tissue.law is None)
     require_groups(case, labels, asked)

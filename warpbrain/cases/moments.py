@@ -53,8 +53,17 @@ def _key(case: Case, time: float) -> tuple[Any, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Times [s], increasing, infinity is the end; the cases at them that differ, the case itself if nothing does from
-    its end; and for each time the number of its case."""
+    """Times, and the cases at them.
+
+    Attributes
+    ----------
+    times : tuple of float
+        [s], increasing; infinity is the end.
+    cases : tuple of Case
+        What differs; the case itself if nothing does from its end.
+    numbers : tuple of int
+        For each time the number of its case.
+    """
 
     times: tuple[float, ...]
     cases: tuple[Case, ...]

@@ -43,8 +43,21 @@ ALIASES = {"synthetic": "phantom", "synthetic-fine": "phantom-fine"}
 
 @dataclass(frozen=True)
 class Entry:
-    """What a shipped case is with one of its meshes ("multi" or "single"): title and origin as `Case` has them, nodes,
-    tetrahedra and volume of the imaged anatomy, whole, and how many rows, points or instants each recording has."""
+    """What a shipped case is with one of its meshes.
+
+    Attributes
+    ----------
+    name : str
+    tissue : str
+        ``"multi"`` or ``"single"``.
+    title, origin : str
+        As `Case` has them.
+    nodes, tetrahedra : int
+        Of the imaged anatomy, whole.
+    volume_cm3 : float
+    recordings : dict of str to int
+        How many rows, points or instants each has.
+    """
 
     name: str
     tissue: str
@@ -62,8 +75,13 @@ def catalogue() -> list[Entry]:
 
 
 def files_of(name: str) -> list[Path]:
-    """Every `case.toml` of a shipped case or of a folder: the one of many tissues, and that of one tissue if there;
-    `InputError` if there is no such case and no such folder."""
+    """Every `case.toml` of a shipped case or of a folder: the one of many tissues, and that of one tissue if there.
+
+    Raises
+    ------
+    InputError
+        If there is no such case and no such folder.
+    """
     name = ALIASES.get(name, name)
     if name in SHIPPED:
         return [_DATA / file for file in dict.fromkeys(SHIPPED[name].values())]
@@ -106,8 +124,13 @@ def find_case(name: str, tissue: str = "multi") -> Case:
 
 
 def as_case(case: Case | str | os.PathLike[str], tissue: str = "multi") -> Case:
-    """A case that may be given itself, by name, or by its path; `InputError` if it is none of these, there is no such
-    case, or it is wrong."""
+    """A case that may be given itself, by name, or by its path.
+
+    Raises
+    ------
+    InputError
+        If it is none of these, there is no such case, or it is wrong.
+    """
     from warpbrain.cases.case import Case
 
     if isinstance(case, Case):

@@ -18,8 +18,16 @@ _SIX = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 
 
 @dataclass(frozen=True)
 class Specimen:
-    """What `[specimen]` says, in SI units: "cylinder" or "block"; its extent along x, y and z [m], a cylinder's axis is
-    z; and whether its ends, the sets `bottom` and `top`, are "glued" or "lubricated", and can widen."""
+    """What `[specimen]` says, in SI units.
+
+    Attributes
+    ----------
+    shape : {"cylinder", "block"}
+    size : (float, float, float)
+        Extent along x, y and z [m]; a cylinder's axis is z.
+    grips : {"glued", "lubricated"}
+        Whether its ends, the sets `bottom` and `top`, can widen.
+    """
 
     shape: str
     size: tuple[float, float, float]

@@ -40,9 +40,21 @@ IN_PLACE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class StartedCase:
-    """What was written: names of tissues by number; of what was made from labels, for each tissue, the volume [m3] of
-    its labels, and the share of its voxels that lie in that tissue of the mesh; the volume [m3] of the closed cavities
-    of the mesh, and of the labels of cavities; and notes of what was mended, left out or not reached."""
+    """What was written.
+
+    Attributes
+    ----------
+    folder, mesh, quality
+    tissues : dict of int to str
+        Names by number.
+    labelled, in_place : dict of int to float, or None
+        Of what was made from labels, for each tissue: volume [m3] of its labels, and the share of its voxels that lie
+        in that tissue of the mesh.
+    cavity, labelled_cavity : float
+        Volume [m3] of the closed cavities of the mesh, and of the labels of cavities.
+    notes : tuple of str
+        What was mended, left out or not reached.
+    """
 
     folder: Path
     mesh: TetMesh
@@ -66,14 +78,27 @@ def start_from_labels(
     program: str | None = None,
     overwrite: bool = False,
 ) -> StartedCase:
-    """Make a case folder, which must not be there yet or be empty, from a label volume (see `read_labels`), with a
-    wanted mean edge [mm], by default what gives about 5,000 nodes.
+    """Make a case folder from a label volume.
 
-    With `overwrite` mesh and `case.toml` that are in the folder may be overwritten. `names` are arguments of
-    `--tissue`, see `parse_names`, and `others` is the name of every label that they leave out; `program` says whose
-    labels they are, see `preset`: `names` take precedence, and labels that the volume lacks are no mistake. `progress`
-    is called with one line of text whenever something is begun. `InputError` if the folder is not empty, or anything is
-    wrong with the labels or their names; nothing is written then.
+    Parameters
+    ----------
+    folder : Path
+        Must not be there yet, or be empty, unless mesh and `case.toml` that are in it may be overwritten.
+    labels : Path
+        See `read_labels`.
+    names, others
+        Arguments of `--tissue`, see `parse_names`, and the name of every label that they leave out.
+    size : float, optional
+        Wanted mean edge [mm]; by default what gives about 5,000 nodes.
+    progress : callable
+        Called with one line of text whenever something is begun.
+    program : str, optional
+        Whose labels they are, see `preset`; `names` take precedence, and labels that the volume lacks are no mistake.
+
+    Raises
+    ------
+    InputError
+        If the folder is not empty, or anything is wrong with the labels or their names; nothing is written then.
     """
     _check_folder(folder, overwrite)
     if size is not None and not 0 < size < np.inf:
@@ -132,12 +157,22 @@ def start_from_mesh(
     *,
     overwrite: bool = False,
 ) -> StartedCase:
-    """Make a case folder from any tetrahedral mesh that meshio reads, with its unit and axes; its tissues are those of
-    `read_regions`, its node and element sets are kept.
+    """Make a case folder from a volume mesh.
 
-    `folder`, `names` and `overwrite` are those of `start_from_labels`; the labels are those of the mesh, and `array` is
-    the cell array of them, where several could be it. `InputError` if the folder is not empty or the mesh cannot be
-    used; nothing is written then.
+    Parameters
+    ----------
+    folder, names, overwrite
+        As of `start_from_labels`; the labels are those of the mesh.
+    file, frame
+        Any tetrahedral mesh that meshio reads, with its unit and axes; its tissues are those of `read_regions`, its
+        node and element sets are kept.
+    array : str, optional
+        Cell array of the labels, where several could be it.
+
+    Raises
+    ------
+    InputError
+        If the folder is not empty or the mesh cannot be used; nothing is written then.
     """
     _check_folder(folder, overwrite)
     parse_names(names)  # what is wrong with them is known before anything is read

@@ -20,8 +20,14 @@ _BATCH = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Vectors (i, j, k, 3) [mm, RAS] on a grid, linear between the centres of voxels and zero beyond the grid, as ITK
-    reads them."""
+    """Vectors on a grid, linear between the centres of voxels and zero beyond the grid, as ITK reads them.
+
+    Attributes
+    ----------
+    grid : Grid
+    vectors : (i, j, k, 3) float32 array
+        [mm, RAS]
+    """
 
     grid: Grid
     vectors: Singles
@@ -61,10 +67,19 @@ class DisplacementField:
 
 @dataclass(frozen=True, eq=False)
 class Inverse:
-    """A displacement field the other way, and how good it is: of what the field makes of where its inverse leads,
-    halfway between the centres of voxels, where linear interpolation is worst, in moved tissue, the 99th percentile and
-    the largest of the distances from where one began [mm]; and how many voxels, of all, have at their centre an error
-    not below a thousandth of a millimetre."""
+    """A displacement field the other way, and how good it is.
+
+    Attributes
+    ----------
+    field : DisplacementField
+    error_99 : float
+        Of what the field makes of where its inverse leads, halfway between the centres of voxels, where linear
+        interpolation is worst, in moved tissue: the 99th percentile of the distance from where one began [mm].
+    error_largest : float
+        The largest of these [mm].
+    unsolved : int
+        Voxels, of all, at whose centre the error is not below a thousandth of a millimetre.
+    """
 
     field: DisplacementField
     error_99: float

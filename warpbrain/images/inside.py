@@ -23,8 +23,19 @@ _PAIRS = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class VoxelsInside:
-    """Voxels whose centre is in a mesh: their numbers (k,) in a raveled array of the grid's shape, increasing, the
-    tetrahedron (k,) that each is in, and barycentric coordinates (k, 4) in it."""
+    """Voxels whose centre is in a mesh.
+
+    Attributes
+    ----------
+    grid : Grid
+    mesh : TetMesh
+    voxels : (k,) int array
+        Their numbers in a raveled array of the grid's shape, increasing.
+    elements : (k,) int array
+        The tetrahedron that each is in.
+    weights : (k, 4) array
+        Barycentric coordinates in it.
+    """
 
     grid: Grid
     mesh: TetMesh

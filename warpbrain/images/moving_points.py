@@ -29,8 +29,18 @@ _HEADER = (
 
 @dataclass(frozen=True, eq=False)
 class PointFile:
-    """A file of labelled points (n, 3), before [mm, RAS]; `moved_text` makes of positions after (n, 3) [mm, RAS] the
-    text of the file that has them."""
+    """A file of points.
+
+    Attributes
+    ----------
+    path : Path
+    labels : tuple of str
+    points : (n, 3) array
+        Before [mm, RAS].
+    moved_text : callable
+        From positions after (n, 3) [mm, RAS] to the text of the file that has them.
+    remarks : tuple of str
+    """
 
     path: Path
     labels: tuple[str, ...]
@@ -50,10 +60,21 @@ class PointFile:
 
 @dataclass(frozen=True, eq=False)
 class MovedPoints:
-    """Points of a file and where they have gone (n, 3) [mm, RAS]; how far outside the mesh they were before (n,) [mm];
-    which were beyond the grid (n,), and are taken not to move; and how far from here the field, and so the transform
-    that is written, puts them (n,) [mm]: it is linear between the centres of voxels, and at a wall of tissue the
-    displacement has a kink."""
+    """Points of a file and where they have gone.
+
+    Attributes
+    ----------
+    file : PointFile
+    points : (n, 3) array
+        After [mm, RAS].
+    outside : (n,) array
+        How far outside the mesh they were before [mm].
+    beyond : (n,) bool array
+        Beyond the grid: they are taken not to move.
+    apart : (n,) array
+        How far from here the field, and so the transform that is written, puts them [mm]: it is linear between the
+        centres of voxels, and at a wall of tissue the displacement has a kink.
+    """
 
     file: PointFile
     points: Floats
@@ -63,8 +84,13 @@ class MovedPoints:
 
 
 def read_point_file(path: Path) -> PointFile:
-    """Read a 3D Slicer markup (`.mrk.json`, `.fcsv`) or a BIDS `electrodes.tsv`; `InputError` names the file, what was
-    found and what was expected."""
+    """Read a 3D Slicer markup (`.mrk.json`, `.fcsv`) or a BIDS `electrodes.tsv`.
+
+    Raises
+    ------
+    InputError
+        Naming the file, what was found and what was expected.
+    """
     if not (is_electrodes(path) or is_markup(path)):
         raise InputError(f"{path}: found ending '{path.suffix}', expected .mrk.json, .fcsv or a BIDS electrodes.tsv")
     problems = Problems()

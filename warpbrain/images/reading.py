@@ -31,8 +31,18 @@ _DISAGREEMENT = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """Values (i, j, k) as the file has them, scaled as it says, where they are, and notes of what the user should know
-    about how the file was read."""
+    """Values and where they are.
+
+    Attributes
+    ----------
+    path : Path
+        The file they came from.
+    values : (i, j, k) array
+        As the file has them, scaled as it says.
+    grid : Grid
+    notes : tuple of str
+        What the user should know about how the file was read.
+    """
 
     path: Path
     values: NDArray[Any]
@@ -47,8 +57,13 @@ def require(module: str, distribution: str, what: str) -> None:
 
 
 def read_image(path: Path) -> Image:
-    """Read one volume of real or whole numbers; any orientation, any voxel size. `InputError` names the file, what was
-    found and what was expected."""
+    """Read one volume of real or whole numbers; any orientation, any voxel size.
+
+    Raises
+    ------
+    InputError
+        Naming the file, what was found and what was expected.
+    """
     if path.is_dir():
         raise InputError(
             f"{path}: found a folder, expected a volume: of a DICOM series make one with dcm2niix -z y -o OUT {path}"
@@ -59,8 +74,13 @@ def read_image(path: Path) -> Image:
 
 
 def labels_of(image: Image) -> NDArray[np.int32]:
-    """The labels (i, j, k) of an image, zero is background; `InputError` if its values are not all whole numbers of
-    zero or more."""
+    """The labels (i, j, k) of an image, zero is background.
+
+    Raises
+    ------
+    InputError
+        If its values are not all whole numbers of zero or more.
+    """
     path, values = image.path, image.values
     with np.errstate(invalid="ignore"):
         labels = values.astype(np.int32)

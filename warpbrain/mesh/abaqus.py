@@ -24,9 +24,19 @@ MATERIAL_SETS = "material sets"
 
 @dataclass
 class AbaqusSets:
-    """What a file names: the numbers of its nodes in the order of the file, which is meshio's; the numbers of the
-    elements of each `*ELEMENT` line, which is a block of meshio's; the numbers of the members of its sets; and the
-    names of the sets that `*SOLID SECTION` gives a material, and of those that `*ELEMENT` lines make."""
+    """What a file names.
+
+    Attributes
+    ----------
+    nodes : list of int
+        Numbers of the nodes in the order of the file, which is meshio's.
+    elements : list of lists of int
+        Numbers of the elements of each `*ELEMENT` line, which is a block of meshio's.
+    node_sets, element_sets : dict of str to list of int
+        Numbers of the members.
+    sections, of_elements : list of str
+        Names of the sets that `*SOLID SECTION` gives a material, and of those that `*ELEMENT` lines make.
+    """
 
     nodes: list[int] = field(default_factory=list)
     elements: list[list[int]] = field(default_factory=list)
@@ -38,7 +48,12 @@ class AbaqusSets:
 
 def read_abaqus(path: Path) -> Any:
     """Read a file: a `meshio.Mesh` with its sets; `info[MATERIAL_SETS]` lists which of them may be the materials.
-    `MeshError` if a set cannot be understood or has what is not there, or the file includes another one."""
+
+    Raises
+    ------
+    MeshError
+        If a set cannot be understood or has what is not there, or the file includes another one.
+    """
     import meshio
 
     sets, plain = _sets_and_rest(path.read_text(encoding="utf-8", errors="replace"))

@@ -29,9 +29,19 @@ _ORIGINS: tuple[Origin, ...] = ("outer", "inner", "cut")
 
 @dataclass(frozen=True, eq=False)
 class FreeSurface:
-    """A part of the surface on which something can act: the name of the node set that stands for it (what acts on that
-    acts on its triangles, and on none that can move beside), what people call it, the nodes of that set (n,), and its
-    triangles (k, 3) that are not held, oriented outwards."""
+    """A part of the surface on which something can act.
+
+    Attributes
+    ----------
+    name : str
+        Of the node set that stands for it: what acts on that acts on its triangles, and on none that can move beside.
+    words : str
+        What people call it.
+    members : (n,) bool array
+        Nodes of that set.
+    faces : (k, 3) int array
+        Triangles of the set that are not held, oriented outwards.
+    """
 
     name: str
     words: str
@@ -41,8 +51,17 @@ class FreeSurface:
 
 @dataclass(frozen=True, eq=False)
 class FreePart:
-    """A connected free surface: of which `Origin`, its triangles (k, 3), oriented outwards, and the centre (3,) of its
-    area [m]."""
+    """A connected free surface.
+
+    Attributes
+    ----------
+    origin : str
+        One of `Origin`.
+    faces : (k, 3) int array
+        Triangles, oriented outwards.
+    centre : (3,) array
+        Of its area [m].
+    """
 
     origin: Origin
     faces: Ints
@@ -56,13 +75,26 @@ def free_faces(mesh: TetMesh, members: Bools, held: Bools) -> Ints:
 
 
 def free_parts(mesh: TetMesh, held: Bools, inner: ArrayLike, smallest: float = 0.0) -> list[FreePart]:
-    """The connected free surfaces of a body: outside, voids, cuts; of each the largest area first.
+    """The connected free surfaces of a body.
 
-    The boundary without triangles whose nodes are all `held` (n,), which cannot move, or not along the normal, falls
-    into pieces that hang together through edges; the wall of a cut, the walls of voids and the outside are apart even
-    where they touch. `inner` (n,) are nodes on the walls of voids, as the body was before anything was cut out. A piece
-    of less than the part `smallest` of the area of all pieces of one origin on one closed surface, such as a gap in
-    what is held, belongs to the largest of them.
+    The boundary without triangles whose nodes are all held falls into pieces that hang together through edges; the
+    wall of a cut, the walls of voids and the outside are apart even where they touch.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    held : (n,) bool array
+        Nodes that cannot move, or not along the normal.
+    inner : (n,) bool array
+        Nodes on the walls of voids, as the body was before anything was cut out.
+    smallest : float
+        Part of the area of all pieces of one origin on one closed surface. A piece of less, such as a gap in what is
+        held, belongs to the largest of them.
+
+    Returns
+    -------
+    list of FreePart
+        Outside, voids, cuts; of each the largest area first.
     """
     faces = mesh.boundary
     free = ~held[faces].all(axis=1)
@@ -128,8 +160,13 @@ def faces_of(mesh: TetMesh, members: Bools) -> Ints:
 
 
 def faces_of_set(mesh: TetMesh, name: str, who: str) -> Ints:
-    """Boundary triangles (k, 3) all of whose nodes are in a node set; `who` asks for them, for the message of the
-    `InputError` if there is no such set or no such triangle."""
+    """Boundary triangles (k, 3) all of whose nodes are in a node set; `who` asks for them, for the message.
+
+    Raises
+    ------
+    InputError
+        If there is no such set or no such triangle.
+    """
     if name not in mesh.node_sets:
         known = ", ".join(sorted(mesh.node_sets)) or "none"
         raise InputError(f"{who}: the mesh has no node set '{name}', found {known}")

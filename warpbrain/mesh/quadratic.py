@@ -116,9 +116,21 @@ class QuadraticMesh:
 
 
 def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> Floats:
-    """A field (n, c) of quadratic tetrahedra with straight sides at points in them, by the points' barycentric
-    coordinates (n, 4) and values at the corners (n, 4, c) and in the middle of the edges (n, 6, c) of each one's
-    tetrahedron, in the order of `warpbrain.mesh.surface.EDGES`."""
+    """A field of quadratic tetrahedra with straight sides at points in them.
+
+    Parameters
+    ----------
+    weights : (n, 4) array
+        Barycentric coordinates of each point.
+    corners : (n, 4, c) array
+        Values at the corners of its tetrahedron.
+    middles : (n, 6, c) array
+        Values in the middle of the edges, in the order of `warpbrain.mesh.surface.EDGES`.
+
+    Returns
+    -------
+    (n, c) array
+    """
     of_corners = np.einsum("na,nac->nc", weights * (2.0 * weights - 1.0), corners)
     return np.asarray(of_corners + np.einsum("na,nac->nc", 4.0 * weights[:, EDGES].prod(axis=2), middles))
 

@@ -88,11 +88,18 @@ def inherited_sets(sets: Mapping[str, Bools], ends: Ints, finer: TetMesh) -> dic
 
 
 def inherited(members: Bools, ends: Ints, surface: Bools) -> Bools:
-    """A set of nodes (n,) once there are midpoints, by the two `ends` (n', 2) between which each node lies in the
-    middle.
+    """A set of nodes once there are midpoints.
 
     A midpoint is in it if both ends of its edge are; of a set of nodes of the surface only if the edge lies on the
-    `surface` (n',), too, which are the nodes of the boundary, midpoints among them.
+    surface too.
+
+    Parameters
+    ----------
+    members : (n,) bool array
+    ends : (n', 2) int array
+        The two nodes between which each node lies in the middle.
+    surface : (n',) bool array
+        Nodes, midpoints among them, that are of the boundary.
     """
     both = members[ends].all(axis=1)
     inside = members & ~surface[: len(members)]

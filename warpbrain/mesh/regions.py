@@ -35,7 +35,16 @@ _DIMENSION = {"vertex": 0, "line": 1, "line3": 1}
 
 @dataclass(frozen=True, eq=False)
 class MeshWithRegions:
-    """A mesh with what its file names: the names of tissues, and notes of where tissues and sets are from."""
+    """A mesh with what its file names.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    names : dict of int to str
+        Names of tissues that the file has.
+    notes : tuple of str
+        Where tissues and sets are from.
+    """
 
     mesh: TetMesh
     names: dict[int, str]
@@ -43,11 +52,20 @@ class MeshWithRegions:
 
 
 def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithRegions:
-    """Read a mesh, with coordinates in "m" or "mm", with its tissues and sets.
+    """Read a mesh with its tissues and sets.
 
-    `array` is the cell array of the tissues, or `SETS`; by default ``tissue`` if there is one, else the only one that
-    can be it. `MeshError`, naming the file, if it is no mesh, or several arrays could be the tissues; the message lists
-    them.
+    Parameters
+    ----------
+    path : Path
+    unit : {"m", "mm"}
+        Of its coordinates.
+    array : str, optional
+        Cell array of the tissues, or `SETS`; by default ``tissue`` if there is one, else the only one that can be it.
+
+    Raises
+    ------
+    MeshError
+        Naming the file, if it is no mesh, or several arrays could be the tissues; the message lists them.
     """
     raw = read_raw(path)
     if not any(block.type in TETRAHEDRA for block in raw.cells):

@@ -32,8 +32,25 @@ def edges_of(faces: ArrayLike) -> NDArray[np.int64]:
 
 
 def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which faces of tetrahedra (m, 4) coincide: pairs (k, 2) of faces that two tetrahedra share, and faces (b,) that
-    only one has; face number = 4 * tetrahedron + local face. `ValueError` if a face belongs to three or more."""
+    """Which faces of which tetrahedra coincide.
+
+    Parameters
+    ----------
+    tetrahedra : (m, 4) array
+        Node ids.
+
+    Returns
+    -------
+    pairs : (k, 2) int64 array
+        Faces shared by two tetrahedra; face number = 4 * tetrahedron + local face.
+    single : (b,) int64 array
+        Faces that only one tetrahedron has.
+
+    Raises
+    ------
+    ValueError
+        If a face belongs to three or more tetrahedra.
+    """
     tets = np.asarray(tetrahedra)
     faces = np.sort(tets[:, FACES].reshape(-1, 3), axis=1)
     order = np.lexsort(faces.T[::-1])
@@ -54,7 +71,18 @@ def _corners(tetrahedra: ArrayLike, faces: NDArray[np.int64]) -> Ints:
 
 
 def all_faces(tetrahedra: ArrayLike) -> Ints:
-    """Every triangle (k, 3) of tetrahedra (m, 4) once, inside and on the boundary."""
+    """Every triangle of a mesh once, inside and on the boundary.
+
+    Parameters
+    ----------
+    tetrahedra : (m, 4) array
+        Node ids.
+
+    Returns
+    -------
+    (k, 3) int32 array
+        Node ids.
+    """
     pairs, single = paired_faces(tetrahedra)
     return _corners(tetrahedra, np.concatenate([pairs[:, 0], single]))
 
@@ -248,12 +276,21 @@ def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
 
 
 def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.bool_]]:
-    """Angle-weighted normals (Baerentzen and Aanaes 2005) of the features of triangles (k, 3), oriented outwards, with
-    corners (n, 3): of the face, of its edges ab, bc, ca and of its corners (k, 7, 3), of unit length; and which
-    features are on a rim (k, 7), the edges of one triangle only and their corners, whose normal is that of the face.
+    """Angle-weighted normals (Baerentzen and Aanaes 2005) of each triangle's features, and which are on a rim.
 
-    The closest point `p` of a closed surface to `x` has `x` outside if `(x - p) . n > 0` with the normal of the feature
-    that `p` is on.
+    Parameters
+    ----------
+    points : (n, 3) array
+    faces : (k, 3) int array
+        Oriented outwards.
+
+    Returns
+    -------
+    normals : (k, 7, 3) array
+        Unit normals of the face, of its edges ab, bc, ca and of its corners. The closest point `p` of a closed surface
+        to `x` has `x` outside if `(x - p) . n > 0` with the normal of the feature that `p` is on.
+    on_rim : (k, 7) bool array
+        True for an edge of one triangle only and its corners, whose normal is that of the face.
     """
     normals = np.empty((len(faces), 7, 3))
     normals[:, 0] = _unit(face_vectors(points, faces))

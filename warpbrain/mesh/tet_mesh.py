@@ -298,8 +298,20 @@ class TetMesh:
 
 
 def signed_volumes(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
-    """Volume (m,) of tetrahedra (m, 4) with nodes (n, 3), in the cube of their unit; positive where positively
-    oriented."""
+    """Signed volume of tetrahedra, in the cube of the unit of `points`.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+        Node positions.
+    tetrahedra : (m, 4) array
+        Node ids.
+
+    Returns
+    -------
+    (m,) array
+        Positive where the tetrahedron is positively oriented.
+    """
     corner = np.asarray(points, dtype=np.float64)[np.asarray(tetrahedra)]
     a, b, c = (corner[:, i] - corner[:, 0] for i in (1, 2, 3))
     return np.asarray(np.einsum("ij,ij->i", np.cross(a, b), c) / 6.0)

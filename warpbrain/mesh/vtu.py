@@ -22,8 +22,16 @@ _HEAD = 2**16
 
 
 def write_vtu(path: Path, mesh: Any, axes: str = "RAS") -> None:
-    """Write a `meshio.Mesh` as compressed VTU that says the axes ("RAS" or "LPS") of its points, in place: see
-    `warpbrain.atomic.whole_file`."""
+    """Write a `meshio.Mesh` as compressed VTU that says its axes.
+
+    Parameters
+    ----------
+    path : Path
+        Written in place: see `warpbrain.atomic.whole_file`.
+    mesh : meshio.Mesh
+    axes : {"RAS", "LPS"}
+        Of its points.
+    """
     import meshio
 
     meshio.write(path, mesh, file_format="vtu", binary=True, compression="zlib")

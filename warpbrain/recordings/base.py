@@ -142,8 +142,13 @@ class Recording:
         return {}
 
     def check(self, mesh: TetMesh, path: Path, problems: Problems) -> None:
-        """Note as problems what cannot have been recorded of a body (its mesh at rest, without what was resected);
-        `InputError` if the mesh has nothing that it could have been recorded of."""
+        """Note as problems what cannot have been recorded of a body (its mesh at rest, without what was resected).
+
+        Raises
+        ------
+        InputError
+            If the mesh has nothing that it could have been recorded of.
+        """
 
     @property
     def ending(self) -> str:
@@ -155,11 +160,21 @@ class Recording:
         raise NotImplementedError
 
     def write(self, path: Path, frame: Frame) -> None:
-        """Write a file that reading gives back, whole or not at all; `frame` is its unit and axes.
+        """Write a file that reading gives back, whole or not at all.
 
         Numbers are written with all their digits: in metres reading gives the same ones back, in mm the same to
         rounding. What stands in `case.toml` (name, role, sigma, node set, boundary, mode) is not in the file.
-        `InputError` if the ending is not that of such a recording, or the file cannot be written.
+
+        Parameters
+        ----------
+        path : Path
+        frame : Frame
+            Unit and axes of the file.
+
+        Raises
+        ------
+        InputError
+            If the ending is not that of such a recording, or the file cannot be written.
         """
         path = Path(path)
         if path.suffix.lower() != self.ending:

@@ -21,9 +21,15 @@ PAIRS = 1_000_000
 
 
 class Spheres:
-    """Which of some spheres, with centres (m, 3) and radii (m,), points touch: a search among millions of triangles or
-    tetrahedra becomes one among dozens. They are sorted by size so that few large ones do not widen the search for all
-    others."""
+    """Which of some spheres points touch: a search among millions of triangles or tetrahedra becomes one among dozens.
+
+    They are sorted by size so that few large ones do not widen the search for all others.
+
+    Parameters
+    ----------
+    centres : (m, 3) array
+    radii : (m,) array
+    """
 
     def __init__(self, centres: Floats, radii: Floats) -> None:
         from scipy.spatial import cKDTree
@@ -61,8 +67,19 @@ class Spheres:
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoints:
-    """Closest points of a surface: where they are (n, 3), the triangle on which each lies (n,), of several the one with
-    the smallest number, barycentric coordinates there (n, 3), not negative and of sum 1, and the distance (n,)."""
+    """Closest points of a surface.
+
+    Attributes
+    ----------
+    position : (n, 3) array
+        Where they are.
+    face : (n,) int32 array
+        Triangle on which each lies; of several, the one with the smallest number.
+    weights : (n, 3) array
+        Barycentric coordinates there: not negative, their sum is 1.
+    distance : (n,) array
+        From the given point.
+    """
 
     position: Floats
     face: Ints
@@ -78,8 +95,20 @@ class ClosestPoints:
 
 
 def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> ClosestPoints:
-    """Points of a surface with vertices (v, 3) and faces (k, 3) that are closest to points (n, 3), exact to rounding;
-    triangles without area count as the segments they are. `InputError` if there are no faces."""
+    """Closest points of a surface, exact to rounding; triangles without area count as the segments they are.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    vertices : (v, 3) array
+    faces : (k, 3) array
+        Ids of vertices.
+
+    Raises
+    ------
+    InputError
+        If there are no faces.
+    """
     xyz = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     triangles = np.asarray(faces)
     if len(triangles) == 0:

@@ -22,18 +22,35 @@ Ints = NDArray[np.int32]
 
 
 def legacy_error(distances: ArrayLike) -> float:
-    """`sqrt(sum_i |r_i| / n)` [sqrt(mm)] with lengths in mm, of distances (n,) or residual vectors (n, 3) [m]: the
-    number that the paper's own code calls its rmse.
+    """`sqrt(sum_i |r_i| / n)` with lengths in mm: the number that the paper's own code calls its rmse.
 
     Its unit is the square root of a mm, not mm: it is the root of the mean distance, and no root mean square. It is
     here to stand beside published numbers, and for nothing else.
+
+    Parameters
+    ----------
+    distances : (n,) array or (n, 3) array
+        Distances or residual vectors [m].
+
+    Returns
+    -------
+    float
+        [sqrt(mm)]
     """
     return float(np.sqrt(np.mean(1000.0 * lengths(distances))))
 
 
 @dataclass(frozen=True)
 class Error:
-    """Distances in four numbers, in the unit of the comparison; `legacy_error` [sqrt(mm)] is of lengths only."""
+    """Distances in four numbers.
+
+    Attributes
+    ----------
+    root_mean_square, percentile_95, largest : float
+        In the unit of the comparison.
+    legacy : float or None
+        `legacy_error` [sqrt(mm)], of lengths only.
+    """
 
     root_mean_square: float
     legacy: float | None
@@ -102,11 +119,26 @@ def compare_points(
     location: Location | None = None,
     rows: NDArray[np.int64] | None = None,
 ) -> Comparison:
-    """Compare displacements `u` (N, 3) [m] of the nodes of a mesh at rest with tracked points.
+    """Compare displacements of tracked points.
 
-    The `time` [s] is that of the state, the recording's end if left out, see `rows_at`, which raises `InputError` if
-    nothing was recorded then; `rows` are those that are compared, whatever the time; `location` is that of all points
-    of the recording in the mesh, if it is known already.
+    Parameters
+    ----------
+    recording : PointsRecording
+    mesh : TetMesh
+        At rest.
+    u : (N, 3) array
+        Displacement of the nodes [m].
+    time : float, optional
+        Of the state [s]; the recording's end if left out, see `rows_at`.
+    location : Location, optional
+        Of all points of the recording in the mesh, if it is known already.
+    rows : (n,) int array, optional
+        Those that are compared, whatever the time.
+
+    Raises
+    ------
+    InputError
+        If nothing was recorded at that time.
     """
     rows = rows_at(recording, time) if rows is None else rows
     place = locate(mesh.points, mesh.tetrahedra, recording.points[rows]) if location is None else location.at(rows)
@@ -129,8 +161,13 @@ def compare_surface(
     """Compare a recorded surface with the moved faces of its node set, both ways.
 
     Parameters are those of `compare_points`. The way back goes from the nodes of these faces to the recorded triangles,
-    or to the nearest recorded points if no triangles were recorded. `InputError` if the mesh has no such node set, no
-    boundary triangle has all its nodes in it, or nothing was recorded at that time.
+    or to the nearest recorded points if no triangles were recorded.
+
+    Raises
+    ------
+    InputError
+        If the mesh has no such node set, no boundary triangle has all its nodes in it, or nothing was recorded at that
+        time.
     """
     rows = rows_at(recording, time) if rows is None else rows
     points = recording.points[rows]
@@ -151,11 +188,20 @@ def compare_force(
     time: float | None = None,
     rows: NDArray[np.int64] | None = None,
 ) -> Comparison:
-    """Compare the resultant (3,) [N] with which a boundary acts on the tissue; components that were not recorded do not
-    count.
+    """Compare the resultant of a boundary; components that were not recorded do not count.
 
-    `time` and `rows` are those of `compare_points`. `InputError` if no component of the force was recorded, or nothing
-    at that time.
+    Parameters
+    ----------
+    recording : ForceRecording
+    reaction : (3,) array
+        Force of the boundary on the tissue [N].
+    time, rows : optional
+        As in `compare_points`.
+
+    Raises
+    ------
+    InputError
+        If no component of the force was recorded, or nothing at that time.
     """
     rows = rows_at(recording, time) if rows is None else rows
     before = recording.force[rows]

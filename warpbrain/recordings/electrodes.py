@@ -28,8 +28,23 @@ _NOTHING = "n/a"
 
 @dataclass(frozen=True, eq=False)
 class Electrodes:
-    """Electrodes of a file: labels and points (n, 3) [m, RAS] of those that have a position, its columns, all its rows
-    as text, which rows (n,) have a position, and the metres of one unit of it."""
+    """Electrodes of a file.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        Of those that have a position.
+    points : (n, 3) array
+        [m, RAS]
+    header : list of str
+        Columns.
+    cells : list of rows
+        All rows as text.
+    rows : (n,) int array
+        Which rows have a position.
+    metres : float
+        Of one unit of the file.
+    """
 
     labels: tuple[str, ...]
     points: Floats

@@ -31,8 +31,17 @@ COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 
 @dataclass(frozen=True, eq=False)
 class Markup:
-    """Control points (n, 3) [m, RAS] and their labels, which may be empty; `moved_text` makes of other positions (n, 3)
-    [m, RAS] the text of the file that has them, all else in it as it was."""
+    """Control points.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        [m, RAS]
+    labels : tuple of str
+        May be empty.
+    moved_text : callable
+        From other positions (n, 3) [m, RAS] to the text of the file that has them; all else in it stays as it is.
+    """
 
     points: Floats
     labels: tuple[str, ...]

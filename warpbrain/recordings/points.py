@@ -104,12 +104,24 @@ class PointsRecording(TrackedPoints, Recording):
 
 
 def distinct_rows(recording: PointsRecording, rows: Ints) -> tuple[Ints, Floats]:
-    """Of rows (k,) those without copies of others (m,), the first of each in the order in which they were given, and
-    their weights (m,): sums of the weights of each and its copies; rows without a weight have that of one.
+    """Rows without copies of others, and their weights.
 
     A copy is of the same place and the same time, went as far, and has the same noise, to the last bit. Taken for rows
     of their own, two of half a weight would not be one: a gross error would have to strike each by itself, and what
     neighbours share grows with the noise of each.
+
+    Parameters
+    ----------
+    recording : PointsRecording
+    rows : (k,) int array
+        Those to look at.
+
+    Returns
+    -------
+    rows : (m,) int64 array
+        The first of each, in the order in which they were given.
+    weights : (m,) array
+        Sums of the weights of each and its copies; rows without a weight have that of one.
     """
     weights = np.ones(len(rows)) if recording.weights is None else recording.weights[rows]
     columns_of = [recording.points, recording.displacement, recording.time, recording.sigmas]

@@ -27,7 +27,16 @@ LARGEST = 1e12
 class Table:
     """A table as it was read: cells that are asked for are checked, and what is wrong is added to `problems`.
 
-    Each row of `cells` is as long as the header; `rows` are their lines in the file, counted from 1.
+    Parameters
+    ----------
+    path : Path
+    header : list of str
+        Names of the columns.
+    cells : list of rows
+        Each as long as the header.
+    rows : list of int
+        Line in the file of each row, counted from 1.
+    problems : Problems
     """
 
     def __init__(
@@ -128,10 +137,20 @@ class Table:
 
 
 def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table | None:
-    """Read a CSV file; None if there is no table to speak of: no readable text, no header or no rows.
+    """Read a CSV file.
 
-    Rows that are too long or too short are left out of the table, which is a problem as all that is wrong. `known` are
-    the columns that mean something: none of them may be there twice.
+    Parameters
+    ----------
+    path : Path
+    problems : Problems
+        Gets everything that is wrong; rows that are too long or too short are left out of the table.
+    known : sequence of str
+        Columns that mean something: none of them may be there twice.
+
+    Returns
+    -------
+    Table or None
+        None if there is no table to speak of: no readable text, no header or no rows.
     """
     text = read_text(path, problems)
     if text is None:

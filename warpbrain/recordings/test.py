@@ -203,7 +203,11 @@ def turn_of(axis: tuple[float, float, float], sheared: tuple[float, float, float
     """Rotation `R` (3, 3) of a tissue in a machine: `R axis` is along z, and `R sheared` between x and z.
 
     Without `sheared` the machine's x is what of the tissue's is across the axis, or of its y where that is little.
-    `InputError` if one of them is zero, or they are one direction.
+
+    Raises
+    ------
+    InputError
+        If one of them is zero, or they are one direction.
     """
     z = np.array(axis, dtype=np.float64)
     if not np.linalg.norm(z) > 0.0:

@@ -54,8 +54,14 @@ def is_readable(path: Path, problems: Problems) -> bool:
 
 
 def read_text(path: Path, problems: Problems) -> str | None:
-    """The text of a UTF-8 file, with or without byte order mark; None if there were problems: no such file, a folder,
-    no permission, nothing in it, larger than `LIMIT`, not UTF-8."""
+    """The text of a UTF-8 file, with or without byte order mark; None if there were problems.
+
+    Parameters
+    ----------
+    path : Path
+    problems : Problems
+        Gets what is wrong: no such file, a folder, no permission, nothing in it, larger than `LIMIT`, not UTF-8.
+    """
     if not is_readable(path, problems):
         return None
     try:

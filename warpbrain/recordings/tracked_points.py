@@ -29,8 +29,18 @@ def added_readers() -> dict[str, Reader]:
 
 
 def tracked_points(path: Path, frame: Frame, moved: Path | None, problems: Problems) -> TrackedPoints | None:
-    """Points of a file; None if there were problems. `frame` is that of a CSV file, all others state theirs; `moved` is
-    the second markup of a pair."""
+    """Points of a file; None if there were problems.
+
+    Parameters
+    ----------
+    path : Path
+    frame : Frame
+        Unit and axes of a CSV file; all others state theirs.
+    moved : Path or None
+        The second markup of a pair.
+    problems : Problems
+        Gets what is wrong.
+    """
     ending = path.suffix.lower()
     if is_markup(path):
         return _of_markups(path, moved, problems)

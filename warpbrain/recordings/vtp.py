@@ -25,10 +25,14 @@ _APPENDED = re.compile(rb"<AppendedData[^>]*?encoding=\"(\w+)\"[^>]*>\s*_")
 
 
 def read_vtp(path: Path) -> tuple[Floats, Ints, str | None]:
-    """Points (n, 3), triangles (k, 3) and the axes that the file states (a field ``SPACE``, as Slicer writes it);
-    `ValueError` with what is wrong, if it is no such file.
+    """Points (n, 3), triangles (k, 3) and the axes that the file states (a field ``SPACE``, as Slicer writes it).
 
     Polygons are cut into fans of triangles, strips into their triangles; vertices and lines are left out.
+
+    Raises
+    ------
+    ValueError
+        With what is wrong, if it is no such file.
     """
     file = _File(path.read_bytes())
     points: list[Floats] = [np.empty((0, 3))]

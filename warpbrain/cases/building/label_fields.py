@@ -45,9 +45,20 @@ def label_volumes(image: Image) -> dict[int, float]:
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """What every voxel is: `OUTSIDE`, a tissue from 1 on, or `CAVITY` (i, j, k), where the voxels at the edge of the
-    grid are outside; how many tissues there are; the volume [mm3] that the user's labels give to each tissue and to
-    `CAVITY`, before anything was mended; and notes of what was mended."""
+    """What every voxel is.
+
+    Attributes
+    ----------
+    codes : (i, j, k) uint8 array
+        `OUTSIDE`, a tissue from 1 on, or `CAVITY`; the voxels at the edge of the grid are outside.
+    grid : Grid
+    tissues : int
+        How many there are.
+    labelled : dict of int to float
+        Volume [mm3] that the user's labels give to each tissue and to `CAVITY`, before anything was mended.
+    notes : tuple of str
+        What was mended.
+    """
 
     codes: Codes
     grid: Grid
@@ -57,10 +68,14 @@ class Regions:
 
 
 def make_regions(image: Image, assignment: Assignment) -> Regions:
-    """Sort the voxels of a volume into tissues, cavities and outside; `InputError` if the volume is none that a brain
-    can have.
+    """Sort the voxels of a volume into tissues, cavities and outside.
 
     Pieces apart from the largest are left out, and unlabelled voids inside get the nearest label: both are noted.
+
+    Raises
+    ------
+    InputError
+        If the volume is none that a brain can have.
     """
     from scipy import ndimage
 
@@ -128,9 +143,18 @@ BALANCING = 12
 
 @dataclass(frozen=True, eq=False)
 class LabelFields:
-    """Fields (i, j, k) on a grid in the world; see the module. `body` and `cavity` are positive inside the body with
-    its cavities, and inside the cavities; `tissues` are the presence of each, favours included: the largest one rules.
-    `in_place` is the share of the voxels of each tissue, and of `CAVITY`, that the fields give to it."""
+    """Fields on a grid in the world; see the module.
+
+    Attributes
+    ----------
+    body, cavity : (i, j, k) float32 arrays
+        Positive inside the body with its cavities, and inside the cavities.
+    tissues : list of (i, j, k) float32 arrays
+        Presence of each tissue, favours included: the largest one rules.
+    grid : Grid
+    in_place : dict of int to float
+        Share of the voxels of each tissue, and of `CAVITY`, that the fields give to it.
+    """
 
     body: Singles
     cavity: Singles

@@ -47,10 +47,22 @@ EASIER = 7.0
 
 @dataclass(frozen=True, eq=False)
 class LabelMesh:
-    """A mesh made from labels: points (n, 3), tetrahedra (m, 4) and tissue (m,) [mm, RAS], tissues with the numbers of
-    the assignment; the wanted mean edge [mm]; the volume [mm3] of the labels of each tissue, by number, and of the
-    cavities; the share of the voxels of each tissue that lie in that tissue of the mesh, before the cutting; its
-    fields; and notes of what was mended, left out or not reached."""
+    """A mesh made from labels.
+
+    Attributes
+    ----------
+    points, tetrahedra, tissue : (n, 3), (m, 4) and (m,) arrays
+        [mm, RAS]; tissues have the numbers of the assignment.
+    size : float
+        Wanted mean edge [mm].
+    labelled, labelled_cavity
+        Volume [mm3] of the labels of each tissue, by number, and of the cavities.
+    in_place : dict of int to float
+        Share of the voxels of each tissue that lie in that tissue of the mesh, before the cutting.
+    fields : LabelFields
+    notes : tuple of str
+        What was mended, left out or not reached.
+    """
 
     points: Floats
     tetrahedra: Ints

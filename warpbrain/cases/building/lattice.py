@@ -43,11 +43,24 @@ SNAP = 0.06
 def cut(
     points: Floats, tetrahedra: Ints, labels: Ints, field: Callable[[Floats], Floats]
 ) -> tuple[Floats, Ints, Ints, Bools]:
-    """Split every edge of tetrahedra (m, 4) with nodes (n, 3) that crosses the zero level of a field, there: the field
-    takes positions (k, 3) to values (k,), and labels (m,) are handed down to the pieces. Returns points, tetrahedra and
-    labels of the cut mesh, conforming and positively oriented if the given one is, and for each tetrahedron whether the
-    field is positive there.
+    """Split every edge that crosses the zero level, there.
 
+    Parameters
+    ----------
+    points, tetrahedra : (n, 3) and (m, 4) arrays
+    labels : (m,) array
+        Handed down to the pieces.
+    field : callable
+        From positions (k, 3) to values (k,).
+
+    Returns
+    -------
+    points, tetrahedra, labels, positive
+        The cut mesh, conforming and positively oriented if the given one is, and for each tetrahedron whether the field
+        is positive there.
+
+    Notes
+    -----
     Bisecting an edge splits every tetrahedron around it in two, which keeps the mesh conforming whatever the order.
     Here the crossed edges are bisected in order of their number. One tetrahedron has at most four of them and each
     piece inherits those that are left, so four rounds over all tetrahedra at once do all of it.

@@ -113,9 +113,16 @@ def remesh(cells: Cells, edge: float) -> Cells | None:
 def fit_size(cells: Cells, size: Size, edge: float, good: Callable[[Cells], Cells | None]) -> Cells:
     """Find the edge length that gives the wanted count, and a mesh there that is good.
 
-    Every trial starts from the fine mesh; `edge` is a first guess of the largest edge [mm]. `good` finishes a mesh of
-    the right size, and gives None if it is not good enough. The first good one met is returned; the search is
-    deterministic.
+    Parameters
+    ----------
+    cells : Cells
+        Fine mesh to start every trial from.
+    size : Size
+    edge : float
+        First guess of the largest edge [mm].
+    good : callable
+        Finishes a mesh of the right size; None if it is not good enough. The first good one met is returned; the search
+        is deterministic.
     """
     goal = 0.5 * (size.at_least + size.at_most)
     seen: list[tuple[float, int]] = []

@@ -248,10 +248,16 @@ STEPS = 32
 
 
 class IndividualWarp:
-    """An individual brain: the template moved by a smooth, invertible deformation of a few millimetres, of a root mean
-    square `amplitude` in space [mm]; the same for the same seed.
+    """An individual brain: the template moved by a smooth, invertible deformation of a few millimetres.
 
     It is the flow for unit time of a velocity field that is a sum of long sine waves.
+
+    Parameters
+    ----------
+    seed : int
+        Same seed, same deformation.
+    amplitude : float
+        Root mean square displacement in space [mm].
     """
 
     def __init__(self, seed: int, amplitude: float) -> None:

@@ -43,8 +43,24 @@ def parse_toml(file: Path, problems: Problems) -> dict[str, Any] | None:
 
 
 class Reading:
-    """A table of a file: the values that are right, with every fault noted as a problem. `where` is how a message calls
-    it: ``"tissue.1"``, ``"boundary 2"``; `variant` is which of the table's variants it is, None if that cannot be told.
+    """A table of a file: the values that are right, with every fault noted as a problem.
+
+    Parameters
+    ----------
+    table : Table
+        What it may say.
+    values : Any
+        What the file has there.
+    context : Context
+    where : str
+        How a message calls it: ``"tissue.1"``, ``"boundary 2"``.
+    problems : Problems
+        Where faults go.
+
+    Attributes
+    ----------
+    variant : str or None
+        Which of the table's variants it is; None if that cannot be told.
     """
 
     def __init__(self, table: Table, values: Any, context: Context, where: str, problems: Problems) -> None:
@@ -152,8 +168,20 @@ def _file_of(folder: Path, name: str) -> tuple[Path | None, str]:
 
 @dataclass
 class Context:
-    """Where a case is being read from, and what was found wrong so far: the `case.toml`, its top level, problems, the
-    frame of every file in the folder, and the whole anatomy; None if it could not be read."""
+    """Where a case is being read from, and what was found wrong so far.
+
+    Attributes
+    ----------
+    file : Path
+        The `case.toml`.
+    tables : dict
+        Its top level.
+    problems : Problems
+    frame : Frame
+        Of every file in the folder.
+    mesh : TetMesh or None
+        The whole anatomy; None if it could not be read.
+    """
 
     file: Path
     tables: dict[str, Any]

@@ -20,8 +20,18 @@ _CURES = {"gravity_axis": "gravity_axis = [0, -1, 0] for a patient who lies on t
 def read_mechanisms(
     context: Context, named: Named | None, axis: tuple[float, float, float] | None, density: float
 ) -> tuple[Mechanism, ...]:
-    """Mechanisms in the order of the file, as far as they are right. `named` gains what they name, and is None if there
-    is no mesh; the axis is where 'down' is, the density is in kg/m3."""
+    """Mechanisms in the order of the file, as far as they are right.
+
+    Parameters
+    ----------
+    context : Context
+    named : Named or None
+        The mesh and what can be named; gains what the mechanisms name. None if there is no mesh.
+    axis : (float, float, float) or None
+        Where 'down' is.
+    density : float
+        [kg/m3]
+    """
     acting: dict[int, Mechanism] = {}
     kinds: set[str] = set()
     # all others act on what is left by those that remove elements

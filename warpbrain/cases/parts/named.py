@@ -36,9 +36,15 @@ _DIRECTIONS = (".csv", ".npy", ".vtu", ".vtk", ".xdmf", ".msh")
 class Named:
     """Looks up what a key names, and adds to the mesh what comes from elsewhere.
 
-    The mesh is the whole anatomy; it gains an element set for each tissue that is named as one, the nodes of the wall
-    of each element set that is named as a node set, sets of nodes and vectors of elements from files. The frame is that
-    of the files.
+    Attributes
+    ----------
+    mesh : TetMesh
+        The whole anatomy; it gains an element set for each tissue that is named as one, the nodes of the wall of each
+        element set that is named as a node set, sets of nodes and vectors of elements from files.
+    tissues : mapping of int to Tissue
+    frame : Frame
+        Of the files.
+    problems : Problems
     """
 
     mesh: TetMesh
@@ -48,7 +54,13 @@ class Named:
 
     def nodes(self, table: Reading, found: MeshInFile) -> str | None:
         """Name of the node set that the key `nodes` of a table names; None, and a problem noted, if there is none.
-        `found` says how the file of the mesh numbers its nodes."""
+
+        Parameters
+        ----------
+        table : Reading
+        found : MeshInFile
+            How the file of the mesh numbers its nodes.
+        """
         if not table.has("nodes"):
             return None
         name: str = table.get("nodes")
@@ -75,11 +87,19 @@ class Named:
         return name
 
     def look_up(self, kind: str, name: str, path_of: Callable[[], Path | None]) -> str | ClosedSurface | None:
-        """What a mechanism takes for a name of a kind of `warpbrain.physics.mechanism.KINDS`; None, and a problem
-        noted, if a file is missing or wrong.
+        """What a mechanism takes for a name of a kind of `warpbrain.physics.mechanism.KINDS`.
 
-        `path_of` gives the file of that name; None, and the problem noted, if there is none. A name of nothing is
-        returned as it is: the mechanism says what the mesh has.
+        Parameters
+        ----------
+        kind, name : str
+        path_of : callable
+            The file of that name; None, and the problem noted, if there is none.
+
+        Returns
+        -------
+        str, ClosedSurface or None
+            None, and a problem noted, if a file is missing or wrong. A name of nothing is returned as it is: the
+            mechanism says what the mesh has.
         """
         if kind == "element set" or (kind == "node set" and name not in self.mesh.node_sets):
             self._take_tissue(name)
