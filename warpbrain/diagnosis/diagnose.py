@@ -123,7 +123,8 @@ class Diagnosing:
             for _ in range(_ROUNDS):
                 by_posterior = _decided(search)
                 checked = self._checked(search, confirming, if_significant(by_posterior, p_value, options.alpha))
-                # checks fit sets without what is named: where these are better than was thought the verdict is another
+                # checks fit sets that the linear model had weighed alone: with other evidence of them the verdict of
+                # least expected loss may be another one
                 if _decided(search) == by_posterior:
                     break
             best, named = checked.best, checked.named

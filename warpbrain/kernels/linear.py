@@ -336,8 +336,8 @@ def conjugate_gradient(
 ) -> type[ConjugateGradient]:
     """Conjugate gradients for a device: as one launch on a GPU, as one kernel on the cores of a CPU.
 
-    Those know blocks alone, and their diagonal. For all else, and GPUs whose blocks cannot wait, there is Warp's loop.
-    `only_blocks`: no part of the matrix is in no block.
+    Both need a matrix that is assembled into 3 x 3 blocks as a whole (`only_blocks`), and precondition by its diagonal
+    blocks. Otherwise, and on GPUs on which blocks of threads cannot wait for each other, it is Warp's loop.
     """
     if not only_blocks or preconditioner == "fsai":
         return WarpGradient

@@ -18,6 +18,7 @@ from warpbrain.mesh.surface import (
     face_vectors,
     in_rows,
     interface_faces,
+    node_vectors,
     nodes_of,
 )
 from warpbrain.mesh.tet_mesh import TetMesh
@@ -183,8 +184,6 @@ def wall_nodes(mesh: TetMesh, elements: str) -> Bools:
 
 def vertex_normals(mesh: TetMesh) -> Floats:
     """Outward unit normals (n, 3) at the nodes of the boundary, means over their faces; zero at all other nodes."""
-    faces = mesh.boundary
-    normals = np.zeros_like(mesh.points)
-    np.add.at(normals, faces.ravel(), np.repeat(face_vectors(mesh.points, faces), 3, axis=0))
+    normals = node_vectors(mesh.points, mesh.boundary)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0))

@@ -249,6 +249,13 @@ def face_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:
     return np.asarray(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]) / 2.0)
 
 
+def node_vectors(points: ArrayLike, faces: ArrayLike) -> Floats:
+    """Sum (n, 3) of the area vectors of all triangles (b, 3) at each node (n, 3); zero where there is no triangle."""
+    total = np.zeros(np.shape(points))
+    np.add.at(total, np.asarray(faces).ravel(), np.repeat(face_vectors(points, faces), 3, axis=0))
+    return total
+
+
 def tangents(normals: ArrayLike) -> Floats:
     """Two unit vectors (..., 2, 3) at right angles to directions (..., 3), and to each other."""
     return np.asarray(np.linalg.svd(np.asarray(normals, dtype=np.float64)[..., None, :])[2][..., 1:, :])

@@ -10,8 +10,8 @@ class Expectation:
     """A distribution of one number, normal or uniform in it or in its logarithm, in the unit of its parameter."""
 
     words: str
-    start: float
-    width: float  # of a logarithm the factor
+    start: float  # median of a normal one, lower end of a uniform one
+    width: float  # standard deviation, or distance of the ends; of a logarithm as a factor
     is_normal: bool
     is_logarithmic: bool = False
 

@@ -127,7 +127,6 @@ class System:
         self.size, self.elements = len(self.node_mesh.points), len(self.mesh.tetrahedra)
         self.constrained: Bools = model.constrained
         self.movable: Bools = np.asarray(~model.constrained.all(axis=1))
-        self._averages, self._mixes = model.elements == "tet4-averaged", model.elements == "tet10-mixed"
         self._kernels = assembly_kernels(self.precision)
         self._place_mesh()
         # of each element; terms ask for them
@@ -217,6 +216,14 @@ class System:
     def once(self, kind: str, arrays: Sequence[NDArray[Any]], make: Callable[[], T]) -> T:
         """See `Assembly.once`."""
         return self.assembly.once(kind, arrays, make)
+
+    @property
+    def _averages(self) -> bool:
+        return self.model.elements == "tet4-averaged"
+
+    @property
+    def _mixes(self) -> bool:
+        return self.model.elements == "tet10-mixed"
 
     @staticmethod
     def _grouped(model: Model) -> dict[tuple[type[Law], str], dict[int, Material]]:

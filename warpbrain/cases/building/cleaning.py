@@ -13,7 +13,7 @@ from warpbrain.cases.building.lattice import cut
 from warpbrain.cases.building.mmg import Cells, remesh
 from warpbrain.mesh import boundary_faces, pinched_nodes, split_boundary
 from warpbrain.mesh.quality import components, dihedral_angles, measure_arrays
-from warpbrain.mesh.surface import FACES, face_vectors, interface_faces, paired_faces
+from warpbrain.mesh.surface import FACES, face_vectors, interface_faces, node_vectors, paired_faces
 from warpbrain.mesh.tet_mesh import signed_volumes
 
 # pieces of a tissue smaller than this [mm3, template] go to their neighbour
@@ -191,8 +191,7 @@ def _normals(cells: Cells) -> list[Floats]:
         interface_faces(cells.tetrahedra, cells.labels % 10),
         interface_faces(cells.tetrahedra, cells.labels // 10),
     ):
-        total = np.zeros_like(cells.points)
-        np.add.at(total, faces.ravel(), np.repeat(face_vectors(cells.points, faces), 3, axis=0))
+        total = node_vectors(cells.points, faces)
         for node in np.unique(faces):
             length = np.linalg.norm(total[node])
             if length > 0:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.building.errors import BuildError
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.surface import face_vectors, interface_faces, nodes_of, split_boundary
+from warpbrain.mesh.surface import face_vectors, interface_faces, node_vectors, nodes_of, split_boundary
 
 # superior cap: depth under the highest point, and how much the surface there faces up (not the walls of the fissure)
 CAP_DEPTH = 15.0
@@ -91,8 +91,7 @@ def first_sets(
 
 def _facing_up(points: Floats, faces: NDArray[np.integer[Any]]) -> Floats:
     """How much the surface faces up at each node (n,): 1 up, -1 down, 0 where there are no faces."""
-    total = np.zeros_like(points)
-    np.add.at(total, faces.ravel(), np.repeat(face_vectors(points, faces), 3, axis=0))
+    total = node_vectors(points, faces)
     return np.asarray(total[:, 2] / np.maximum(np.linalg.norm(total, axis=1), np.finfo(float).tiny))
 
 

@@ -114,7 +114,7 @@ class Gravity(BodyForce, Mechanism):
         "cavity": "What has been taken out weighs nothing.",
         "resection": "Levels are counted from the lowest point of the whole anatomy.",
     }
-    sentence: ClassVar[str] = "The body sinks under weight that no fluid carries: it drained, or the body is in air."
+    sentence: ClassVar[str] = "The body sinks under weight that no fluid carries, in air or where fluid has drained."
     example: ClassVar[str] = "gravity:level=130"
 
     def __post_init__(self) -> None:

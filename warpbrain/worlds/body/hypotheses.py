@@ -46,7 +46,8 @@ _PLACES, _SETS = 20, 12
 _ELSEWHERE = 2
 #: Places of each cause whose columns are made anew about a fit.
 _PLACES_ABOUT_FIT = 8
-#: How often at most a set is fitted, or its supersets are weighed; twice as often what the verdict rests on.
+#: How often at most a set is fitted, or its supersets are weighed, as long as any set may be chosen; and as often again
+#: for the set that the verdict rests on, which may be another one after each fit.
 _MOST = 10
 #: By how much [nats] another optimum is better that is worth a fit.
 _BETTER = 1.0

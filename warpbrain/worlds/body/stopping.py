@@ -32,7 +32,7 @@ def next_to_fit(
     """The set that is fitted next, or whose supersets are weighed next if it is fitted; None to stop.
 
     `sets`: the most probable first. `probabilities` (s,). `expanded`: fitted sets whose supersets were weighed about
-    their fit. `rivals`: False if only what the verdict rests on is still worth it.
+    their fit. `rivals`: whether sets that the verdict does not rest on may be chosen, too.
     """
     decision, _ = _decide(sets)
     named = [candidate for candidate in sets if frozenset(candidate.mechanisms) == frozenset(decision.causes)]
@@ -61,7 +61,7 @@ def bend_of(base: Base) -> float:
     """
     sensors, size = base.declared.sensors, base.at.system.model.mesh.volume ** (1.0 / 3.0)
     rows = sensors.is_displacement & ~sensors.of_surfaces
-    # how far does not depend on the axes
+    # squared lengths of displacements, which are the same in all axes
     squares = np.bincount(sensors.groups[rows], (sensors.residual + sensors.computed)[rows] ** 2)
     return float(squares.max(initial=0.0)) / size**2
 
@@ -114,14 +114,15 @@ def _part_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> Weighte
 
 
 def _unknown_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> WeightedSet | None:
-    """The set that a verdict of an unknown rests on, or that without it, if it was not fitted; None if they were.
+    """The likeliest set with an unknown force and no mechanism, else the same without that force, if it was not fitted.
 
-    What a rigid motion does to second order looks like an unknown force in the linear model.
+    None if both were, or the verdict is another one. In the linear model, what a finite rigid rotation does to second
+    order looks like an unknown force.
     """
     if decision.verdict != UNKNOWN:
         return None
     without_names = (candidate for candidate in sets if UNKNOWN in candidate.names and not candidate.mechanisms)
-    likely = next(without_names).names
+    likely = next((candidate.names for candidate in without_names), frozenset())
     parts = (candidate for candidate in sets if candidate.names in (likely, likely - {UNKNOWN}))
     return next((part for part in parts if part.refit is None and not part.failure), None)
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference.beliefs import belief
-from warpbrain.mesh import face_vectors, node_areas
+from warpbrain.mesh import node_areas, node_vectors
 from warpbrain.physics.words import number
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -42,7 +42,7 @@ def _patches(
 def _weights(
     at: Linearisation, places: Floats, shares: Floats, length: float, spacing: float | None = None
 ) -> tuple[Floats, Floats]:
-    """Sites (s, 3) [m], and what nodes with these shares (N,) have of a Gaussian about each: (N, s)."""
+    """Sites (s, 3) [m], and Gaussians (N, s) about them at the nodes, of height 1, times the shares of nodes (N,)."""
     from scipy.spatial.distance import cdist
 
     points = at.system.model.mesh.points
@@ -68,25 +68,23 @@ def tractions(at: Linearisation, length: float) -> Floats:
 
 
 def pressures(at: Linearisation, length: float) -> Floats:
-    """Columns (n, k) of a pressure of a length [m] on the same, along the normals of the deformed surface."""
+    """Columns (n, k) of a pressure of a length [m] on what is free of the deformed surface; (n, 0) if nothing is."""
     mesh, free = at.system.model.mesh, _free_of_surface(at)
     if not free.any():
         return np.zeros((len(at.sensors), 0))
     _, weights = _weights(at, mesh.points[free], free.astype(np.float64), length)
-    thirds = np.repeat(face_vectors(mesh.points + at.u, mesh.boundary) / 3.0, 3, axis=0)
-    normals = np.stack(
-        [np.bincount(mesh.boundary.ravel(), weights=along, minlength=len(mesh.points)) for along in thirds.T], axis=1
-    )
-    forces = (normals[:, :, None] * weights[:, None]).reshape(normals.size, -1)
+    # each corner of a face bears a third of its load
+    of_unit_pressure = node_vectors(mesh.points + at.u, mesh.boundary) / 3.0
+    forces = (of_unit_pressure[:, :, None] * weights[:, None]).reshape(of_unit_pressure.size, -1)
     return _visible_modes(at.answers_of_columns(forces), at.sensors.is_displacement)
 
 
 def _free_of_surface(at: Linearisation) -> Bools:
     """Nodes (N,) on the surface that are not held."""
-    mesh = at.system.model.mesh
-    free: Bools = np.asarray(~at.system.model.constrained.reshape(-1, 3).all(axis=1))
-    free[np.setdiff1d(np.arange(len(free)), mesh.boundary)] = False
-    return np.asarray(free)
+    model = at.system.model
+    on_surface = np.zeros(len(model.mesh.points), dtype=bool)
+    on_surface[model.mesh.boundary] = True
+    return np.asarray(on_surface & ~model.constrained.reshape(-1, 3).all(axis=1))
 
 
 def eigenstresses(at: Linearisation, length: float) -> Floats:
