@@ -123,7 +123,8 @@ def test_what_was_not_weighed_is_fitted_from_more(pair):
     without._sets = {names: one for names, one in pair._sets.items() if "gravity" not in names or one is both}
     refitted = without.fitted_with(frozenset(("gravity",)), both)
     expected = pair.get(("gravity",))
-    np.testing.assert_allclose(refitted.refit.log_evidence, expected.refit.log_evidence, atol=1e-3)
+    # begun elsewhere, to what a fit is not repeated for
+    np.testing.assert_allclose(refitted.refit.log_evidence, expected.refit.log_evidence, atol=0.05)
     # less what the places of both causes cost
     cost = both.refit.log_evidence - both.hypothesis.log_evidence
     np.testing.assert_allclose(refitted.refit.log_evidence - refitted.hypothesis.log_evidence, cost, atol=1e-6)
@@ -132,7 +133,7 @@ def test_what_was_not_weighed_is_fitted_from_more(pair):
 
 def test_causes_are_checked_beside_those_that_explain_more(pair):
     both = pair.get(("gravity", "swelling"))
-    weight, swelling = Confirming(pair, 100, np.random.default_rng(0)).confirmations(both)
+    weight, swelling = Confirming(pair, 100, np.random.default_rng(0), 0.05).confirmations(both)
     assert (weight.name, swelling.name) == ("gravity", "swelling")
     # the weight beside nothing, the swelling beside the weight
     evidence = [pair.get(names).hypothesis.log_evidence for names in ((), ("gravity",), ("gravity", "swelling"))]

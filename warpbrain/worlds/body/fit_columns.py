@@ -53,21 +53,16 @@ def columns_about(
     base: Base,
     mesh_errors: MeshErrors | None,
     mesh_share: MeshShare | None,
-) -> tuple[Floats, Linearisation | None]:
+) -> tuple[Floats, Linearisation]:
     """Columns of tissue, field, law and mechanisms about a state; the others as they are.
 
     What the shape of a law does is next to nothing where strains are small: about the base, which nothing but declared
     loads deforms. It is not where a mechanism strains tissue by half, and would be taken for a cause.
 
     `z` (q,): its coordinates. `columns` (n, q): about another state. `mesh_share`: that is taken off the residuals.
-    Returns columns (n, q), those that were given if the state cannot be linearised, and the linear model if it was
-    linearised. `SolveError` if a mechanism is not linear there.
+    Returns columns (n, q), and the linear model. `SolveError` if the state is unstable or a mechanism not linear there.
     """
-    try:
-        at = state.linearised()
-    except SolveError:
-        return columns, None
-    columns = columns.copy()
+    at, columns = state.linearised(), columns.copy()
     relaxed = _relaxation_factor(effects, [z[part] for part in layout.effects], state.sensors)
     tissue = relaxed * tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
     columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)

@@ -33,16 +33,21 @@ from warpbrain.worlds.body.weighted_set import MeshShare, Refit, evidence_of, ex
 _ITERATIONS, _HALVINGS = 20, 6
 #: How far [standard deviations] coordinates go until columns are made anew.
 _RELINEARISE = 0.3
+#: The same where the search ends: which step is the last one, rounding may decide, and it must not matter.
+_NEAR = 0.1
 #: Step [standard deviations] of a difference between states.
 _DIFFERENCE = 0.05
 #: Earlier states from which the next one is extrapolated at most.
 _KEPT = 9
-#: Steps shorter than this in standard deviations of the prior end the search.
-_SHORT = 0.03
+#: Steps that are expected to gain less of the log posterior density than this end the search (half the square of
+#: Newton's decrement, Boyd and Vandenberghe 2004, section 9.5.1).
+_ENOUGH = 0.02
+#: Part of what a step was expected to gain below which columns that were made elsewhere are made anew.
+_AGREES = 0.5
 #: By how much an error of the mesh changes that is worth going on [standard deviations: of the noise, all sensors
 #: together, and of what is not known of that error].
 _MATTERS = 0.3
-#: How often at most a fit is repeated with the error of the mesh, or the gross errors and the noise, of its result.
+#: How often at most a fit is repeated with laws, error of the mesh, gross errors and noise of its result.
 _ROUNDS = 3
 #: Change of the log evidence below which the fit is not repeated again.
 _SAME = 0.1
@@ -89,6 +94,8 @@ class FitSearch:
         # of the last state of this fit that was followed over time
         self._course: tuple[Floats, ...] = ()
         self.columns = columns
+        # columns of the shape of laws about the state that was linearised last
+        self._laws_there = columns[:, self._layout.law]
         self.state, self.converged = base.state, False
         self.z, self.residual, self._best = np.zeros(self.columns.shape[1]), np.zeros(len(self._U)), np.inf
 
@@ -149,36 +156,48 @@ class FitSearch:
                 return
 
     def minimise(self) -> None:
+        """Go to the best point nearby, where what the shape of laws does is that of the point."""
+        for _ in range(_ROUNDS):
+            self._minimise_with_these_laws()
+            if not self._update_laws():
+                return
+
+    def _minimise_with_these_laws(self) -> None:
         """Go to the best point nearby by Gauss-Newton's method, with columns made anew on the way.
 
         Where something relaxes, columns of a state that does not help are replaced by differences of states: tissue
         that is several times as stiff at first is no small change of what it is in the end.
         """
-        self.converged, by_differences = False, False
+        self.converged, by_differences, elsewhere = False, False, np.full(len(self.z), np.inf)
         for iteration in range(_ITERATIONS):
-            moved = np.abs(self.z - self._linearised_at)[self._layout.nonlinear].max(initial=0.0)
-            if self._outdated or (iteration > 0 and moved > _RELINEARISE):
+            if self._outdated or (iteration > 0 and self._moved() > _RELINEARISE):
                 self._relinearise()
                 if by_differences:
                     self.columns = self._difference_columns()
             self.columns = self._rigid.renewed(self.columns, self.state.sensors, self.z)
-            step, current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
-            if np.abs(step).max() < _SHORT:
-                self.converged = True
-                return
-            if not self._line_search(step):
-                if not current and np.abs(step).max() >= 2.0 * _SHORT:
-                    # columns that were made elsewhere may point uphill
-                    self._linearised_at = np.full(len(self.z), np.inf)
-                    continue
+            (step, gain), current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
+            if gain < _ENOUGH:
+                self.converged = not _NEAR < self._moved() < np.inf
+                if self.converged:
+                    return
+                self._linearised_at = elsewhere
+                continue
+            before = self._best
+            gained = before - self._best if self._line_search(step) else 0.0
+            if not current and gained < _AGREES * gain:
+                # columns that were made elsewhere may point uphill
+                self._linearised_at = elsewhere
+            elif gained < _ENOUGH:
                 # what is left is rounding, or no better point lies this way: the last good one stands
-                self.converged = bool(np.abs(step).max() < 2.0 * _SHORT)
+                self.converged = gain < _SAME
                 relaxing = any(effect.proposed.history for effect in self.effects)
                 if self.converged or by_differences or not relaxing:
                     return
-                by_differences, self._linearised_at = True, np.full(len(self.z), np.inf)
-            if self.converged:
-                return
+                by_differences, self._linearised_at = True, elsewhere
+
+    def _moved(self) -> float:
+        """How far the best point is from where its columns were made [standard deviations]; infinite if not known."""
+        return float(np.abs(self.z - self._linearised_at)[self._layout.nonlinear].max(initial=0.0))
 
     def update_noise(self, fit: Refit) -> bool:
         """Take noise, gross errors and the mesh's unknown error of a result; whether it was fitted with others."""
@@ -256,8 +275,27 @@ class FitSearch:
             self._mesh_share,
         )
 
-    def _gauss_newton_step(self, field_stays: bool) -> Floats:
-        """The step; without the stiffness field, whose columns are rough where something relaxes, if that stays.
+    def _update_laws(self) -> bool:
+        """Take what the shape of laws does where it was linearised last; whether it was taken elsewhere before.
+
+        It acts linearly, and stays as it is while a best point is looked for: otherwise the objective would be another
+        one at each point.
+        """
+        law, columns = self._layout.law, self._laws_there
+        before = self._U[:, law]
+        if np.array_equal(before, columns):
+            return False
+        residual = self.residual + (before - columns) @ self.z[law]
+        self._U, self.columns = self._U.copy(), self.columns.copy()
+        self._U[:, law] = self.columns[:, law] = columns
+        self._best = np.inf
+        self._accept_if_better(self.z, self.state, residual)
+        return True
+
+    def _gauss_newton_step(self, field_stays: bool) -> tuple[Floats, float]:
+        """The step and what it gains in the linear model.
+
+        Without the stiffness field, whose columns are rough where something relaxes, if that stays.
 
         Coordinates at a limit that the step would leave stay there (projected Newton, Bertsekas 1982): clipped with the
         others as they are, the step need not be downhill.
@@ -274,19 +312,18 @@ class FitSearch:
             step[kept] = np.linalg.solve(np.eye(len(kept)) + W[:, kept].T @ W[:, kept], gradient[kept])
             leaving = free & limited & (step * self.z > 0.0)
             if not leaving.any():
-                return step
+                return step, 0.5 * float(gradient @ step)
             free &= ~leaving
 
     def _line_search(self, step: Floats) -> bool:
         """Go along a step, halved until it is downhill; whether any of it was."""
         for _ in range(_HALVINGS):
-            before, trial = self.z, self._clipped(self.z + step)
+            trial = self._clipped(self.z + step)
             try:
                 better = self._accept_if_better(trial, *self._evaluate(trial, self.state))
             except (SolveError, InputError):
                 better = False
             if better:
-                self.converged = bool(np.abs(trial - before).max() < _SHORT)
                 return True
             step = 0.5 * step
         return False
@@ -352,25 +389,19 @@ class FitSearch:
         return state
 
     def _relinearise(self) -> None:
-        """Make the columns of tissue, field, law and mechanisms anew at the best point."""
-        self.columns, at = columns_about(
-            self.state,
-            self.z,
-            self.columns,
-            self._layout,
-            self.effects,
-            self._base,
-            self.mesh_errors,
-            self._mesh_share,
-        )
-        self._nearby = self._nearby if at is None else at
+        """Make the columns of tissue, field and mechanisms anew at the best point; not where these are not linear."""
         self._linearised_at, self._outdated = self.z, False
-        # laws act linearly: of what they do, that about the new state
+        base, share = self._base, self._mesh_share
+        try:
+            columns, at = columns_about(
+                self.state, self.z, self.columns, self._layout, self.effects, base, self.mesh_errors, share
+            )
+        except SolveError:
+            return
         law = self._layout.law
-        before, self._U = self._U, self._U.copy()
-        self._U[:, law] = self.columns[:, law]
-        self._best = np.inf
-        self._accept_if_better(self.z, self.state, self.residual + (before - self._U)[:, law] @ self.z[law])
+        self._nearby, self._laws_there = at, columns[:, law].copy()
+        columns[:, law] = self._U[:, law]
+        self.columns = columns
 
     def _difference_columns(self) -> Floats:
         """Columns with those of tissue and mechanisms as differences between states."""
