@@ -84,7 +84,7 @@ def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianMode
         return Onset(0.0, float(times[0]), None, OF_ITS_OWN)
     courses = time_courses(base.states.times)
     per_interval = np.bincount([course.interval for course in courses])
-    cause = cause or unknown_cause(base, [np.ones(len(residual))])
+    cause = cause or unknown_cause(base, [np.ones((len(residual), 1))])
     evidence = [
         _log_evidence(cause, factor_of_rows(course, base.at.sensors), model, residual)
         - float(np.log(per_interval[course.interval]))

@@ -21,7 +21,7 @@ from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import Nuisances
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
-from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses
+from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses, modes_of_rows
 
 UNKNOWN = "unknown"
 #: What each means, in a sentence.
@@ -109,17 +109,23 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
         # a mechanism with an expected size, such as a weight, has that one
         has_mean = any(place.mean is not None for place in places)
         causes.append(Cause(kind, places, math.log(belief("causes.mechanism")), unit_sizes if has_mean else sizes))
-    # setting in at any recorded time
-    courses = main_courses(base.states.times)
-    factors = [factor_of_rows(course, base.at.sensors) for course in courses]
+    # setting in at any recorded time, or changing from one to the next as mechanisms may
+    times, sensors = base.states.times, base.at.sensors
+    factors = [factor_of_rows(course, sensors)[:, None] for course in main_courses(times)]
+    if len(times) > 1:
+        factors.append(modes_of_rows(times, sensors))
     causes.append(unknown_cause(base, [factor for factor in factors if factor.any()]))
     return BodyCauses(tuple(causes), candidates.effects)
 
 
 def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:
-    """Unknown fields of every kind and length, with each of some factors (n,) on the rows."""
+    """Unknown fields of every kind and length, with each of some courses: factors (n, r) of its modes on the rows."""
     noise = base.typical_noise
-    places = tuple(Place(noise * factor[:, None] * columns) for columns in base.unknown.values() for factor in factors)
+    places = tuple(
+        Place(noise * (columns[:, :, None] * factor[:, None]).reshape(len(columns), -1))
+        for columns in base.unknown.values()
+        for factor in factors
+    )
     return Cause(UNKNOWN, places, math.log(belief("causes.unknown")), beliefs("unknown.sizes"), Kind.UNKNOWN)
 
 

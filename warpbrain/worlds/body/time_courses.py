@@ -71,9 +71,21 @@ def finite_times(times: Floats) -> Floats:
 
 def factor_of_rows(course: TimeCourse, sensors: Sensors) -> Floats:
     """Part (n,) of the full size by which each row differs from the state that it is counted from."""
-    times = np.concatenate([sensors.times, sensors.references])
-    after, before = np.split(course.factor(finite_times(times)), 2)
-    return np.where(sensors.before < 0, after, after - before)
+    times = finite_times(np.concatenate([sensors.times, sensors.references]))
+    return _since_reference(course.factor(times)[:, None], sensors)[:, 0]
+
+
+def modes_of_rows(times: Sequence[float], sensors: Sensors) -> Floats:
+    """Modes (n, r) on rows of a cause that changes from one of several times [s] to the next."""
+    ends, modes = finite_times(np.array(times)), modes_of(len(times))
+    seconds = finite_times(np.concatenate([sensors.times, sensors.references]))
+    return _since_reference(np.stack([np.interp(seconds, ends, mode) for mode in modes.T], axis=1), sensors)
+
+
+def _since_reference(factors: Floats, sensors: Sensors) -> Floats:
+    """Factors (2 n, r) at the times of rows and then at those of what they are counted from: their change (n, r)."""
+    after, before = np.split(factors, 2)
+    return np.where(sensors.before[:, None] < 0, after, after - before)
 
 
 def main_courses(times: Sequence[float]) -> list[TimeCourse]:
