@@ -120,11 +120,11 @@ class HeldOut:
 class Confirming:
     """Checks the sets of one search.
 
-    `draws`: of rows from each model.
+    `draws`: of rows from each model at first. `alpha`: with which p-values are compared.
     """
 
-    def __init__(self, search: HypothesisSearch, draws: int, random: np.random.Generator) -> None:
-        self.search, self._draws, self._random = search, draws, random
+    def __init__(self, search: HypothesisSearch, draws: int, random: np.random.Generator, alpha: float) -> None:
+        self.search, self._draws, self._random, self._alpha = search, draws, random, alpha
         sensors = search.base.at.sensors
         self._held_out = {local: HeldOut(sensors, local) for local in (False, True)}
         #: Columns (n, m) of a smooth force as large as the noise, of which random patterns are mixtures.
@@ -138,15 +138,16 @@ class Confirming:
         takes the Bayes factor of all causes, each with gross errors of its own, which is `b` or more with a probability
         of `1 / b` at most if none acts (Markov's inequality).
         """
-        by_draws = self._predictive_p(nothing.marginal.model, nothing.residual, mechanisms=True)
+        levels = [level / 2.0 for level in (self._alpha, belief("fits.significance"))]
+        by_draws = self._predictive_p(nothing, True, levels)
         bound = float(np.exp(-max(self.search.log_bayes_factor, 0.0) / calibration().temperature))
         return min(1.0, 2.0 * min(by_draws, bound))
 
     def p_left(self, weighted_set: WeightedSet) -> float:
         """p-value of the hypothesis that a set is all that acts, against unknown fields."""
-        return self._predictive_p(weighted_set.marginal.model, weighted_set.residual, mechanisms=False)
+        return self._predictive_p(weighted_set, False, [self._alpha])
 
-    def _predictive_p(self, model: GaussianModel, residual: Floats, mechanisms: bool) -> float:
+    def _predictive_p(self, weighted_set: WeightedSet, mechanisms: bool, levels: Sequence[float]) -> float:
         fields, weights = [], []
         for cause in self.search.causes.causes:
             if cause.kind is Kind.UNKNOWN or (mechanisms and cause.kind is Kind.PHYSICS):
@@ -157,7 +158,8 @@ class Confirming:
                 fields += columns
                 weights += [-np.log(len(columns))] * len(columns)
         logs = np.array(weights) - np.logaddexp.reduce(weights)
-        return predictive_p(model, fields, beliefs("unknown.sizes"), residual, self._draws, self._random, logs)
+        model, residual, sizes = weighted_set.marginal.model, weighted_set.residual, beliefs("unknown.sizes")
+        return predictive_p(model, fields, sizes, residual, self._draws, self._random, logs, levels)
 
     def held_out_for(self, weighted_set: WeightedSet) -> HeldOut:
         """Held-out blocks for a set: scattered points if all its effects are local, else regions."""

@@ -107,7 +107,7 @@ class Diagnosing:
             mechanisms=options.candidates,
             timed=self.seconds.of,
         )
-        confirming = Confirming(search, options.draws, random)
+        confirming = Confirming(search, options.draws, random, options.alpha)
         nothing = search.nothing
         with self.seconds.of("significance"):
             p_value = confirming.p_of_nothing(nothing)

@@ -14,6 +14,9 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.gaussian import GaussianModel
 
+#: Standard errors that a p-value is to be away from a level, and how many times the draws are made for that at most.
+_DEVIATIONS, _MOST_DRAWS = 3.0, 16
+
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
@@ -113,11 +116,22 @@ def predictive_p(
     draws: int,
     random: np.random.Generator,
     weights: Floats | None = None,
+    levels: Sequence[float] = (),
 ) -> float:
-    """Probability that the Bayes factor of `log_factors_of_fields` is as large in rows drawn from the model."""
-    drawn = np.column_stack([residual, model.draws(draws, random)])
-    statistic = log_factors_of_fields(model, fields, sizes, drawn, weights)
-    return p_value(statistic[0], statistic[1:])
+    """Probability that the Bayes factor of `log_factors_of_fields` is as large in rows drawn from the model.
+
+    `draws`: of rows, at first; as many again as there are until each of the `levels` that it is compared with is
+    farther off than what draws leave uncertain, or there are `_MOST_DRAWS` times as many.
+    """
+    observed = log_factors_of_fields(model, fields, sizes, residual[:, None], weights)[0]
+    drawn = np.zeros(0)
+    while True:
+        rows = model.draws(max(draws, len(drawn)), random)
+        drawn = np.concatenate([drawn, log_factors_of_fields(model, fields, sizes, rows, weights)])
+        p = p_value(observed, drawn)
+        uncertain = _DEVIATIONS * np.sqrt(p * (1.0 - p) / len(drawn))
+        if all(abs(p - level) > uncertain for level in levels) or len(drawn) >= _MOST_DRAWS * draws:
+            return p
 
 
 def p_value(observed: float, drawn: Sequence[float] | Floats) -> float:

@@ -51,10 +51,13 @@ class _Predicted:
 
 
 class Checker:
-    """Checks fits of one diagnosis by all recorded rows, with some draws of rows in which nothing is left."""
+    """Checks fits of one diagnosis by all recorded rows.
 
-    def __init__(self, sets: Sets, protocol: Protocol, draws: int, random: np.random.Generator) -> None:
-        self.sets, self.protocol, self._draws, self._random = sets, protocol, draws, random
+    `draws`: of rows in which nothing is left, at first. `alpha`: with which p-values are compared.
+    """
+
+    def __init__(self, sets: Sets, protocol: Protocol, draws: int, random: np.random.Generator, alpha: float) -> None:
+        self.sets, self.protocol, self._draws, self._random, self._alpha = sets, protocol, draws, random, alpha
         self.folds = folds_of(protocol.thinned)
         self._predictions: dict[Fit, _Predicted] = {}
 
@@ -65,7 +68,7 @@ class Checker:
         """
         fields = [place.columns for cause in self.sets.about(fit).causes for place in cause.places]
         sizes, residual = beliefs("specimen.sizes"), fit.residual[fit.rows]
-        return predictive_p(fit.model, fields, sizes, residual, self._draws, self._random)
+        return predictive_p(fit.model, fields, sizes, residual, self._draws, self._random, levels=[self._alpha])
 
     def of(self, fit: Fit) -> CheckResults:
         """Everything about a fit; of the base only its errors."""

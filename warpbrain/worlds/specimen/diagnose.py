@@ -94,7 +94,7 @@ class DiagnosingSpecimen:
             sets = Sets(effects, base, self._listener)
             ordered = sets.ordered()
         with self.seconds.of("checks"):
-            checker = Checker(sets, protocol, options.draws, np.random.default_rng([options.seed, 11]))
+            checker = Checker(sets, protocol, options.draws, np.random.default_rng([options.seed, 11]), options.alpha)
             p_value = checker.p_left(base)
             chances = np.array([p for _, p in ordered])
             by_posterior, _ = decide([candidate.hypothesis for candidate, _ in ordered], chances, calibration().losses)
