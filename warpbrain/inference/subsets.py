@@ -63,11 +63,11 @@ class Blocks:
 
     def _stacked(self, residual: Floats, causes: Sequence[Cause]) -> Floats:
         """Rows (n, 1 + p + q) of the residual, means and columns, not yet standardised; sets the order of blocks."""
-        widths = [max(place.columns.shape[1] for place in cause.places) for cause in causes]
-        order = np.argsort([-width for width in widths], kind="stable").tolist()
+        widths = [np.array([place.columns.shape[1] for place in cause.places]) for cause in causes]
+        order = np.argsort([-each.max() for each in widths], kind="stable").tolist()
         self.cause = np.concatenate([np.full(len(causes[c].places), c) for c in order]).astype(np.int64)
         self.place = np.concatenate([np.arange(len(causes[c].places)) for c in order]).astype(np.int64)
-        self._width = np.array(widths, dtype=np.int64)[self.cause]
+        self._width = np.concatenate([widths[c] for c in order]).astype(np.int64)
         self._first = np.concatenate([[0], np.cumsum(self._width)])
         self._sizes = np.array([cause.sizes for cause in causes])[self.cause]
         self.log_weights = np.concatenate([causes[c].log_weights for c in order])
@@ -121,7 +121,7 @@ class Blocks:
         """
         logs = np.empty((len(self) - start, self._sizes.shape[1]))
         widths = self._width[start:]
-        # causes of the same width are next to each other
+        # those of the same width are next to each other
         edges = np.flatnonzero(np.diff(widths)) + 1
         for low, high in zip([0, *edges.tolist()], [*edges.tolist(), len(widths)], strict=True):
             logs[low:high] = self._log_factors_of_width(np.arange(start + low, start + high), acting)
