@@ -17,8 +17,22 @@ from warpbrain.kernels.precision import Precision
 def force_on(first: wp.array[int], corners: wp.array[int], element_forces: wp.array[Any], i: int):
     """The sum of the element forces on node `i`, in a fixed order."""
     f = type(element_forces[0])()
-    for c in range(first[i], first[i + 1]):
+    c = first[i]
+    end = first[i + 1]
+    # four are on their way before the first is needed
+    while c + 4 <= end:
+        f0 = element_forces[corners[c]]
+        f1 = element_forces[corners[c + 1]]
+        f2 = element_forces[corners[c + 2]]
+        f3 = element_forces[corners[c + 3]]
+        f += f0
+        f += f1
+        f += f2
+        f += f3
+        c += 4
+    while c < end:
         f += element_forces[corners[c]]
+        c += 1
     return f
 
 
@@ -46,8 +60,22 @@ def assembly_kernels(precision: Precision) -> KernelSet:
         components replaced by those of the identity. Writes both `A_ij` and `A_ji`."""
         p = start + wp.tid()
         K = mat33()
-        for c in range(first[p], first[p + 1]):
+        c = first[p]
+        end = first[p + 1]
+        # four are on their way before the first is needed
+        while c + 4 <= end:
+            K0 = element_blocks[contributions[c]]
+            K1 = element_blocks[contributions[c + 1]]
+            K2 = element_blocks[contributions[c + 2]]
+            K3 = element_blocks[contributions[c + 3]]
+            K += K0
+            K += K1
+            K += K2
+            K += K3
+            c += 4
+        while c < end:
             K += element_blocks[contributions[c]]
+            c += 1
         i = pairs[p][0]
         j = pairs[p][1]
         # components are 1 where free and 0 where constrained
@@ -55,8 +83,8 @@ def assembly_kernels(precision: Precision) -> KernelSet:
         if i == j:
             one = scalar(1.0)
             inertia = m * mass[i]
-            for c in range(3):
-                A[c, c] += free[i][c] * inertia + (one - free[i][c])
+            for d in range(3):
+                A[d, d] += free[i][d] * inertia + (one - free[i][d])
         values[positions[p][0]] = A
         if i != j:
             values[positions[p][1]] = wp.transpose(A)

@@ -26,6 +26,8 @@ constexpr int RENEWED_EVERY = 50;
 constexpr int PIPELINED = 200;
 // ratio of squared residual norms, now to when it was last measured, below which recurrences hold only rounding errors
 constexpr double CARRIED = 1e-20;
+// part of a residual along the last direction, relative to u . r, with which the next one begins afresh
+constexpr double ALONG = 0.1;
 // [ns]; blocks that do not hear from each other for so long give up
 constexpr word PATIENCE = 2000000000ull;
 
@@ -148,8 +150,9 @@ auto meet = [&](bool few) {
         return sum;
     };
     double sum = 0.0;
-    for (int w = lane / SUMS; w < WARPS; w += 32 / SUMS)
-        sum += partial[w][k];
+#pragma unroll
+    for (int w = lane / SUMS; w < (WARPS + 7) / 8 * 8; w += 32 / SUMS)
+        sum += w < WARPS ? partial[w][k] : 0.0;
     sum = over_warp(sum);
     if (few && k == 3)
         sum = 1.0;
@@ -275,8 +278,9 @@ auto precondition = [&](int row, double v) -> double {
 // What is done between two meetings. An iteration has one (Ghysels and Vanroose 2014, algorithm 4); what comes before
 // the first and after the last, and every so often between, is the residual itself and what follows from it and from
 // the search direction: u = M r, w = A u, s = A p, q = M s, z = A q. Long solves, and those whose end was none, go on
-// with textbook conjugate gradients, of three meetings an iteration: p = u + beta p; s = A p; x, r and u.
-enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, ITERATE, DIRECTION, CURVATURE, UPDATE, END, LEAVE };
+// with textbook conjugate gradients, of three meetings an iteration: p = u + beta p; s = A p; x, r and u. These keep the
+// direction only if the residual hardly has a part along it: where rounding has ruled, they would go astray for good.
+enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, RESTART, ITERATE, DIRECTION, CURVATURE, UPDATE, END, LEAVE };
 const double infinity = __longlong_as_double(0x7ff0000000000000ll);
 for (int system = group; system < systems; system += groups) {
     int iteration = 0, since = 0;
@@ -358,7 +362,7 @@ for (int system = group; system < systems; system += groups) {
                 textbook = true;
             }
             textbook = textbook || iteration >= PIPELINED;
-            phase = textbook ? RESUME : of_guess ? BEGIN : GET_W;
+            phase = textbook ? RESTART : of_guess ? BEGIN : GET_W;
             of_guess = false;
             since = 0;
         } else if (phase == GET_W) {
@@ -392,6 +396,8 @@ for (int system = group; system < systems; system += groups) {
                 phase = RESIDUAL;
                 return;
             }
+            if (phase == RESTART)
+                afresh = afresh || fabs(sums[2]) > ALONG * gamma_before;
             beta = iteration > 0 && !afresh ? gamma * per_gamma : 0.0;
             afresh = false;
             if (textbook) {
@@ -422,88 +428,86 @@ for (int system = group; system < systems; system += groups) {
             const bool mine = base + lane / LANES < rows && sub < 3;
             auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
             const double y = phase == RESIDUAL ? product(row, solution, epoch - 1, true) : vector(PRODUCT);
-            double give, bi = 0.0;
-            if (phase == GET_W) {
-                give = vector(P);
-                if (mine)
-                    vector(W) = y;
-            } else if (phase == DIRECTION) {
-                give = vector(U) + beta * vector(P);
-                if (mine)
-                    vector(P) = give;
-            } else if (phase == CURVATURE) {
-                give = 0.0;
+            double x = vector(X), r = vector(R), u = vector(U), p = vector(P), v = y, bi = 0.0;
+            if (phase == ITERATE) {
+                const double w = vector(W), z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
+                const double s = w + beta * vector(S);
+                v = w - alpha * z;
+                p = u + beta * p;
+                x += alpha * p;
+                r -= alpha * s;
+                u -= alpha * q;
                 if (mine) {
-                    const double p = vector(P);
-                    vector(S) = y;
-                    sums[0] += p * y;
-                    sums[1] += p * p;
+                    vector(Z) = z;
+                    vector(Q) = q;
+                    vector(S) = s;
+                    vector(P) = p;
+                    vector(X) = x;
+                    vector(R) = r;
+                    vector(U) = u;
+                    vector(W) = v;
                 }
-            } else {
-                // what the preconditioner is applied to
-                double v = y;
-                if (phase == RESIDUAL) {
-                    bi = double(b_of[(3 * size_t(row0) + i) * stride + slot]);
-                    v = bi - y;
-                } else if (phase == GET_Z || phase == RESUME) {
-                    v = vector(W);
-                    if (mine && phase == GET_Z)
-                        vector(Z) = y;
-                } else if (phase == ITERATE) {
-                    const double w = vector(W), u = vector(U);
-                    const double z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
-                    const double s = w + beta * vector(S), p = u + beta * vector(P);
-                    v = w - alpha * z;
-                    if (mine) {
-                        vector(Z) = z;
-                        vector(Q) = q;
-                        vector(S) = s;
-                        vector(P) = p;
-                        vector(X) += alpha * p;
-                        vector(R) -= alpha * s;
-                        vector(U) = u - alpha * q;
-                        vector(W) = v;
-                    }
-                } else if (phase == UPDATE) {
-                    v = vector(R) - alpha * vector(S);
-                    if (mine) {
-                        vector(X) += alpha * vector(P);
-                        vector(R) = v;
-                    }
-                } else if (phase == BEGIN && mine) {
-                    vector(W) = y;
+            } else if (phase == RESIDUAL) {
+                bi = double(b_of[(3 * size_t(row0) + i) * stride + slot]);
+                r = v = bi - y;
+                x = double(REAL(x));
+                if (mine) {
+                    vector(X) = x;
+                    vector(R) = r;
                 }
-                give = precondition(row, v);
-                if (mine && phase == RESIDUAL) {
-                    vector(X) = double(REAL(vector(X)));
-                    vector(R) = v;
-                    vector(U) = give;
-                    const double magnitude = size + fabs(bi);
-                    sums[0] += v * v;
-                    sums[1] += bi * bi;
-                    sums[2] += magnitude * magnitude;
-                } else if (mine && phase == GET_S) {
-                    vector(S) = y;
-                    vector(Q) = give;
-                } else if (mine && phase == UPDATE) {
-                    vector(U) = give;
-                    sums[0] += v * v;
-                    sums[1] += v * give;
-                } else if (mine) {
-                    vector(M) = give;
-                    const double r = vector(R), u = vector(U), p = vector(P);
-                    sums[0] += r * r;
-                    sums[1] += r * u;
-                    sums[2] += v * u;
-                    // of many systems nobody asks for the curvature
-                    if (!BATCHED)
-                        sums[3] += p * p;
+            } else if (phase == UPDATE) {
+                x += alpha * p;
+                r = v = r - alpha * vector(S);
+                if (mine) {
+                    vector(X) = x;
+                    vector(R) = r;
                 }
+            } else if (phase == GET_Z || phase == RESUME || phase == RESTART) {
+                v = vector(W);
+                if (mine && phase == GET_Z)
+                    vector(Z) = y;
+            } else if (phase == DIRECTION) {
+                p = u + beta * p;
+                if (mine)
+                    vector(P) = p;
+            } else if (mine && phase != GET_S && phase != CURVATURE) {
+                vector(W) = y;
             }
+            double give = p;
+            if (phase != GET_W && phase != DIRECTION && phase != CURVATURE)
+                give = precondition(row, v);
             publish(outgoing, row, give, mine);
             // as it will be stored, should this be the end
             if (tells_solution)
-                publish(solution, row, double(REAL(vector(X))), mine);
+                publish(solution, row, double(REAL(x)), mine);
+            if (!mine)
+                continue;
+            if (phase == RESIDUAL) {
+                vector(U) = give;
+                const double magnitude = size + fabs(bi);
+                sums[0] += r * r;
+                sums[1] += bi * bi;
+                sums[2] += magnitude * magnitude;
+            } else if (phase == GET_S) {
+                vector(S) = y;
+                vector(Q) = give;
+            } else if (phase == CURVATURE) {
+                vector(S) = y;
+                sums[0] += p * y;
+                sums[1] += p * p;
+            } else if (phase == UPDATE) {
+                vector(U) = give;
+                sums[0] += r * r;
+                sums[1] += r * give;
+            } else if (tells_solution) {
+                vector(M) = give;
+                sums[0] += r * r;
+                sums[1] += r * u;
+                sums[2] += phase == RESTART ? r * p : v * u;
+                // of many systems nobody asks for the curvature
+                if (!BATCHED)
+                    sums[3] += p * p;
+            }
         }
         if (!adds_up) {
             of_guess = false;
@@ -515,6 +519,7 @@ for (int system = group; system < systems; system += groups) {
         if (adds_up) {
             // what the next factors need is on its way while others are waited for
             const double per_gamma = 1.0 / gamma_before, per_alpha = 1.0 / alpha;
+            asm volatile("" ::"d"(per_gamma), "d"(per_alpha));
             meet(few);
             decide(per_gamma, per_alpha);
             if (lane == 0)

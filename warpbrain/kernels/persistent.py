@@ -42,8 +42,8 @@ NUMBERS = 39
 _SUMS = 4
 #: Blocks that may meet.
 MOST_BLOCKS = 256
-#: Rows that a block has at least, unless there are fewer: what two blocks say to each other takes longer than these.
-_LEAST_ROWS = 8
+#: Rows that a block has at least, unless there are fewer: what more blocks say to each other takes longer than these.
+_LEAST_ROWS = 32
 
 
 def native_code(precision: Precision, shared_bytes: int, lanes: int, messages: int, batched: bool = False) -> str:
