@@ -60,22 +60,8 @@ def assembly_kernels(precision: Precision) -> KernelSet:
         components replaced by those of the identity. Writes both `A_ij` and `A_ji`."""
         p = start + wp.tid()
         K = mat33()
-        c = first[p]
-        end = first[p + 1]
-        # four are on their way before the first is needed
-        while c + 4 <= end:
-            K0 = element_blocks[contributions[c]]
-            K1 = element_blocks[contributions[c + 1]]
-            K2 = element_blocks[contributions[c + 2]]
-            K3 = element_blocks[contributions[c + 3]]
-            K += K0
-            K += K1
-            K += K2
-            K += K3
-            c += 4
-        while c < end:
+        for c in range(first[p], first[p + 1]):
             K += element_blocks[contributions[c]]
-            c += 1
         i = pairs[p][0]
         j = pairs[p][1]
         # components are 1 where free and 0 where constrained
@@ -83,8 +69,8 @@ def assembly_kernels(precision: Precision) -> KernelSet:
         if i == j:
             one = scalar(1.0)
             inertia = m * mass[i]
-            for d in range(3):
-                A[d, d] += free[i][d] * inertia + (one - free[i][d])
+            for c in range(3):
+                A[c, c] += free[i][c] * inertia + (one - free[i][c])
         values[positions[p][0]] = A
         if i != j:
             values[positions[p][1]] = wp.transpose(A)

@@ -36,7 +36,7 @@ def compiled_module(name: str, unroll: int | None = None) -> Any:
 
 
 def threads_of_block(device: wp.Device) -> int | None:
-    """Of kernels with a thread for an item: few on a GPU, so that a mesh of some thousand nodes is shared out to all of it.
+    """Of kernels with a thread for an item: few on a GPU, so that some thousand items are shared out to all of it.
 
     A module is compiled for one number: whoever launches a kernel of those that are loaded ahead says it.
     """

@@ -67,7 +67,7 @@ auto entry = [&](int place, int k) -> REAL {
 };
 
 // -- what is kept on the chip: vectors and inverse diagonal blocks, then as much of the matrix as there is room for
-enum { X, R, U, W, P, S, Q, Z, M, PRODUCT, INVERSE, VECTORS = INVERSE + 3 };
+enum { X, R, U, W, P, S, Q, Z, M, PRODUCT, INVERSE, VECTORS = INVERSE + 2 };
 double(*const partial)[SUMS] = (double(*)[SUMS])dynamic_smem_base;
 // what is next: two factors and a phase; and whether a block is missing
 double *const factors = (double *)(partial + WARPS);
@@ -268,10 +268,11 @@ auto product = [&](int row, const word *given, unsigned when, bool measured) -> 
 };
 // Component of the inverse diagonal block times what the first three threads of the row have.
 auto precondition = [&](int row, double v) -> double {
-    const double *const inverse = vectors + INVERSE * length + 9 * row + 3 * component;
+    // of which the six entries on and above the diagonal are kept
+    const double *const inverse = vectors + INVERSE * length + 6 * row;
     double y = 0.0;
     for (int k = 0; k < 3; ++k)
-        y += inverse[k] * __shfl_sync(ALL, v, k, LANES);
+        y += inverse[component + k + (component * k > 0)] * __shfl_sync(ALL, v, k, LANES);
     return y;
 };
 
@@ -304,9 +305,17 @@ for (int system = group; system < systems; system += groups) {
     // the last system's numbers are no longer needed
     __syncthreads();
 #endif
+#if BATCHED
+#pragma unroll 2
+    for (int place = tid; place < kept; place += THREADS)
+#pragma unroll
+        for (int k = 0; k < 9; ++k)
+            kept_values[9 * place + k] = entry(place, k);
+#else
 #pragma unroll 4
     for (int i = tid; i < 9 * kept; i += THREADS)
         kept_values[i] = entry(i / 9, i % 9);
+#endif
     for (int i = tid; i < length; i += THREADS) {
 #if BATCHED
         if (phase == RESUME) {
@@ -323,7 +332,7 @@ for (int system = group; system < systems; system += groups) {
         double a[9];
         for (int k = 0; k < 9; ++k)
             a[k] = double(all_values[(9 * size_t(diagonal.data[row0 + i]) + k) * stride + slot]);
-        double inverse[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+        double inverse[6] = {1.0, 0.0, 0.0, 1.0, 0.0, 1.0};
         if (jacobi) {
             const double c0 = a[4] * a[8] - a[5] * a[7];
             const double c1 = a[5] * a[6] - a[3] * a[8];
@@ -332,15 +341,12 @@ for (int system = group; system < systems; system += groups) {
             inverse[0] = d * c0;
             inverse[1] = d * (a[2] * a[7] - a[1] * a[8]);
             inverse[2] = d * (a[1] * a[5] - a[2] * a[4]);
-            inverse[3] = d * c1;
-            inverse[4] = d * (a[0] * a[8] - a[2] * a[6]);
-            inverse[5] = d * (a[2] * a[3] - a[0] * a[5]);
-            inverse[6] = d * c2;
-            inverse[7] = d * (a[1] * a[6] - a[0] * a[7]);
-            inverse[8] = d * (a[0] * a[4] - a[1] * a[3]);
+            inverse[3] = d * (a[0] * a[8] - a[2] * a[6]);
+            inverse[4] = d * (a[2] * a[3] - a[0] * a[5]);
+            inverse[5] = d * (a[0] * a[4] - a[1] * a[3]);
         }
-        for (int k = 0; k < 9; ++k)
-            vectors[INVERSE * length + 9 * i + k] = inverse[k];
+        for (int k = 0; k < 6; ++k)
+            vectors[INVERSE * length + 6 * i + k] = inverse[k];
     }
     __syncthreads();
 

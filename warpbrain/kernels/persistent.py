@@ -36,8 +36,8 @@ _WORKERS, LANES = 480, (16, 8, 4)
 THREADS = _WORKERS + 32
 #: What a kernel has of a multiprocessor's shared memory without asking for it [bytes].
 _RESERVED = 6 * 1024
-#: Numbers of a row beside the matrix: ten vectors of three components and an inverse diagonal block.
-NUMBERS = 39
+#: Numbers of a row beside the matrix: ten vectors of three components and half an inverse diagonal block.
+NUMBERS = 36
 #: Sums of a meeting; a message is one, and the number of the meeting.
 _SUMS = 4
 #: Blocks that may meet.
@@ -47,7 +47,7 @@ _LEAST_ROWS = 32
 
 
 def native_code(precision: Precision, shared_bytes: int, lanes: int, messages: int, batched: bool = False) -> str:
-    """What the kernels consist of, for blocks with so much shared memory, `lanes` for a row, `messages` for a thread."""
+    """What the kernels consist of: `lanes` threads have a row, and a thread of the last warp has `messages`."""
     real = {"double": "double", "single": "float"}[precision.name]
     code = files("warpbrain.kernels").joinpath("persistent.cu").read_text(encoding="utf-8")
     return (
