@@ -35,12 +35,12 @@ def compiled_module(name: str, unroll: int | None = None) -> Any:
     return module
 
 
-def threads_of_block(device: wp.Device) -> int | None:
+def threads_of_block(device: wp.DeviceLike) -> int | None:
     """Of kernels with a thread for an item: few on a GPU, so that some thousand items are shared out to all of it.
 
     A module is compiled for one number: whoever launches a kernel of those that are loaded ahead says it.
     """
-    return 64 if device.is_cuda else None
+    return 64 if wp.get_device(device).is_cuda else None
 
 
 class KernelSet:

@@ -10,8 +10,9 @@ Matrix Anal. Appl. 39, 426), long solves go over to textbook conjugate gradients
 to reach the tolerance in the end. Vectors and sums are double in either precision.
 
 **Meetings.** There are no more blocks than multiprocessors, and each of these has room for one: all run at once. A
-block writes its sums, labelled with the number of the meeting, and waits for those of all others, which it adds in one
-order: the same bits every time. A block that does not hear from another for two seconds gives up, then all do, and
+block writes its sums, labelled with the number of the meeting, and one of its warps waits for those of all others and
+adds them in one order: the same bits every time. Numbers for neighbours are labelled, too: the other warps need no
+fence to multiply them meanwhile. A block that does not hear from another for two seconds gives up, then all do, and
 `PersistentSolve.outcome` raises: nothing hangs.
 """
 
