@@ -17,8 +17,22 @@ from warpbrain.kernels.precision import Precision
 def force_on(first: wp.array[int], corners: wp.array[int], element_forces: wp.array[Any], i: int):
     """The sum of the element forces on node `i`, in a fixed order."""
     f = type(element_forces[0])()
-    for c in range(first[i], first[i + 1]):
+    c = first[i]
+    end = first[i + 1]
+    # four are on their way before the first is needed
+    while c + 4 <= end:
+        f0 = element_forces[corners[c]]
+        f1 = element_forces[corners[c + 1]]
+        f2 = element_forces[corners[c + 2]]
+        f3 = element_forces[corners[c + 3]]
+        f += f0
+        f += f1
+        f += f2
+        f += f3
+        c += 4
+    while c < end:
         f += element_forces[corners[c]]
+        c += 1
     return f
 
 

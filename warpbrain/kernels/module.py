@@ -35,6 +35,14 @@ def compiled_module(name: str, unroll: int | None = None) -> Any:
     return module
 
 
+def threads_of_block(device: wp.DeviceLike) -> int | None:
+    """Of kernels with a thread for an item: few on a GPU, so that some thousand items are shared out to all of it.
+
+    A module is compiled for one number: whoever launches a kernel of those that are loaded ahead says it.
+    """
+    return 64 if wp.get_device(device).is_cuda else None
+
+
 class KernelSet:
     """Kernels of one module, by their names: each is one that `add` decorates; see `compiled_module`."""
 
@@ -59,7 +67,10 @@ def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], Non
     thread: Warp precompiles its header once for each thread, and that takes longer than four of our modules.
     """
     modules = {kernel.module.name: kernel.module for kernel in kernels}
-    begun = [_compiler(os.getpid()).submit(wp.force_load, device, [module]) for module in modules.values()]
+    begun = [
+        _compiler(os.getpid()).submit(wp.force_load, device, [module], threads_of_block(device))
+        for module in modules.values()
+    ]
     _begun[:] = [*(loaded for loaded in _begun if not loaded.done()), *begun]
 
     def wait() -> None:

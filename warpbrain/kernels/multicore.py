@@ -31,7 +31,7 @@ import numpy as np
 import warp as wp
 from warp._src.context import _build_cpu_args_structs
 
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import compiled_module, threads_of_block
 from warpbrain.threads import is_part, thread_count
 
 #: Items of a launch below which it stays on one thread: some 20 us of work, about what it takes to share it out.
@@ -221,7 +221,7 @@ def launch(kernel: Any, dim: Any, inputs: Sequence[Any], device: Any, least: int
     # twice as many as threads, so that what is left at the end is small
     count = 1 if team is None else min(2 * team.count, items // least)
     if team is None or count < 2:
-        wp.launch(kernel, dim=dim, inputs=list(inputs), device=device)
+        wp.launch(kernel, dim=dim, inputs=list(inputs), device=device, block_dim=threads_of_block(device))
         return
     bounds = [items * part // count for part in range(count + 1)]
     changes = [{"start": first, "count": last - first} for first, last in pairwise(bounds)]

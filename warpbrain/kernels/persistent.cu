@@ -1,16 +1,22 @@
 // Preconditioned conjugate gradients in one launch: the body of `solve` in persistent.py and batched/persistent.py,
-// which say what it does and what its arguments are. BATCHED, THREADS, LANES, SHARED_BYTES, REAL and ROUNDING are put
-// before it.
+// which say what it does and what its arguments are. BATCHED, THREADS, LANES, MESSAGES, SHARED_BYTES, REAL and ROUNDING
+// are put before it.
 //
 // Blocks are in groups; a group solves one system after the other. With BATCHED these are samples, of which one in a
 // slot has the numbers `slot + stride * k`; without, there is one group and one system.
+//
+// All warps of a block but the last have rows. The last adds up the sums of all blocks and decides what is next, while
+// the others already multiply what their neighbours have given them.
+//
+// Nothing that blocks tell each other needs a fence: each sixteen bytes have the number of the phase in which they were
+// written, and no store or load of sixteen bytes is ever torn apart. Who reads an older number reads again.
 
-constexpr int WARPS = THREADS / 32;
+typedef unsigned long long word;
+constexpr int WORKERS = THREADS - 32, WARPS = WORKERS / 32;
 constexpr int ROWS_OF_WARP = 32 / LANES;
-constexpr int ROWS_AT_ONCE = THREADS / LANES;
+constexpr int ROWS_AT_ONCE = WORKERS / LANES;
 constexpr unsigned ALL = 0xffffffffu;
 constexpr int SUMS = 4;
-constexpr int MOST_BLOCKS = 256;
 #if BATCHED
 constexpr int SCALARS = 8;
 #endif
@@ -20,12 +26,15 @@ constexpr int RENEWED_EVERY = 50;
 constexpr int PIPELINED = 200;
 // ratio of squared residual norms, now to when it was last measured, below which recurrences hold only rounding errors
 constexpr double CARRIED = 1e-20;
+// part of a residual along the last direction, relative to u . r, with which the next one begins afresh
+constexpr double ALONG = 0.1;
 // [ns]; blocks that do not hear from each other for so long give up
-constexpr unsigned long long PATIENCE = 2000000000ull;
+constexpr word PATIENCE = 2000000000ull;
 
 extern __shared__ char dynamic_smem_base[];
 
 const int tid = threadIdx.x, lane = tid % 32, warp = tid / 32, sub = lane % LANES;
+const bool adds_up = warp == WARPS;
 const int grid = starts.shape[0] - 1, group = blockIdx.x / grid, groups = gridDim.x / grid, me = blockIdx.x % grid;
 const int row0 = starts.data[me], rows = starts.data[me + 1] - row0;
 const int block0 = offsets.data[row0], blocks = offsets.data[row0 + rows] - block0;
@@ -34,8 +43,9 @@ const REAL *const all_values = (const REAL *)values.data;
 const REAL *const b_of = (const REAL *)b.data;
 REAL *const x_of = (REAL *)x.data;
 int *const state = control.data + 2 * group;
-unsigned long long *const mailbox = (unsigned long long *)messages.data + size_t(group) * grid * 4 * SUMS;
-double *const places = exchange.data + size_t(group) * 12 * nodes, *const solution = places + 8 * size_t(nodes);
+// two places that take turns, by the number of the phase, and one for the solution
+word *const mailbox = (word *)messages.data + size_t(group) * grid * 4 * SUMS;
+word *const places = (word *)exchange.data + size_t(group) * 12 * nodes, *const solution = places + 8 * size_t(nodes);
 #if BATCHED
 const int systems = count.data[0];
 const size_t stride = x.shape[2];
@@ -57,11 +67,13 @@ auto entry = [&](int place, int k) -> REAL {
 };
 
 // -- what is kept on the chip: vectors and inverse diagonal blocks, then as much of the matrix as there is room for
-enum { X, R, U, W, P, S, Q, Z, M, INVERSE, VECTORS = INVERSE + 3 };
+enum { X, R, U, W, P, S, Q, Z, M, PRODUCT, INVERSE, VECTORS = INVERSE + 2 };
 double(*const partial)[SUMS] = (double(*)[SUMS])dynamic_smem_base;
-double(*const totals)[SUMS] = partial + WARPS;
-int *const quit = (int *)(totals + MOST_BLOCKS / 32);
-char *room = (char *)(quit + 4);
+// what is next: two factors and a phase; and whether a block is missing
+double *const factors = (double *)(partial + WARPS);
+int *const next = (int *)(factors + 2);
+volatile int *const quit = next + 1;
+char *room = (char *)(next + 2);
 int left = SHARED_BYTES - (int)(room - dynamic_smem_base);
 const int length = 3 * rows;
 double *vectors = (double *)room;
@@ -95,7 +107,24 @@ __syncthreads();
 if (*quit)
     return;
 
-// -- meetings of the blocks of a group
+// -- what blocks tell each other
+auto store = [](word *to, word first, word second) {
+    asm volatile("{.reg .b128 t; mov.b128 t, {%1, %2}; st.relaxed.gpu.global.b128 [%0], t;}" ::"l"(to), "l"(first),
+                 "l"(second));
+};
+auto load = [](const word *from, word &first, word &second) {
+    asm volatile("{.reg .b128 t; ld.relaxed.gpu.global.b128 t, [%2]; mov.b128 {%0, %1}, t;}"
+                 : "=l"(first), "=l"(second)
+                 : "l"(from));
+};
+// Gives a row's vector, of whose components the first three threads of the row have one each, to all blocks: two times
+// twelve bytes.
+auto publish = [&](word *place, int row, double v, bool mine) {
+    const word bits = __double_as_longlong(v), other = __double_as_longlong(__shfl_sync(ALL, v, (sub + 1) % LANES, LANES));
+    // the second component is halved between both
+    if (mine && sub < 2)
+        store(place + 4 * size_t(row0 + row) + 2 * sub, sub ? other : bits, (sub ? bits >> 32 : other) << 32 | epoch);
+};
 // Sums over a warp of four numbers: lane 8 k has the k-th, in an order that is always the same. Halves of the warp send
 // each other what the other one sums.
 auto warp_sums = [&](const double s[SUMS]) -> double {
@@ -110,96 +139,83 @@ auto warp_sums = [&](const double s[SUMS]) -> double {
     return sum;
 };
 double sums[SUMS] = {0.0, 0.0, 0.0, 0.0};
-// What threads stored before is seen by all after it, and their shares of `sums` are added in an order that is always
-// the same. False if a block is missing: then every thread has to return.
-auto meet = [&]() -> bool {
-    double sum = warp_sums(sums);
-    if (lane % 8 == 0)
-        partial[warp][lane / 8] = sum;
-    __syncthreads();
-    ++epoch;
-    // a message is half a number and the epoch, which a single store of eight bytes cannot tear apart; a place is
-    // written again only two meetings later, when all have read it
-    unsigned long long *const mail = mailbox + size_t(epoch % 2) * grid * 2 * SUMS;
-    if (warp == 0) {
-        for (int k = 0; k < SUMS; ++k)
-            sums[k] = lane < WARPS ? partial[lane][k] : 0.0;
-        sum = warp_sums(sums);
-        asm volatile("fence.acq_rel.gpu;" ::: "memory");
-        if (lane % 8 < 2) {
-            const unsigned long long bits = __double_as_longlong(sum);
-            const unsigned long long half = lane % 8 ? bits >> 32 : bits & 0xffffffffull;
-            const unsigned long long message = half << 32 | epoch;
-            unsigned long long *const to = mail + 2 * SUMS * me + lane / 8 * 2 + lane % 8;
-            asm volatile("st.relaxed.gpu.global.u64 [%0], %1;" ::"l"(to), "l"(message) : "memory");
-        }
-    }
-    if (warp < (grid + 31) / 32) {
-        for (int k = 0; k < SUMS; ++k)
-            sums[k] = 0.0;
-        if (tid < grid) {
-            const unsigned long long *const from = mail + 2 * SUMS * tid;
-            unsigned long long begun = 0, now;
-            for (unsigned tries = 1;; ++tries) {
-                bool all_there = true;
-                for (int k = 0; k < SUMS; ++k) {
-                    unsigned long long low, high;
-                    asm volatile("ld.relaxed.gpu.global.v2.u64 {%0, %1}, [%2];"
-                                 : "=l"(low), "=l"(high)
-                                 : "l"(from + 2 * k)
-                                 : "memory");
-                    all_there = all_there && (unsigned)low == epoch && (unsigned)high == epoch;
-                    sums[k] = __longlong_as_double((long long)(high >> 32 << 32 | low >> 32));
-                }
-                if (all_there)
-                    break;
-                if (tries % 1024 == 0) {
-                    asm volatile("mov.u64 %0, %globaltimer;" : "=l"(now));
-                    begun = begun == 0 ? now : begun;
-                    if (now - begun > PATIENCE || *(volatile int *)(state + 1)) {
-                        *(volatile int *)(state + 1) = 1;
-                        *(volatile int *)quit = 1;
-                        break;
-                    }
-                }
-            }
-            asm volatile("fence.acq_rel.gpu;" ::: "memory");
-        }
-        sum = warp_sums(sums);
-        if (lane % 8 == 0)
-            totals[warp][lane / 8] = sum;
-    }
-    __syncthreads();
-    for (int k = 0; k < SUMS; ++k)
-        sums[k] = totals[0][k];
-    // all on their way before the first is needed
+// Of the last warp: adds up what the warps of all blocks have left in `partial`, in an order that is always the same. A
+// place is written again only two meetings later, when all have read it.
+auto meet = [&](bool few) {
+    // thread t has sum t % 4, of every eighth warp and block
+    const int k = lane % SUMS;
+    auto over_warp = [&](double sum) -> double {
+        for (int d = SUMS; d < 32; d *= 2)
+            sum += __shfl_xor_sync(ALL, sum, d);
+        return sum;
+    };
+    double sum = 0.0;
 #pragma unroll
-    for (int w = 1; w < MOST_BLOCKS / 32; ++w)
-        if (w < (grid + 31) / 32)
-            for (int k = 0; k < SUMS; ++k)
-                sums[k] += totals[w][k];
-    return *(volatile int *)quit == 0;
+    for (int w = lane / SUMS; w < (WARPS + 7) / 8 * 8; w += 32 / SUMS)
+        sum += w < WARPS ? partial[w][k] : 0.0;
+    sum = over_warp(sum);
+    if (few && k == 3)
+        sum = 1.0;
+    word *const mail = mailbox + size_t(epoch % 2) * grid * 2 * SUMS;
+    if (lane < SUMS)
+        store(mail + 2 * (SUMS * me + k), __double_as_longlong(sum), epoch);
+    word begun = 0, now;
+    for (unsigned tries = 1;; ++tries) {
+        bool all_there = true;
+        sum = 0.0;
+#pragma unroll
+        for (int m = 0; m < MESSAGES; ++m) {
+            const int from = 32 / SUMS * m + lane / SUMS;
+            word bits, written;
+            load(mail + 2 * (SUMS * min(from, grid - 1) + k), bits, written);
+            all_there = all_there && (unsigned)written == epoch;
+            sum += from < grid ? __longlong_as_double(bits) : 0.0;
+        }
+        if (__all_sync(ALL, all_there))
+            break;
+        if (tries % 1024 == 0) {
+            asm volatile("mov.u64 %0, %globaltimer;" : "=l"(now));
+            begun = begun == 0 ? now : begun;
+            if (__any_sync(ALL, now - begun > PATIENCE || *(volatile int *)(state + 1))) {
+                *(volatile int *)(state + 1) = 1;
+                *quit = 1;
+                break;
+            }
+        }
+    }
+    sum = over_warp(sum);
+    for (int j = 0; j < SUMS; ++j)
+        sums[j] = __shfl_sync(ALL, sum, j, 32);
 };
 
 // -- rows: LANES threads for each; of every four the first three have its components, of which those of the first four
 // count
 const int component = min(sub % 4, 2);
-// Component of a row of `A v`, of what was given before the last meeting; where the residual is measured of `A x` and
-// `|A| |x|`, of what has been reached or of the guess.
-int turn = 0;
-bool of_guess = true, measured = true;
+// Component of a row of `A v`, of what was given in a phase; where the residual is measured of `A x` and `|A| |x|`, of
+// what has been reached or of the guess.
+bool of_guess;
 double size;
-auto product = [&](int row) -> double {
-    const double *const given = measured ? solution : places + size_t(turn ^ 1) * 4 * nodes;
-    auto get = [&](int node, double v[3]) {
-        if (of_guess) {
+auto product = [&](int row, const word *given, unsigned when, bool measured) -> double {
+    auto ask = [&](int node, word v[4]) {
+        if (measured && of_guess) {
             for (int c = 0; c < 3; ++c)
-                v[c] = double(x_of[(3 * size_t(node) + c) * stride + slot]);
+                v[c] = __double_as_longlong(double(x_of[(3 * size_t(node) + c) * stride + slot]));
         } else {
-            const double *const from = given + 4 * size_t(node);
-            asm volatile("ld.global.cg.v2.f64 {%0, %1}, [%2];" : "=d"(v[0]), "=d"(v[1]) : "l"(from));
-            asm volatile("ld.global.cg.f64 %0, [%1];" : "=d"(v[2]) : "l"(from + 2));
+            load(given + 4 * size_t(node), v[0], v[1]);
+            load(given + 4 * size_t(node) + 2, v[2], v[3]);
         }
+    };
+    auto get = [&](int node, word v[4], double x[3]) {
+        if (!(measured && of_guess)) {
+            for (unsigned tries = 1; (unsigned)v[1] != when || (unsigned)v[3] != when; ++tries) {
+                if (tries % 1024 == 0 && *quit)
+                    break;
+                ask(node, v);
+            }
+            v[1] = v[3] >> 32 << 32 | v[1] >> 32;
+        }
+        for (int c = 0; c < 3; ++c)
+            x[c] = __longlong_as_double(v[c]);
     };
     double y[3] = {0.0, 0.0, 0.0}, z[3] = {0.0, 0.0, 0.0};
     auto add = [&](int place, const double v[3]) {
@@ -220,14 +236,19 @@ auto product = [&](int row) -> double {
     // two at a time: both are on their way before the first is needed
 #pragma unroll 1
     for (; place < end; place += 2 * LANES) {
-        double v[3], w[3];
+        word asked[2][4];
+        double v[3];
         const bool two = place + LANES < end;
-        get(column(place), v);
+        const int node = column(place), other = two ? column(place + LANES) : 0;
+        ask(node, asked[0]);
         if (two)
-            get(column(place + LANES), w);
+            ask(other, asked[1]);
+        get(node, asked[0], v);
         add(place, v);
-        if (two)
-            add(place + LANES, w);
+        if (two) {
+            get(other, asked[1], v);
+            add(place + LANES, v);
+        }
     }
     // halves go different ways here, too: thread k of four has component k
     auto component_sum = [&](const double v[3]) -> double {
@@ -247,26 +268,28 @@ auto product = [&](int row) -> double {
 };
 // Component of the inverse diagonal block times what the first three threads of the row have.
 auto precondition = [&](int row, double v) -> double {
-    const double *const inverse = vectors + INVERSE * length + 9 * row + 3 * component;
+    // of which the six entries on and above the diagonal are kept
+    const double *const inverse = vectors + INVERSE * length + 6 * row;
     double y = 0.0;
     for (int k = 0; k < 3; ++k)
-        y += inverse[k] * __shfl_sync(ALL, v, k, LANES);
+        y += inverse[component + k + (component * k > 0)] * __shfl_sync(ALL, v, k, LANES);
     return y;
 };
 
 // What is done between two meetings. An iteration has one (Ghysels and Vanroose 2014, algorithm 4); what comes before
 // the first and after the last, and every so often between, is the residual itself and what follows from it and from
 // the search direction: u = M r, w = A u, s = A p, q = M s, z = A q. Long solves, and those whose end was none, go on
-// with textbook conjugate gradients, of three meetings an iteration: p = u + beta p; s = A p; x, r and u.
-enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, ITERATE, DIRECTION, CURVATURE, UPDATE };
+// with textbook conjugate gradients, of three meetings an iteration: p = u + beta p; s = A p; x, r and u. These keep the
+// direction only if the residual hardly has a part along it: where rounding has ruled, they would go astray for good.
+enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, RESTART, ITERATE, DIRECTION, CURVATURE, UPDATE, END, LEAVE };
 const double infinity = __longlong_as_double(0x7ff0000000000000ll);
 for (int system = group; system < systems; system += groups) {
     int iteration = 0, since = 0;
     double gamma_before = 1.0, alpha = 1.0, beta = 0.0, least = infinity, before = infinity;
     double rr = 0.0, goal = 0.0, updated = infinity;
-    bool ended = false, left_off = false, textbook = false, afresh = false;
-    Phase phase = RESIDUAL;
-    of_guess = measured = true;
+    bool ended = false, textbook = false, afresh = false;
+    int phase = RESIDUAL;
+    of_guess = true;
 #if BATCHED
     slot = slots.data[system];
     double *const saved = memory.data + slot * (27 * size_t(nodes) + SCALARS);
@@ -274,7 +297,7 @@ for (int system = group; system < systems; system += groups) {
     if (saved[0] >= 0.0) {
         // it was left off
         phase = RESUME;
-        of_guess = measured = false;
+        of_guess = false;
         iteration = (int)saved[0], since = (int)saved[1];
         gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5];
         textbook = saved[6] > 0.0, rr = saved[7];
@@ -282,9 +305,17 @@ for (int system = group; system < systems; system += groups) {
     // the last system's numbers are no longer needed
     __syncthreads();
 #endif
+#if BATCHED
+#pragma unroll 2
+    for (int place = tid; place < kept; place += THREADS)
+#pragma unroll
+        for (int k = 0; k < 9; ++k)
+            kept_values[9 * place + k] = entry(place, k);
+#else
 #pragma unroll 4
     for (int i = tid; i < 9 * kept; i += THREADS)
         kept_values[i] = entry(i / 9, i % 9);
+#endif
     for (int i = tid; i < length; i += THREADS) {
 #if BATCHED
         if (phase == RESUME) {
@@ -301,7 +332,7 @@ for (int system = group; system < systems; system += groups) {
         double a[9];
         for (int k = 0; k < 9; ++k)
             a[k] = double(all_values[(9 * size_t(diagonal.data[row0 + i]) + k) * stride + slot]);
-        double inverse[9] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+        double inverse[6] = {1.0, 0.0, 0.0, 1.0, 0.0, 1.0};
         if (jacobi) {
             const double c0 = a[4] * a[8] - a[5] * a[7];
             const double c1 = a[5] * a[6] - a[3] * a[8];
@@ -310,141 +341,34 @@ for (int system = group; system < systems; system += groups) {
             inverse[0] = d * c0;
             inverse[1] = d * (a[2] * a[7] - a[1] * a[8]);
             inverse[2] = d * (a[1] * a[5] - a[2] * a[4]);
-            inverse[3] = d * c1;
-            inverse[4] = d * (a[0] * a[8] - a[2] * a[6]);
-            inverse[5] = d * (a[2] * a[3] - a[0] * a[5]);
-            inverse[6] = d * c2;
-            inverse[7] = d * (a[1] * a[6] - a[0] * a[7]);
-            inverse[8] = d * (a[0] * a[4] - a[1] * a[3]);
+            inverse[3] = d * (a[0] * a[8] - a[2] * a[6]);
+            inverse[4] = d * (a[2] * a[3] - a[0] * a[5]);
+            inverse[5] = d * (a[0] * a[4] - a[1] * a[3]);
         }
-        for (int k = 0; k < 9; ++k)
-            vectors[INVERSE * length + 9 * i + k] = inverse[k];
+        for (int k = 0; k < 6; ++k)
+            vectors[INVERSE * length + 6 * i + k] = inverse[k];
     }
     __syncthreads();
 
-    for (;;) {
-        for (int k = 0; k < SUMS; ++k)
-            sums[k] = 0.0;
-#if BATCHED
-        // so few go on that the rest may wait for the next launch: asked for here, needed after the rows
-        const bool few = me == 0 && tid == 0 && *(volatile int *)remaining.data <= linger.data[0];
-#endif
-        double *const outgoing = places + size_t(turn) * 4 * nodes;
-#pragma unroll 1
-        for (int base = warp * ROWS_OF_WARP; base < rows; base += ROWS_AT_ONCE) {
-            // threads without a component go along: they take part in shuffles
-            const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
-            const bool mine = base + lane / LANES < rows && sub < 3;
-            auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
-            const double y = phase == RESUME || phase == DIRECTION || phase == UPDATE ? 0.0 : product(row);
-            double give, bi = 0.0;
-            if (phase == GET_W) {
-                give = vector(P);
-                if (mine)
-                    vector(W) = y;
-            } else if (phase == DIRECTION) {
-                give = vector(U) + beta * vector(P);
-                if (mine)
-                    vector(P) = give;
-            } else if (phase == CURVATURE) {
-                give = 0.0;
-                if (mine) {
-                    const double p = vector(P);
-                    vector(S) = y;
-                    sums[0] += p * y;
-                    sums[1] += p * p;
-                }
-            } else {
-                // what the preconditioner is applied to
-                double v = y;
-                if (phase == RESIDUAL) {
-                    bi = double(b_of[(3 * size_t(row0) + i) * stride + slot]);
-                    v = bi - y;
-                } else if (phase == GET_Z || phase == RESUME) {
-                    v = vector(W);
-                    if (mine && phase == GET_Z)
-                        vector(Z) = y;
-                } else if (phase == ITERATE) {
-                    const double w = vector(W), u = vector(U);
-                    const double z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
-                    const double s = w + beta * vector(S), p = u + beta * vector(P);
-                    v = w - alpha * z;
-                    if (mine) {
-                        vector(Z) = z;
-                        vector(Q) = q;
-                        vector(S) = s;
-                        vector(P) = p;
-                        vector(X) += alpha * p;
-                        vector(R) -= alpha * s;
-                        vector(U) = u - alpha * q;
-                        vector(W) = v;
-                    }
-                } else if (phase == UPDATE) {
-                    v = vector(R) - alpha * vector(S);
-                    if (mine) {
-                        vector(X) += alpha * vector(P);
-                        vector(R) = v;
-                    }
-                } else if (phase == BEGIN && mine) {
-                    vector(W) = y;
-                }
-                give = precondition(row, v);
-                if (mine && phase == RESIDUAL) {
-                    vector(X) = double(REAL(vector(X)));
-                    vector(R) = v;
-                    vector(U) = give;
-                    const double magnitude = size + fabs(bi);
-                    sums[0] += v * v;
-                    sums[1] += bi * bi;
-                    sums[2] += magnitude * magnitude;
-                } else if (mine && phase == GET_S) {
-                    vector(S) = y;
-                    vector(Q) = give;
-                } else if (mine && phase == UPDATE) {
-                    vector(U) = give;
-                    solution[4 * size_t(row0 + row) + sub] = double(REAL(vector(X)));
-                    sums[0] += v * v;
-                    sums[1] += v * give;
-                } else if (mine) {
-                    vector(M) = give;
-                    // as it will be stored, should this be the end
-                    solution[4 * size_t(row0 + row) + sub] = double(REAL(vector(X)));
-                    const double r = vector(R), u = vector(U), p = vector(P);
-                    sums[0] += r * r;
-                    sums[1] += r * u;
-                    sums[2] += v * u;
-                    // of many systems nobody asks for the curvature
-                    if (!BATCHED)
-                        sums[3] += p * p;
-                }
-            }
-            if (mine)
-                outgoing[4 * size_t(row0 + row) + sub] = give;
-        }
-#if BATCHED
-        if (few)
-            sums[3] = 1.0;
-#endif
-        if (!meet())
-            return;
-        turn ^= 1;
+    // Of the last warp, after a meeting: the next phase and its factors.
+    auto decide = [&](double per_gamma, double per_alpha) {
         if (phase == RESIDUAL) {
-            measured = false;
             rr = sums[0];
             goal = tolerance * tolerance * sums[1];
+            phase = END;
             if (!(rr > goal) || ended || iteration >= max_iterations)
-                break;
+                return;
             if (!(updated > goal)) {
                 // what is carried along says that this is the end, and is wrong, or as right as rounding allows
                 if (rr <= 256.0 * ROUNDING * ROUNDING * sums[2])
                     rr = updated;
                 if (rr > 0.25 * before || rr == updated)
-                    break;
+                    return;
                 before = rr;
                 textbook = true;
             }
             textbook = textbook || iteration >= PIPELINED;
-            phase = textbook ? RESUME : of_guess ? BEGIN : GET_W;
+            phase = textbook ? RESTART : of_guess ? BEGIN : GET_W;
             of_guess = false;
             since = 0;
         } else if (phase == GET_W) {
@@ -463,54 +387,184 @@ for (int system = group; system < systems; system += groups) {
             updated = sums[0];
             const double gamma = sums[1];
             // p . A p is gamma / alpha
-            if (!BATCHED && phase == ITERATE && sums[3] > 0.0)
-                least = fmin(least, gamma_before / alpha / sums[3]);
+            if (watch && phase == ITERATE && sums[3] > 0.0)
+                least = fmin(least, gamma_before * per_alpha / sums[3]);
             ended = iteration >= max_iterations || (watch && least <= 0.0);
             since += phase == ITERATE;
-            left_off = BATCHED && sums[3] > 0.0 && !ended && updated > goal;
-            if (left_off)
-                break;
+            if (BATCHED && sums[3] > 0.0 && !ended && updated > goal) {
+                phase = LEAVE;
+                return;
+            }
             const bool rounded = !textbook && updated > goal && updated < CARRIED * rr;
             textbook = textbook || rounded;
             afresh = afresh || rounded;
             if (ended || !(updated > goal) || rounded || (since == RENEWED_EVERY && !textbook)) {
                 phase = RESIDUAL;
-                measured = true;
-                continue;
+                return;
             }
-            beta = iteration > 0 && !afresh ? gamma / gamma_before : 0.0;
+            if (phase == RESTART)
+                afresh = afresh || fabs(sums[2]) > ALONG * gamma_before;
+            beta = iteration > 0 && !afresh ? gamma * per_gamma : 0.0;
             afresh = false;
             if (textbook) {
                 phase = DIRECTION;
             } else {
                 phase = ITERATE;
-                alpha = gamma / (sums[2] - beta * gamma / alpha);
+                alpha = gamma / (sums[2] - beta * gamma * per_alpha);
                 ++iteration;
             }
             gamma_before = gamma;
         }
+    };
+    while (phase < END) {
+        ++epoch;
+        word *const outgoing = places + size_t(epoch % 2) * 4 * nodes;
+        const bool tells_solution = phase >= GET_Z && phase <= ITERATE || phase == UPDATE;
+        bool few = false;
+#if BATCHED
+        // so few go on that the rest may wait for the next launch
+        few = adds_up && me == 0 && *(volatile int *)remaining.data <= linger.data[0];
+#endif
+        for (int k = 0; k < SUMS; ++k)
+            sums[k] = 0.0;
+#pragma unroll 1
+        for (int base = warp * ROWS_OF_WARP; !adds_up && base < rows; base += ROWS_AT_ONCE) {
+            // threads without a component go along: they take part in shuffles
+            const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
+            const bool mine = base + lane / LANES < rows && sub < 3;
+            auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
+            const double y = phase == RESIDUAL ? product(row, solution, epoch - 1, true) : vector(PRODUCT);
+            double x = vector(X), r = vector(R), u = vector(U), p = vector(P), v = y, bi = 0.0;
+            if (phase == ITERATE) {
+                const double w = vector(W), z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
+                const double s = w + beta * vector(S);
+                v = w - alpha * z;
+                p = u + beta * p;
+                x += alpha * p;
+                r -= alpha * s;
+                u -= alpha * q;
+                if (mine) {
+                    vector(Z) = z;
+                    vector(Q) = q;
+                    vector(S) = s;
+                    vector(P) = p;
+                    vector(X) = x;
+                    vector(R) = r;
+                    vector(U) = u;
+                    vector(W) = v;
+                }
+            } else if (phase == RESIDUAL) {
+                bi = double(b_of[(3 * size_t(row0) + i) * stride + slot]);
+                r = v = bi - y;
+                x = double(REAL(x));
+                if (mine) {
+                    vector(X) = x;
+                    vector(R) = r;
+                }
+            } else if (phase == UPDATE) {
+                x += alpha * p;
+                r = v = r - alpha * vector(S);
+                if (mine) {
+                    vector(X) = x;
+                    vector(R) = r;
+                }
+            } else if (phase == GET_Z || phase == RESUME || phase == RESTART) {
+                v = vector(W);
+                if (mine && phase == GET_Z)
+                    vector(Z) = y;
+            } else if (phase == DIRECTION) {
+                p = u + beta * p;
+                if (mine)
+                    vector(P) = p;
+            } else if (mine && phase != GET_S && phase != CURVATURE) {
+                vector(W) = y;
+            }
+            double give = p;
+            if (phase != GET_W && phase != DIRECTION && phase != CURVATURE)
+                give = precondition(row, v);
+            publish(outgoing, row, give, mine);
+            // as it will be stored, should this be the end
+            if (tells_solution)
+                publish(solution, row, double(REAL(x)), mine);
+            if (!mine)
+                continue;
+            if (phase == RESIDUAL) {
+                vector(U) = give;
+                const double magnitude = size + fabs(bi);
+                sums[0] += r * r;
+                sums[1] += bi * bi;
+                sums[2] += magnitude * magnitude;
+            } else if (phase == GET_S) {
+                vector(S) = y;
+                vector(Q) = give;
+            } else if (phase == CURVATURE) {
+                vector(S) = y;
+                sums[0] += p * y;
+                sums[1] += p * p;
+            } else if (phase == UPDATE) {
+                vector(U) = give;
+                sums[0] += r * r;
+                sums[1] += r * give;
+            } else if (tells_solution) {
+                vector(M) = give;
+                sums[0] += r * r;
+                sums[1] += r * u;
+                sums[2] += phase == RESTART ? r * p : v * u;
+                // of many systems nobody asks for the curvature
+                if (!BATCHED)
+                    sums[3] += p * p;
+            }
+        }
+        if (!adds_up) {
+            of_guess = false;
+            const double sum = warp_sums(sums);
+            if (lane % 8 == 0)
+                partial[warp][lane / 8] = sum;
+        }
+        __syncthreads();
+        if (adds_up) {
+            // what the next factors need is on its way while others are waited for
+            const double per_gamma = 1.0 / gamma_before, per_alpha = 1.0 / alpha;
+            asm volatile("" ::"d"(per_gamma), "d"(per_alpha));
+            meet(few);
+            decide(per_gamma, per_alpha);
+            if (lane == 0)
+                factors[0] = alpha, factors[1] = beta, *next = phase;
+        } else if (phase != CURVATURE && phase != UPDATE) {
+#pragma unroll 1
+            for (int base = warp * ROWS_OF_WARP; base < rows; base += ROWS_AT_ONCE) {
+                const int row = min(base + lane / LANES, rows - 1);
+                const double y = product(row, outgoing, epoch, false);
+                if (base + lane / LANES < rows && sub < 3)
+                    vectors[PRODUCT * length + 3 * row + sub] = y;
+            }
+        }
+        __syncthreads();
+        if (*quit)
+            return;
+        alpha = factors[0], beta = factors[1], phase = *next;
     }
 
 #if BATCHED
-    if (left_off) {
+    if (phase == LEAVE) {
         for (int i = tid; i < length; i += THREADS)
             for (int k = 0; k < 9; ++k)
                 saved_vectors[k * length + i] = vectors[k * length + i];
-        if (me == 0 && tid == 0) {
+        if (me == 0 && adds_up && lane == 0) {
             saved[0] = double(iteration), saved[1] = double(since);
             saved[2] = gamma_before, saved[3] = alpha, saved[4] = before, saved[5] = goal, saved[6] = double(textbook);
             saved[7] = rr;
         }
         continue;
     }
-    if (me == 0 && tid == 0) {
+    if (me == 0 && adds_up && lane == 0) {
         solving.data[slot] = 0;
         atomicSub(remaining.data, 1);
     }
 #endif
     for (int i = tid; i < length; i += THREADS)
         x_of[(3 * size_t(row0) + i) * stride + slot] = REAL(vectors[X * length + i]);
-    if (me == 0 && tid == 0) {
+    if (me == 0 && adds_up && lane == 0) {
         outcome.data[4 * slot] = double(iteration);
         outcome.data[4 * slot + 1] = sqrt(rr);
         outcome.data[4 * slot + 2] = sqrt(goal);

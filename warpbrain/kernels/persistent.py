@@ -10,8 +10,9 @@ Matrix Anal. Appl. 39, 426), long solves go over to textbook conjugate gradients
 to reach the tolerance in the end. Vectors and sums are double in either precision.
 
 **Meetings.** There are no more blocks than multiprocessors, and each of these has room for one: all run at once. A
-block writes its sums, labelled with the number of the meeting, and waits for those of all others, which it adds in one
-order: the same bits every time. A block that does not hear from another for two seconds gives up, then all do, and
+block writes its sums, labelled with the number of the meeting, and one of its warps waits for those of all others and
+adds them in one order: the same bits every time. Numbers for neighbours are labelled, too: the other warps need no
+fence to multiply them meanwhile. A block that does not hear from another for two seconds gives up, then all do, and
 `PersistentSolve.outcome` raises: nothing hangs.
 """
 
@@ -29,41 +30,44 @@ from warpbrain.errors import SolveError
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 
-#: Threads of a block, and how many of them may share a row: the most with which all rows are under way at once.
-THREADS, LANES = 512, (16, 8, 4)
+#: Threads of a block that have rows, and how many of them may share one: the most with which all rows are under way at
+#: once. One more warp adds up the sums of all blocks.
+_WORKERS, LANES = 480, (16, 8, 4)
+#: Threads of a block.
+THREADS = _WORKERS + 32
 #: What a kernel has of a multiprocessor's shared memory without asking for it [bytes].
 _RESERVED = 6 * 1024
-#: Numbers of a row beside the matrix: nine vectors of three components and an inverse diagonal block.
+#: Numbers of a row beside the matrix: ten vectors of three components and half an inverse diagonal block.
 NUMBERS = 36
-#: Sums of a meeting; a message has half of one.
+#: Sums of a meeting; a message is one, and the number of the meeting.
 _SUMS = 4
 #: Blocks that may meet.
 MOST_BLOCKS = 256
-#: Rows that a block has at least, unless there are fewer: what two blocks say to each other takes longer than these.
-_LEAST_ROWS = 8
+#: Rows that a block has at least, unless there are fewer: what more blocks say to each other takes longer than these.
+_LEAST_ROWS = 32
 
 
-def native_code(precision: Precision, shared_bytes: int, threads: int, lanes: int, batched: bool = False) -> str:
-    """What the kernels consist of, for blocks with so much shared memory and so many threads, `lanes` for a row."""
+def native_code(precision: Precision, shared_bytes: int, lanes: int, messages: int, batched: bool = False) -> str:
+    """What the kernels consist of: `lanes` threads have a row, and a thread of the last warp has `messages`."""
     real = {"double": "double", "single": "float"}[precision.name]
     code = files("warpbrain.kernels").joinpath("persistent.cu").read_text(encoding="utf-8")
     return (
         f"#define BATCHED {int(batched)}\n"
         f"using REAL = {real};\n"
-        f"constexpr int THREADS = {threads}, LANES = {lanes}, SHARED_BYTES = {shared_bytes};\n"
+        f"constexpr int THREADS = {THREADS}, LANES = {lanes}, MESSAGES = {messages}, SHARED_BYTES = {shared_bytes};\n"
         f"constexpr double ROUNDING = {precision.epsilon!r};\n"
     ) + code
 
 
 @cache
-def persistent_kernel(precision: Precision, shared_bytes: int, threads: int, lanes: int) -> Any:
-    """Make (once) the kernel of blocks with so much shared memory and so many threads, of which `lanes` share a row."""
+def persistent_kernel(precision: Precision, shared_bytes: int, lanes: int, messages: int) -> Any:
+    """Make (once) the kernel of what `native_code` is for."""
     vec3, mat33 = precision.vec3, precision.mat33
-    module = compiled_module(f"persistent_{precision.name}_{shared_bytes}_{threads}_{lanes}")
-    module.options["block_dim"] = threads
+    module = compiled_module(f"persistent_{precision.name}_{shared_bytes}_{lanes}_{messages}")
+    module.options["block_dim"] = THREADS
     numbers = wp.constant(shared_bytes // 8)
 
-    @wp.func_native(native_code(precision, shared_bytes, threads, lanes))
+    @wp.func_native(native_code(precision, shared_bytes, lanes, messages))
     def solve(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -83,7 +87,7 @@ def persistent_kernel(precision: Precision, shared_bytes: int, threads: int, lan
         outcome: wp.array[wp.float64],
     ): ...
 
-    @wp.kernel(module=module, launch_bounds=(threads, 1), grid_stride=False)
+    @wp.kernel(module=module, launch_bounds=(THREADS, 1), grid_stride=False)
     def conjugate_gradients(
         offsets: wp.array[int],
         columns: wp.array[int],
@@ -125,12 +129,13 @@ def shared_memory(device: wp.Device) -> int:
     return int(device.max_shared_memory_per_block - _RESERVED) // 8 * 8
 
 
-def share_rows(offsets: NDArray[np.int32], blocks: int) -> tuple[NDArray[np.int32], int]:
-    """First row of each block, by the entries (n + 1,) of rows, and how many threads are to share a row."""
+def share_rows(offsets: NDArray[np.int32], blocks: int) -> tuple[NDArray[np.int32], int, int]:
+    """First row of each block, by the entries (n + 1,) of rows; how many threads share a row; messages for a thread."""
     starts = np.searchsorted(offsets, np.linspace(0, offsets[-1], blocks + 1)).astype(np.int32)
     starts[0], starts[-1] = 0, len(offsets) - 1
     rows = int(np.max(np.diff(starts)))
-    return starts, next((lanes for lanes in LANES if rows * lanes <= THREADS), LANES[-1])
+    lanes = next((lanes for lanes in LANES if rows * lanes <= _WORKERS), LANES[-1])
+    return starts, lanes, -(-blocks * _SUMS // 32)
 
 
 class Meetings:
@@ -147,7 +152,7 @@ class Meetings:
     exchange : wp.array of double
         Two places a group that take turns, and one for the solution, with four numbers a row.
     messages : wp.array of uint64
-        Two places a group that take turns, with a message for each half of a sum of a block.
+        Two places a group that take turns, with a message for each sum of a block.
     scratch : wp.array of double
         What has no room on the chip.
     control : wp.array of int
@@ -167,6 +172,7 @@ class Meetings:
             return
         self.control.zero_()
         self.messages.zero_()
+        self.exchange.zero_()
         raise SolveError(
             f"conjugate gradients on {self._device.name}: its blocks waited two seconds for each other, because "
             "something else holds a part of it; with WARPBRAIN_PERSISTENT=0 in the environment they need not wait"
@@ -203,8 +209,8 @@ class PersistentSolve:
     ) -> None:
         device, n = b.device, b.shape[0]
         self._blocks = max(1, min(device.sm_count, MOST_BLOCKS, n // _LEAST_ROWS))
-        starts, lanes = share_rows(matrix.offsets.numpy(), self._blocks)
-        self._kernel = persistent_kernel(precision, shared_memory(device), THREADS, lanes)
+        starts, lanes, messages = share_rows(matrix.offsets.numpy(), self._blocks)
+        self._kernel = persistent_kernel(precision, shared_memory(device), lanes, messages)
         self._meetings = m = Meetings(n, self._blocks, 1, device)
         self._outcome = wp.zeros(4, dtype=wp.float64, device=device)
         self._before = [

@@ -21,14 +21,14 @@ _SCALARS, _VECTORS = 8, 27
 
 
 @cache
-def persistent_batch_kernels(precision: Precision, shared_bytes: int, threads: int, lanes: int) -> tuple[Any, Any]:
+def persistent_batch_kernels(precision: Precision, shared_bytes: int, lanes: int, messages: int) -> tuple[Any, Any]:
     """Make (once) the kernel, and one that marks systems as not begun; see `persistent_kernel`."""
     scalar = precision.scalar
-    module = compiled_module(f"persistent_{precision.name}_{shared_bytes}_{threads}_{lanes}_batched")
-    module.options["block_dim"] = threads
+    module = compiled_module(f"persistent_{precision.name}_{shared_bytes}_{lanes}_{messages}_batched")
+    module.options["block_dim"] = THREADS
     numbers = wp.constant(shared_bytes // 8)
 
-    @wp.func_native(native_code(precision, shared_bytes, threads, lanes, batched=True))
+    @wp.func_native(native_code(precision, shared_bytes, lanes, messages, batched=True))
     def solve(
         slots: wp.array[int],
         count: wp.array[int],
@@ -53,7 +53,7 @@ def persistent_batch_kernels(precision: Precision, shared_bytes: int, threads: i
         solving: wp.array[int],
     ): ...
 
-    @wp.kernel(module=module, launch_bounds=(threads, 1), grid_stride=False)
+    @wp.kernel(module=module, launch_bounds=(THREADS, 1), grid_stride=False)
     def conjugate_gradients(
         slots: wp.array[int],
         count: wp.array[int],
@@ -138,8 +138,8 @@ class PersistentBatch:
         needed = n * (8 * NUMBERS + 4) + len(pairs) * (9 * precision.numpy.itemsize + 4)
         self._blocks = min(-(-needed // shared), device.sm_count, MOST_BLOCKS, n)
         self._groups = device.sm_count // self._blocks
-        starts, lanes = share_rows(offsets.numpy(), self._blocks)
-        self._solve, self._begin = persistent_batch_kernels(precision, shared, THREADS, lanes)
+        starts, lanes, messages = share_rows(offsets.numpy(), self._blocks)
+        self._solve, self._begin = persistent_batch_kernels(precision, shared, lanes, messages)
         self._meetings = m = Meetings(n, self._blocks, self._groups, device)
         self._memory = wp.zeros((slots, _SCALARS + _VECTORS * n), dtype=wp.float64, device=device)
         # as of a single solve, the last of which is the curvature: not watched

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.kernels.distance_field import distance_kernels, smooth_distance
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import compiled_module, threads_of_block
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.mesh.quality import extent
@@ -338,7 +338,7 @@ class DistanceField:
             precision.scalar(reach),
             self.coefficients,
         ]
-        wp.launch(self._fill, dim=shape, inputs=inputs, device=device)
+        wp.launch(self._fill, dim=shape, inputs=inputs, device=device, block_dim=threads_of_block(device))
         # the tree is needed until this is done, and no longer
         wp.synchronize_device(device)
         if in_place:
@@ -355,7 +355,8 @@ class DistanceField:
         inputs = [
             points, self.coefficients, self.origin, self._precision.scalar(self.spacing), distances, directions
         ]  # fmt: skip
-        wp.launch(self._evaluate, dim=len(points), inputs=inputs, device=self._device)
+        block_dim = threads_of_block(self._device)
+        wp.launch(self._evaluate, dim=len(points), inputs=inputs, device=self._device, block_dim=block_dim)
 
 
 def _edge(points: Floats, faces: NDArray[np.int32]) -> float:
