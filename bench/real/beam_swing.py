@@ -8,7 +8,7 @@ stress that relax (`viscoelasticity`, moduli `b_i` relative to that at rest, tim
     s^2 + w0^2 (1 + (beta + h) s + sum_i b_i s t_i / (1 + s t_i)) = 0
 
 `beta` = 1 ms is Rayleigh's damping, `h` = 1 ms to first order that of steps of backward Euler; the step changes the
-frequency by less than 0.2 %. Two branches are fitted to the first release under the beam's own weight, all else is
+frequency by 0.1 %. Two branches are fitted to the first release under the beam's own weight, all else is
 predicted. `--to-rest` is the same motion with steps that double, which do not resolve a swing.
 """
 
