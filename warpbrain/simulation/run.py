@@ -142,7 +142,8 @@ def _motion(case: Case, system: System, steps: int, watching: Watching) -> Follo
     clock = PhaseClock(system.device)
     every = max(1, steps // 10)
     history: list[dict[str, Any]] = []
-    recorded, states = recorded_times(case, ("fit", "check")), {}
+    recorded = recorded_times(case, ("fit", "check"))
+    states: dict[float, NodalState] = {}
     begun = 0.0
     for step in range(1, steps + 1):
         min_J = simulator.step_to(step / steps, clock)
