@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 from referee.baselines import METHODS, answers_of
@@ -15,7 +13,7 @@ from referee.challenge.score import outcome_of
 from referee.intervals import Share
 from referee.outcomes import Outcome
 from referee.scores import shares
-from referee.threads import single
+from referee.threads import mapped
 from warpbrain.cases.reading import read_case
 
 #: Shares that are compared.
@@ -30,9 +28,8 @@ COMPARED = (
 
 def compare(folders: Sequence[Path], outcomes: Sequence[Outcome]) -> dict[str, dict[str, Share]]:
     """Shares of each method, under the names of the tool's; `folders`: of the case of each outcome."""
-    # a fresh process knows nothing of the threads of this one
-    with ProcessPoolExecutor(max_workers=os.cpu_count(), mp_context=get_context("spawn"), initializer=single) as pool:
-        said = list(pool.map(_answers, folders))
+    with mapped(os.cpu_count() or 1) as each:
+        said = list(each(_answers, folders))
     found = {}
     for method in METHODS:
         given = [outcome_of(o.label, answers[method]) for o, answers in zip(outcomes, said, strict=True)]

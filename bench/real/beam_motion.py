@@ -54,14 +54,15 @@ class Swing:
         Relative to critical.
     amplitude : float
         Of the vertical way at the release [m].
-    creep : float
-        How far the mean sinks after it [m].
+    creep, creep_time : float
+        What part of the whole way the mean still sinks after it, and in what time [s].
     """
 
     frequency: float
     damping: float
     amplitude: float
     creep: float
+    creep_time: float
 
     @property
     def sag(self) -> float:
@@ -129,7 +130,8 @@ class Release:
         first = float(hertz[np.where(hertz > 2.0, spectrum, 0.0).argmax()])
         guess = [-0.8 * z[-1], 0.0, first, 0.05, z[-1], -0.1 * z[-1], 0.0]
         fitted = least_squares(lambda p: course(p) - z, guess, x_scale=np.maximum(np.abs(guess), 1e-2)).x
-        return Swing(float(fitted[2]), float(fitted[3]), abs(float(fitted[0])), float(fitted[5]))
+        amplitude, _, frequency, damping, end, creep, slowness = fitted.tolist()
+        return Swing(frequency, damping, abs(amplitude), -creep / end, float(np.exp(slowness)))
 
 
 def rigid_motion(before: Floats, after: Floats) -> tuple[Floats, Floats]:

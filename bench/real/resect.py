@@ -42,14 +42,14 @@ def rigid(points: Floats, moved: Floats) -> tuple[Rotation, Floats, Floats]:
     return Rotation.align_vectors(moved - b, points - a)[0], a, b
 
 
-def left_out_by_rigid(points: Floats, moved: Floats) -> float:
-    """Root mean square distance [m] of each landmark to where a rigid motion of all others takes it."""
+def left_out_by_rigid(points: Floats, moved: Floats) -> Floats:
+    """Distance (n,) [m] of each landmark to where a rigid motion of all others takes it."""
     errors = []
     for k in range(len(points)):
         others = np.arange(len(points)) != k
         R, a, b = rigid(points[others], moved[others])
         errors.append(float(np.linalg.norm(R.apply(points[k] - a) + b - moved[k])))
-    return root_mean_square(np.array(errors))
+    return np.array(errors)
 
 
 def most_probable(found: Diagnosis) -> WeightedSet:
@@ -93,7 +93,11 @@ def diagnosed(name: str) -> dict[str, Any]:
     best = most_probable(found)
     left_out = HeldOut(found.base.at.sensors, local=True)
     # a landmark is a block: each from all others
-    assert len(np.unique(left_out.blocks)) == len(points)
+    assert np.array_equal(np.unique(left_out.blocks), np.arange(len(points)))
+    prediction = left_out.predict(best.marginal.model, best.residual)
+    squared = np.bincount(left_out.blocks, weights=prediction.errors**2)
+    by_rigid = left_out_by_rigid(points, moved)
+    worse = 1e6 * (squared - by_rigid**2)
     return {
         "case": name,
         "title": case.title,
@@ -108,8 +112,10 @@ def diagnosed(name: str) -> dict[str, Any]:
         "rigid_shift_mm": 1e3 * float(np.linalg.norm(b - a)),
         "rigid_turn_degrees": float(np.degrees(R.magnitude())),
         "rigid_left_mm": 1e3 * root_mean_square(np.linalg.norm(exact - moved, axis=1)),
-        "rigid_left_out_mm": 1e3 * left_out_by_rigid(points, moved),
-        "left_out_mm": 1e3 * left_out.error(left_out.predict(best.marginal.model, best.residual)),
+        "rigid_left_out_mm": 1e3 * root_mean_square(by_rigid),
+        "left_out_mm": 1e3 * left_out.error(prediction),
+        "left_out_worse_mm2": float(worse.mean()),
+        "left_out_worse_sd_mm2": float(worse.std(ddof=1) / np.sqrt(len(worse))),
         "left_out_of_nothing_mm": 1e3 * found.fit.refitted[1],
         "rigid_apart_mm": 1e3 * root_mean_square(np.linalg.norm(rigid_of(found, best, points) - exact, axis=1)),
         "smallest": {kind: [one.size, one.unit, one.name] for kind, one in found.smallest.items()},

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from referee.errors import InputError
+
+if TYPE_CHECKING:
+    from referee.challenge.answers import Answer
 
 #: The cases of an exported set, in its folder: what is scored.
 LIST = "cases.txt"
@@ -20,9 +23,11 @@ def add_challenge(commands: Any) -> None:
     export.add_argument("folder", type=Path, help="gets CASE.npz, the folder CASE and cases.txt")
     export.add_argument("--cases", type=Path, required=True, help="folder of case folders")
     export.add_argument("--only", default="", help="names of cases, separated by commas; all if absent")
+    export.add_argument("--workers", type=int, default=1, help="processes")
     baselines = parts.add_parser("baselines", help="answer by forward selection, LASSO, relevance vectors, discrepancy")
     baselines.add_argument("folder", type=Path, help="where export wrote")
     baselines.add_argument("--out", type=Path, required=True, help="folder that gets METHOD.csv")
+    baselines.add_argument("--workers", type=int, default=1, help="processes")
     tool = parts.add_parser("tool", help="turn diagnoses of warpbrain into answers")
     tool.add_argument("folder", type=Path, help="where export wrote")
     tool.add_argument("--diagnoses", type=Path, required=True, help="folder with CASE/diagnosis.json")
@@ -51,25 +56,34 @@ def challenge(given: argparse.Namespace) -> int:
 def _export(given: argparse.Namespace) -> int:
     from referee.challenge.export import export
 
-    count = export(given.cases, given.folder, [name for name in given.only.split(",") if name])
+    count = export(given.cases, given.folder, [name for name in given.only.split(",") if name], given.workers)
     print(f"{count} cases in {given.folder}")
     return 0
 
 
 def _baselines(given: argparse.Namespace) -> int:
-    from referee.baselines import METHODS, answers_of
+    from referee.baselines import METHODS
     from referee.challenge.answers import write_answers
+    from referee.threads import mapped
+
+    names = _names(given.folder)
+    answers = []
+    with mapped(given.workers) as each:
+        for of_case in each(_of_baselines, [given.folder / f"{name}.npz" for name in names]):
+            answers.append(of_case)
+            words = (f"{method}: {answer.verdict} {' '.join(answer.names)}" for method, answer in of_case.items())
+            print(f"{names[len(answers) - 1]}: {', '.join(words)}", flush=True)
+            # what is interrupted leaves the answers that there are
+            for method in METHODS:
+                write_answers(given.out / f"{method}.csv", [of_case[method] for of_case in answers])
+    return 0
+
+
+def _of_baselines(file: Path) -> dict[str, Answer]:
+    from referee.baselines import answers_of
     from referee.challenge.neutral import read_case
 
-    said = []
-    for name in _names(given.folder):
-        said.append(answers_of(read_case(given.folder / f"{name}.npz")))
-        told = (f"{method}: {answer.verdict} {' '.join(answer.names)}" for method, answer in said[-1].items())
-        print(f"{name}: {', '.join(told)}", flush=True)
-        # what is interrupted leaves the answers that there are
-        for method in METHODS:
-            write_answers(given.out / f"{method}.csv", [answers[method] for answers in said])
-    return 0
+    return answers_of(read_case(file))
 
 
 def _tool(given: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,12 @@ from referee.compliance.neo_hookean import NeoHookeanBody
 from referee.compliance.nuisances import noise_covariance, nuisances
 from referee.compliance.response import DeclaredResponse
 from referee.errors import InputError
+from referee.threads import mapped
 from warpbrain.cases.case import Case
 from warpbrain.cases.reading import read_case
 
 
-def export(cases: Path, out: Path, only: Sequence[str] = ()) -> int:
+def export(cases: Path, out: Path, only: Sequence[str] = (), workers: int = 1) -> int:
     """Write `out/CASE.npz` and `out/CASE`, the case folder as it is, for each case, and the list of them.
 
     Parameters
@@ -30,6 +32,8 @@ def export(cases: Path, out: Path, only: Sequence[str] = ()) -> int:
     out : Path
     only : sequence of str, optional
         Names of the cases that are exported; all if there are none.
+    workers : int
+        Processes.
 
     Returns
     -------
@@ -48,18 +52,22 @@ def export(cases: Path, out: Path, only: Sequence[str] = ()) -> int:
     if not names:
         raise InputError(f"{cases}: no folder in it has a case.toml")
     out.mkdir(parents=True, exist_ok=True)
-    for count, name in enumerate(names, start=1):
-        if (out / f"{name}.npz").exists():
-            continue
-        started = time.process_time()
-        # a file that is there is whole
-        written = out / f".{name}.npz"
-        write_case(written, neutral_case(read_case(folders[name])))
-        shutil.copytree(folders[name], out / name, dirs_exist_ok=True)
-        written.rename(out / f"{name}.npz")
-        print(f"{count} of {len(names)}: {name} in {time.process_time() - started:.0f} s", flush=True)
+    waiting = [folders[name] for name in names if not (out / f"{name}.npz").exists()]
+    with mapped(workers) as each:
+        for count, told in enumerate(each(partial(_export, out), waiting), start=1):
+            print(f"{count} of {len(waiting)}: {told}", flush=True)
     (out / LIST).write_text("".join(f"{name}\n" for name in names), encoding="ascii")
     return len(names)
+
+
+def _export(out: Path, folder: Path) -> str:
+    """Write a case; the file appears when it is whole."""
+    started = time.process_time()
+    written = out / f".{folder.name}.npz"
+    write_case(written, neutral_case(read_case(folder)))
+    shutil.copytree(folder, out / folder.name, dirs_exist_ok=True)
+    written.rename(out / f"{folder.name}.npz")
+    return f"{folder.name} in {time.process_time() - started:.0f} s"
 
 
 def neutral_case(case: Case) -> NeutralCase:
@@ -69,9 +77,9 @@ def neutral_case(case: Case) -> NeutralCase:
     nuisance_name, nuisance_response = nuisances(response)
     names, numbers, places, lengths, amounts, units, columns = [], [], [], [], [], [], []
     for number, candidate in enumerate(candidates(response)):
-        found = seen(response, candidate)
-        k = found.shape[1]
-        columns.append(found)
+        answer = seen(response, candidate)
+        k = answer.shape[1]
+        columns.append(answer)
         names += [candidate.cause] * k
         numbers += [number] * k
         places += [candidate.place] * k

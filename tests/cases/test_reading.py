@@ -11,11 +11,13 @@ from wrong_cases import FORCE, GRAVITY, SECOND_LAW, WRONG
 from warpbrain.cases.boundary import Fixed, Forced
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.shipped import BEAM, RESECT, SHIPPED, STAND_INS, find_case
+from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh, write_mesh
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 from warpbrain.recordings.registration import Registration
 from warpbrain.simulation.of_case import model_of
+from warpbrain.worlds.body.states import stiffness_modes
 
 
 def refusal(folder, *changes, mesh: TetMesh | None = None) -> str:
@@ -59,6 +61,18 @@ def test_the_accuracy_of_a_registration_is_in_mm_and_degrees(tmp_path):
     assert read_case(write_folder(tmp_path / "none")).registration is None
     head = ('axes = "RAS"', 'axes = "RAS"\nregistration = { mm = 2.5, degrees = 180 }')
     assert read_case(write_folder(tmp_path / "declared", head)).registration == Registration(0.0025, np.pi)
+
+
+def test_how_unlike_a_tissue_is_from_place_to_place(tmp_path):
+    assert read_case(write_folder(tmp_path / "none")).heterogeneity is None
+    cast = ("poisson = 0.45", "poisson = 0.45\nheterogeneity = 0.02")
+    case = read_case(write_folder(tmp_path / "cast", cast))
+    assert read_case(write_case(tmp_path / "again", case).parent).heterogeneity == case.heterogeneity == 0.02
+    # the field that a diagnosis allows for, which few modes leave out little of
+    spread = np.linalg.norm(stiffness_modes(case.mesh, 0.02), axis=1)
+    assert 0.9 * 0.02 < np.sqrt(np.mean(spread**2)) <= 0.02
+    with pytest.raises(InputError, match=r"\[body\] heterogeneity: found -1"):
+        read_case(write_folder(tmp_path / "wrong", ("poisson = 0.45", "poisson = 0.45\nheterogeneity = -1")))
 
 
 def test_what_may_be_left_out(tmp_path):

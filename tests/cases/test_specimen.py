@@ -99,6 +99,11 @@ def test_a_specimen_is_read_and_written(tmp_path):
             "[recording 1] kind: 'points' belongs to a case with [mesh]",
         ),
         ("[tissue.1]", '[mesh]\nfile = "m.vtu"\n[tissue.1]', "[mesh]: means nothing with [specimen]"),
+        (
+            "[tissue.1]",
+            "[body]\nheterogeneity = 0.1\n[tissue.1]",
+            "[body] heterogeneity: means nothing with a [specimen]",
+        ),
         ('shape = "cylinder"\nradius = 4.0\nheight = 4.541', 'shape = "block"\nsize = [1, 0, 1]', "3 positive numbers"),
     ],
 )

@@ -11,6 +11,8 @@ from testing_machine import CUBE, case_of, recorded, simulate_test
 
 from warpbrain.cases.reading import read_case
 from warpbrain.errors import InputError
+from warpbrain.recordings.recording import PointsRecording
+from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.run import Course, Running, Watching, run
@@ -52,6 +54,23 @@ def test_steps_are_told(case):
     assert [number for number, _, _ in told] == list(range(1, 13))
     assert told[-1][1] == pytest.approx(0.012) == done.followed.time
     assert [noted for _, _, noted in told if noted] == done.followed.solution["history"]
+
+
+def test_a_motion_is_compared_at_each_time_that_it_passes(case):
+    simulator = Simulator(System(model_of(case), "cpu"))
+    places = case.mesh.points[-4:]
+    times = [0.003, 0.0052, 0.04]
+    moved = {}
+    for step in range(1, 13):
+        simulator.step_to(step / 12)
+        moved[step] = simulator.system.u.numpy()[-4:].copy()
+    # of the last time, that the motion does not reach, nothing is compared
+    displacement = np.concatenate([moved[3], moved[5], np.ones((4, 3))])
+    points, time = np.tile(places, (3, 1)), np.repeat(times, 4)
+    beads = PointsRecording(name="beads", file="b.csv", points=points, time=time, displacement=displacement)
+    done = run(replace(case, recordings=(beads,)), steps=12, elements="tet4", device="cpu")
+    [compared] = done.observed.comparisons
+    assert compared.count == 8 and compared.after.root_mean_square < 1e-12 < compared.before.root_mean_square
 
 
 def test_a_motion_to_rest_ends_at_the_equilibrium(case):

@@ -85,6 +85,8 @@ class Case(Shown):
     tissues : mapping of int to Tissue
     density, poisson : float
         [kg/m3] and without unit.
+    heterogeneity : float or None
+        Standard deviation of `ln mu` from place to place within a tissue; None if the case does not say.
     boundaries : tuple of Boundary
     mechanisms : tuple of Mechanism
     recordings : tuple of Recording
@@ -100,6 +102,7 @@ class Case(Shown):
     tissues: Mapping[int, Tissue]
     density: float
     poisson: float
+    heterogeneity: float | None = None
     frame: Frame = field(default_factory=Frame)
     gravity_axis: tuple[float, float, float] | None = None
     registration: Registration | None = None

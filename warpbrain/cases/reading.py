@@ -72,7 +72,7 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     mesh_file, found, specimen = read_anatomy(context)
     context.mesh = None if found is None else found.mesh
     tissues = read_tissues(context)
-    density, poisson = read_body(context)
+    density, poisson, heterogeneity = read_body(context)
     named = None if found is None else Named(found.mesh, tissues, context.frame, problems)
     boundaries = read_boundaries(context, named, found)
     mechanisms = read_mechanisms(context, named, axis, density)
@@ -95,6 +95,7 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
         tissues=tissues,
         density=density,
         poisson=poisson,
+        heterogeneity=heterogeneity,
         boundaries=boundaries,
         mechanisms=mechanisms,
         recordings=recordings,

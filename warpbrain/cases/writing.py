@@ -15,7 +15,7 @@ import numpy as np
 from warpbrain.atomic import output_folder, safe_name, whole_file
 from warpbrain.cases.boundary import Boundary, Contact, Displaced
 from warpbrain.cases.case import Case, Tissue
-from warpbrain.cases.format.tables import BOUNDARY, CASE, MECHANISM, PRIOR, RECORDING, TISSUE
+from warpbrain.cases.format.tables import BODY, BOUNDARY, CASE, MECHANISM, PRIOR, RECORDING, TISSUE
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
@@ -71,7 +71,7 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
         in_axes = replace(case.mesh, points=frame.directions(case.mesh.points), element_vectors=turned)
         write_mesh(folder / name, in_axes, unit=frame.unit, axes=frame.axes)
     tables["tissue"] = {str(label): _tissue(tissue, frame) for label, tissue in sorted(case.tissues.items())}
-    tables["body"] = {"density": case.density, "poisson": case.poisson}
+    tables["body"] = _values(BODY, "", vars(case), frame)
     if case.boundaries:
         tables["boundary"] = [_boundary(folder, boundary, frame) for boundary in case.boundaries]
     if case.mechanisms:

@@ -308,6 +308,8 @@ def _mesh_error(
         return None, None
     from warpbrain.report.comparison import describe_mesh_error
     from warpbrain.simulation.mesh_error import mesh_error, observe_without
+    from warpbrain.simulation.observation import observe
+    from warpbrain.simulation.result import nodal_state_of
 
     smaller = options.mesh_error == "size"
     try:
@@ -324,5 +326,8 @@ def _mesh_error(
     except SolveError as error:
         # the run itself is sound
         return None, {"unknown": str(error)}
-    without = observe_without(case, result, estimated_error, outcome.get("time_s"))
-    return estimated_error, describe_mesh_error(estimated_error, system.model.elements, observed, without)
+    time = outcome.get("time_s")
+    without = observe_without(case, result, estimated_error, time)
+    # of a motion the error is that of its end
+    at_end = observed if time is None else observe(case, nodal_state_of(system, time), time)
+    return estimated_error, describe_mesh_error(estimated_error, system.model.elements, at_end, without)

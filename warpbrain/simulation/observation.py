@@ -49,7 +49,7 @@ def observe(
         Of the state [s]; None for a state at rest long after everything.
     others : mapping of float to State, optional
         States of earlier times. Without them, rows of other times are compared with the state at rest if what acts then
-        is the same; a motion is compared with the rows of its own time alone.
+        is the same; the end of a motion with the rows of its own time alone.
     """
     require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
     comparisons, skipped = [], []

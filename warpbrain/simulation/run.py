@@ -94,7 +94,7 @@ def follow(case: Case, system: System, course: Course, watching: Watching) -> Fo
     if course.until is not None:
         return _slowly(case, system, course.until, course, watching)
     if course.steps is not None:
-        return _motion(system, course.steps, watching)
+        return _motion(case, system, course.steps, watching)
     return _to_rest(system, course, watching) if course.to_rest else _equilibrium(system, course, watching)
 
 
@@ -137,15 +137,21 @@ def _to_rest(system: System, course: Course, watching: Watching) -> Followed:
     return Followed(solution, None, (*times, time.perf_counter())[0], clock.seconds, clock.counts)
 
 
-def _motion(system: System, steps: int, watching: Watching) -> Followed:
+def _motion(case: Case, system: System, steps: int, watching: Watching) -> Followed:
     simulator = Simulator(system)
     clock = PhaseClock(system.device)
     every = max(1, steps // 10)
     history: list[dict[str, Any]] = []
+    recorded = recorded_times(case, ("fit", "check"))
+    states: dict[float, NodalState] = {}
     begun = 0.0
     for step in range(1, steps + 1):
         min_J = simulator.step_to(step / steps, clock)
         begun = begun or time.perf_counter()
+        # a recorded time is that of the step that ends nearest to it
+        near = [at for at in recorded if abs(at - simulator.time) <= 0.5 * simulator.time_step and at not in states]
+        if near:
+            states |= dict.fromkeys(near, nodal_state_of(system, simulator.time))
         noted = None
         if step % every == 0 or step == steps:
             noted = {"time_s": simulator.time, "cg_iterations": simulator.last_solve().iterations, "min_J": min_J}
@@ -160,7 +166,7 @@ def _motion(system: System, steps: int, watching: Watching) -> Followed:
         "cg_tolerance": simulator.tolerance,
         "history": history,
     }
-    return Followed(solution, simulator.time, begun, clock.seconds, clock.counts)
+    return Followed(solution, simulator.time, begun, clock.seconds, clock.counts, states)
 
 
 def _slowly(case: Case, system: System, until: float, course: Course, watching: Watching) -> Followed:

@@ -98,6 +98,13 @@ BODY = Table(
         # wide enough for foams and metals, too narrow for g/cm3
         Key("density", "number", "1211.5 (the paper's Table 4) if absent.", "kg/m3", above=0.0, default=1211.5),
         Key("poisson", "number", "Poisson ratio at rest", above=-1.0, below=0.5, default=0.45),
+        Key(
+            "heterogeneity",
+            "number",
+            "Standard deviation of ln(modulus) from place to place within a tissue; that of brain if absent.",
+            above=0.0,
+            below=3.0,
+        ),
     ),
 )
 

@@ -97,8 +97,8 @@ def _law(table: Reading) -> tuple[Law | None, bool]:
         return None, False
 
 
-def read_body(context: Context) -> tuple[float, float]:
-    """Density [kg/m3] and Poisson ratio."""
+def read_body(context: Context) -> tuple[float, float, float | None]:
+    """Density [kg/m3], Poisson ratio, and standard deviation of `ln mu` from place to place if it is declared."""
     table = context.table(BODY, needed=False)
     density = table.si("density")
     if not table.has("density") and "specimen" not in context.tables:
@@ -110,4 +110,6 @@ def read_body(context: Context) -> tuple[float, float]:
     if not LIGHTEST < density < HEAVIEST:
         cure = f"{density:g} g/cm3 is {1000.0 * density:g} kg/m3" if density < LIGHTEST else "is it in kg/m3?"
         table.problem("density", f"found {density:g} kg/m3, which no tissue or gel has", cure)
-    return density, table.si("poisson")
+    if table.has("heterogeneity") and "specimen" in context.tables:
+        table.problem("heterogeneity", "means nothing with a [specimen], which is taken to be of one stiffness")
+    return density, table.si("poisson"), table.si("heterogeneity")

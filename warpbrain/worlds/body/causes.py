@@ -28,7 +28,7 @@ UNKNOWN = "unknown"
 SENTENCES = {
     "registration": "Recordings and anatomy are registered wrongly.",
     "mesh": "The mesh is too coarse, or not the shape of the anatomy.",
-    "stiffness": "Stiffness varies more from place to place than brain tissue is known to.",
+    "stiffness": "Stiffness varies more from place to place than it is known to.",
     "loads": "The known loads are not as large as was said.",
     "segmentation": "A recorded surface, or that of the anatomy, is not where it was found.",
     "forces": "A recorded force is not the one that acted, or has another direction.",

@@ -127,7 +127,7 @@ class States:
         self._near: dict[float, Floats] = {}
         self.centre = self._observations_of(case).centre
         self.realign(self.motion)
-        self.modes = stiffness_modes(case.remaining[0])
+        self.modes = stiffness_modes(case.remaining[0], case.heterogeneity or belief("tissue.field"))
         self.solves = 0
         self._factors: dict[tuple[str, ...], KeptFactors | None] = {}
 
@@ -400,23 +400,23 @@ def instants_of(case: Case, times: Sequence[float]) -> int:
     return len(times) if constant and np.isfinite(times).all() else 1
 
 
-def stiffness_modes(mesh: TetMesh) -> Floats:
-    """Modes (m, k) of `ln mu` of each element, each times its standard deviation.
+def stiffness_modes(mesh: TetMesh, sd: float) -> Floats:
+    """Modes (m, k) of `ln mu` of each element, each times its standard deviation, which at each place is `sd`.
 
     As few as hold all of its variance but `tissue.field_cut`: what fewer modes leave out is largest at the surfaces,
     and a cause that is soft or stiff would do its work.
     """
     reach = belief("tissue.field_reach") * mesh.radius
     sites = mesh.centres[spread_points(mesh.centres, 0.5 * reach, _SITES)]
-    values, vectors = np.linalg.eigh(_covariance(sites, sites, reach))
+    values, vectors = np.linalg.eigh(_correlation(sites, sites, reach))
     values, vectors = values[::-1], vectors[:, ::-1]
     count = 1 + int(np.searchsorted(np.cumsum(values), (1.0 - belief("tissue.field_cut")) * values.sum()))
-    return np.asarray(_covariance(mesh.centres, sites, reach) @ vectors[:, :count] / np.sqrt(values[:count]))
+    return np.asarray(sd * _correlation(mesh.centres, sites, reach) @ vectors[:, :count] / np.sqrt(values[:count]))
 
 
-def _covariance(a: Floats, b: Floats, reach: float) -> Floats:
+def _correlation(a: Floats, b: Floats, reach: float) -> Floats:
     squares = np.sum(a**2, axis=1)[:, None] + np.sum(b**2, axis=1)[None] - 2.0 * a @ b.T
-    return np.asarray(belief("tissue.field") ** 2 * np.exp(-0.5 * np.maximum(squares, 0.0) / reach**2))
+    return np.asarray(np.exp(-0.5 * np.maximum(squares, 0.0) / reach**2))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
