@@ -43,8 +43,8 @@ const REAL *const all_values = (const REAL *)values.data;
 const REAL *const b_of = (const REAL *)b.data;
 REAL *const x_of = (REAL *)x.data;
 int *const state = control.data + 2 * group;
-// two places that take turns, by the number of the phase, and one for the solution
 word *const mailbox = (word *)messages.data + size_t(group) * grid * 4 * SUMS;
+// two places that take turns, by the number of the phase, and one for the solution
 word *const places = (word *)exchange.data + size_t(group) * 12 * nodes, *const solution = places + 8 * size_t(nodes);
 #if BATCHED
 const int systems = count.data[0];
@@ -391,7 +391,8 @@ for (int system = group; system < systems; system += groups) {
                 least = fmin(least, gamma_before * per_alpha / sums[3]);
             ended = iteration >= max_iterations || (watch && least <= 0.0);
             since += phase == ITERATE;
-            if (BATCHED && sums[3] > 0.0 && !ended && updated > goal) {
+            // not where it begins again, which is not written down
+            if (BATCHED && phase != RESTART && sums[3] > 0.0 && !ended && updated > goal) {
                 phase = LEAVE;
                 return;
             }
