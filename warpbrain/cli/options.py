@@ -1,76 +1,18 @@
-"""Options that several commands have, how their values are checked, and what logs say of a case."""
+"""What commands share: how values of options are checked, and what logs say of a case."""
 
 from __future__ import annotations
 
 import argparse
 import math
 from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
-
-if TYPE_CHECKING:
-    from warpbrain.cases.case import Case
-    from warpbrain.report.picture import Pictures
-    from warpbrain.simulation.system import System
-    from warpbrain.terminal.record import Record
-
-_RESULT = "folder that run, estimate, diagnose or ensemble has written, or its .vtu file"
-_OPTIONS: dict[str, dict[str, Any]] = {
-    "result": {"type": Path, "metavar": "RESULT", "help": _RESULT},
-    "--case": {
-        "required": True,
-        "metavar": "NAME",
-        "help": "0529, ... (see warpbrain cases), or the path of a case folder",
-    },
-    "--tissue": {"choices": ("single", "multi"), "default": "multi", "help": "one tissue, or grey and white (default)"},
-    "--model": {
-        "metavar": "LAW",
-        "help": "neo-hookean, mooney-rivlin or ogden for every tissue (default: the case's own)",
-    },
-    "--gp": {"metavar": "MODEL"},
-    "--variant": {"choices": ("corrected", "as_published")},
-    "--poisson": {"type": float, "metavar": "NU", "help": "Poisson ratio of every tissue, in (-1, 0.5)"},
-    "--seed": {"type": int, "metavar": "S"},
-    "--tolerance": {"type": float, "default": 1e-8, "metavar": "TOL"},
-    "--device": {"metavar": "NAME", "help": "cpu, cuda:0, ... (default: the GPU if there is one, else cpu)"},
-    "--precision": {"choices": ("double", "single"), "default": "double", "help": "default: double"},
-    "--no-discretisation": {"action": "store_true", "help": "take the mesh for exact"},
-    "--steps": {"type": int, "metavar": "N", "help": "follow the motion for N time steps of 1 ms"},
-    "--to-rest": {"action": "store_true", "help": "follow the damped motion until it is at rest"},
-    "--image": {
-        "type": Path,
-        "metavar": "FILE",
-        "help": "image to warp, on whose grid all is written: .nii.gz, .nrrd, .mgz",
-    },
-    "--labels": {"type": Path, "metavar": "FILE", "help": "label volume to warp"},
-    "--points": {
-        "type": Path,
-        "nargs": "+",
-        "metavar": "FILE",
-        "default": [],
-        "help": "points to move: .mrk.json and .fcsv of 3D Slicer, BIDS electrodes.tsv",
-    },
-    "--out": {"type": Path, "metavar": "DIR"},
-    "--csv": {"type": Path, "metavar": "FILE"},
-    "--overwrite": {"action": "store_true", "help": "replace the results that are in that folder"},
-    "--quiet": {"action": "store_true", "help": "print nothing but errors"},
-}
-#: What a result can carry along.
-WARPED = ("--image", "--labels", "--points")
-
-
-def add_to(parser: argparse._ActionsContainer, *names: str, **changed: Any) -> None:
-    """Add options, those of several commands as `_OPTIONS` says; `changed` is what is other for this one."""
-    for name in names:
-        parser.add_argument(name, **{**_OPTIONS.get(name, {}), **changed})
-
-
-def add_results(parser: argparse.ArgumentParser, usual: str) -> None:
-    """Add where results go; `usual` is the name of their folder if nothing is said."""
-    add_to(parser, "--out", help=f"folder for the results (default: {usual}, or the next free {usual}-2, -3, ...)")
-    add_to(parser, "--overwrite", "--quiet")
+from warpbrain.report.files import fingerprints
+from warpbrain.report.picture import Pictures
+from warpbrain.report.summary import machine
+from warpbrain.simulation.system import System
+from warpbrain.terminal.record import Record
 
 
 def require_whole(options: argparse.Namespace, **least: int) -> None:
@@ -101,9 +43,6 @@ def require_positive(name: str, value: float | None, expected: str) -> None:
 
 def note_case(record: Record, case: Case, device: str) -> None:
     """Say in the log what is computed of which files, where, and by which versions."""
-    from warpbrain.report.files import fingerprints
-    from warpbrain.report.summary import machine
-
     record.note(
         case=str(case.path),
         sha256=", ".join(f"{name} {digest}" for name, digest in fingerprints(case).items()),

@@ -6,14 +6,13 @@ import argparse
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from warpbrain.physics.words import tabled
+from warpbrain.simulation.equilibrium import NewtonStep
+from warpbrain.simulation.relaxation import RelaxationStep
+from warpbrain.simulation.run import Watching
 from warpbrain.terminal.progress import Progress
-
-if TYPE_CHECKING:
-    from warpbrain.simulation.equilibrium import NewtonStep
-    from warpbrain.simulation.relaxation import RelaxationStep
-    from warpbrain.simulation.run import Watching
 
 #: Newton iterations that are printed one by one.
 _LONG_HISTORY = 16
@@ -23,9 +22,6 @@ _INDENT = 12 * " "
 @contextmanager
 def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[Watching]:
     """Who is told of the steps, after the head of their table is printed."""
-    from warpbrain.physics.words import tabled
-    from warpbrain.simulation.run import Watching
-
     if options.until is not None:
         name, columns = "slow change", "     time [s]   Newton    CG   min J   largest [mm]"
     elif options.steps is not None:

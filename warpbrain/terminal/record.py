@@ -24,7 +24,8 @@ class Record:
         self.arguments = tuple(arguments)
         self._quiet = quiet
         self._begun = datetime.now(UTC)
-        self._clock = time.perf_counter()
+        #: When the command began, as `time.perf_counter` counts.
+        self.clock = time.perf_counter()
         self._facts: dict[str, str] = {}
         self._lines: list[str] = []
         self._warnings: list[str] = []
@@ -70,7 +71,7 @@ class Record:
             "in": str(Path.cwd()),
             "begun": self._begun.isoformat(timespec="seconds"),
             **self._facts,
-            "took": f"{time.perf_counter() - self._clock:.1f} s",
+            "took": f"{time.perf_counter() - self.clock:.1f} s",
             "ended": " ".join(ending.split()),
         }
         lines = [f"{name:<10}{text}" for name, text in head.items()]
