@@ -13,7 +13,7 @@ from typing import Any
 from warpbrain.atomic import safe_name
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
-from warpbrain.cli.options import note_case, require_poisson, require_tolerance, require_whole
+from warpbrain.cli.options import note_case
 from warpbrain.ensemble.results import EnsembleResult, results_of
 from warpbrain.ensemble.run import SAMPLES, chosen_samples, chosen_workers, compute_missing, overloaded
 from warpbrain.ensemble.sample import Sample
@@ -118,10 +118,7 @@ def _write(
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse bad numbers before anything is computed; reads the size of a batch."""
-    require_whole(options, samples=1, steps=1, processes=1, seed=0)
-    require_poisson(options.poisson)
-    require_tolerance(options.tolerance)
+    """Refuse options that mean nothing together; reads the size of a batch."""
     if options.grid and options.seed is not None:
         raise InputError(f"--seed {options.seed}: means nothing with --grid")
     if options.dask is not None and options.processes is not None:

@@ -104,8 +104,6 @@ def _registration(options: argparse.Namespace) -> Registration | None:
 
 def _options(options: argparse.Namespace) -> EstimationOptions:
     """What is asked for; refuses bad numbers before anything is computed."""
-    if not options.nu > 0.0:
-        raise InputError(f"--nu {options.nu:g}: expected a positive number of degrees of freedom, or inf")
     return EstimationOptions(
         Likelihood(None) if math.isinf(options.nu) else Likelihood(),
         None if options.no_discretisation else Discretisation(),

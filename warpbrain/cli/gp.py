@@ -7,7 +7,6 @@ from itertools import product
 from pathlib import Path
 
 from warpbrain.atomic import check_new_folder, check_writable, output_folder, whole_folder
-from warpbrain.cli.options import require_poisson, require_whole
 from warpbrain.errors import InputError
 from warpbrain.gp import leaving_out
 from warpbrain.gp.asymmetry import asymmetries_of_papers, asymmetry
@@ -43,11 +42,6 @@ def _chosen_model(options: argparse.Namespace) -> Process:
 
 def show(options: argparse.Namespace) -> None:
     """Draw a generative model and print the shear moduli that it makes likely."""
-    if options.draws < 40:
-        raise InputError(f"--draws {options.draws}: expected at least 40, for an interval that holds 95 % of them")
-    require_whole(options, seed=0)
-    require_poisson(options.poisson)
-
     model = _chosen_model(options)
     if options.group is not None and options.group not in model.groups:
         raise InputError(
@@ -86,7 +80,6 @@ def show(options: argparse.Namespace) -> None:
 
 def fit(options: argparse.Namespace) -> None:
     """Fit a generative model and write it."""
-    require_whole(options, climbs=1)
     if options.climbs is not None and options.gp == KINDS[0]:
         raise InputError(f"--climbs {options.climbs}: means nothing with the {KINDS[0]} model")
 
@@ -125,12 +118,8 @@ def _print_change(options: argparse.Namespace, model: Process) -> None:
 
 def sample(options: argparse.Namespace) -> None:
     """Draw laws of one or several tissues."""
-    if options.number < 1:
-        raise InputError(f"-n {options.number}: expected a whole number of at least 1")
-    require_whole(options, sweep=2, seed=0)
     if options.sweep is not None and options.seed is not None:
         raise InputError(f"--seed {options.seed}: means nothing with --sweep, which draws nothing")
-    require_poisson(options.poisson)
     if len(set(options.group)) < len(options.group):
         raise InputError(f"--group {' '.join(options.group)}: a group is given twice")
 

@@ -17,8 +17,6 @@ from warpbrain.report.two_results import describe_two, read_result
 
 def view(options: argparse.Namespace) -> None:
     """Show a result in a window, or write a page of it."""
-    if options.exaggeration is not None and not 0.0 <= options.exaggeration < float("inf"):
-        raise InputError(f"--exaggeration {options.exaggeration:g}: expected a number of at least 0")
     if options.html is not None:
         check_writable(options.html)
     elif not _has_display():

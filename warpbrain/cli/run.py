@@ -14,14 +14,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import FromPrior, with_prior_draw, with_prior_middle
 from warpbrain.cases.shipped import find_case
 from warpbrain.cli import run_specimen, warp
-from warpbrain.cli.options import (
-    drawn,
-    note_device,
-    require_poisson,
-    require_positive,
-    require_tolerance,
-    require_whole,
-)
+from warpbrain.cli.options import drawn, note_device
 from warpbrain.cli.run_progress import watching
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
@@ -121,21 +114,16 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse bad numbers before anything is computed; reads the moduli."""
-    require_whole(options, steps=1)
-    require_poisson(options.poisson)
-    require_tolerance(options.tolerance)
+    """Refuse options that mean nothing together; reads the moduli."""
     if options.mesh_error is not None and options.elements in ("tet10", "tet10-mixed"):
         raise InputError(f"--mesh-error: is not known of --elements {options.elements}: expected tet4 or tet4-averaged")
     if options.mesh_error == "elements" and options.elements == "tet4-averaged":
         raise InputError("--mesh-error elements: compares with tet4-averaged: --mesh-error size says what is left")
-    require_positive("until", options.until, "a positive number of seconds")
     if options.until is not None and options.to_rest:
         raise InputError(f"--until {options.until:g}: means nothing with --to-rest")
     if options.until is not None and options.mesh_error is not None:
         raise InputError(f"--until {options.until:g}: the error of the mesh is not estimated for slow change yet")
     options.moduli = parse_moduli(options.mu)
-    require_whole(options, sample=0, seed=0)
     if options.sample is not None and options.mu:
         raise InputError(
             f"--sample {options.sample}: gives every law; --mu {' '.join(options.mu)} means nothing with it"
