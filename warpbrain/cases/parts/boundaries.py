@@ -64,8 +64,7 @@ def _history(table: Reading) -> dict[str, Any] | None:
         return None
     with collected(path, problems) as found:
         rows = read_table(path, found, ("t", *columns))
-        if rows is None or not rows.require("t", *columns):
-            return None
+        rows.require("t", *columns)
         times, values = rows.times(strictly=True), rows.vectors(*columns)
     if found:
         return None
