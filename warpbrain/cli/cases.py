@@ -69,8 +69,9 @@ def print_schema(options: argparse.Namespace) -> None:
 
 def begin(options: argparse.Namespace) -> None:
     """Make a case folder from a segmentation or from a mesh."""
-    from warpbrain.cases.starting import start_from_labels, start_from_mesh, summary
+    from warpbrain.cases.starting import start_from_labels, start_from_mesh
     from warpbrain.frame import Frame
+    from warpbrain.report.case_text import started_lines
 
     foreign = ("units", "axes", "array") if options.labels else ("others", "size", "preset")
     for name in foreign:
@@ -84,7 +85,7 @@ def begin(options: argparse.Namespace) -> None:
         case = start_from_mesh(
             options.folder, options.mesh, frame, options.tissue, options.array, overwrite=options.overwrite
         )
-    print(*summary(case), sep="\n")
+    print(*started_lines(case), sep="\n")
 
 
 def build(options: argparse.Namespace) -> None:
