@@ -176,8 +176,7 @@ def read_closed_surface(path: Path, name: str, frame: Frame, problems: Problems)
             )
             wrong.refuse(path, "", message, "contact needs an inside: close the surface")
         points = Frame(frame.unit, surface.axes or frame.axes).lengths(surface.points)
-        return ClosedSurface(name, points, surface.faces)
-    return None
+    return None if wrong else ClosedSurface(name, points, surface.faces)
 
 
 def read_directions(path: Path, mesh: TetMesh, frame: Frame, problems: Problems) -> Floats | None:
