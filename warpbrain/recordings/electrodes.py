@@ -6,15 +6,14 @@ https://bids-specification.readthedocs.io/en/stable/modality-specific-files/intr
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats, Ints
+from warpbrain.arrays import Floats
 from warpbrain.problems import Problems
+from warpbrain.recordings.markups import Markup
 from warpbrain.recordings.tables import position_of
 from warpbrain.recordings.text import lines_of, read_text, shown
 
@@ -26,49 +25,13 @@ _ELSEWHERE = ("pixels", "ctf", "elektaneuromag", "4dbti", "kityokogawa", "chieti
 _NOTHING = "n/a"
 
 
-@dataclass(frozen=True, eq=False)
-class Electrodes:
-    """Electrodes of a file.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        Of those that have a position.
-    points : (n, 3) array
-        [m, RAS]
-    header : list of str
-        Columns.
-    cells : list of rows
-        All rows as text.
-    rows : (n,) int array
-        Which rows have a position.
-    metres : float
-        Of one unit of the file.
-    """
-
-    labels: tuple[str, ...]
-    points: Floats
-    header: list[str]
-    cells: list[list[str]]
-    rows: Ints
-    metres: float
-
-    def moved_text(self, points: ArrayLike) -> str:
-        """The file with the electrodes at other places (n, 3) [m, RAS], everything else as it was."""
-        cells = [list(row) for row in self.cells]
-        for row, position in zip(self.rows, np.asarray(points, dtype=np.float64) / self.metres, strict=True):
-            for name, value in zip("xyz", position, strict=True):
-                cells[row][self.header.index(name)] = f"{value:.9g}"
-        return "".join("\t".join(row) + "\n" for row in (self.header, *cells))
-
-
 def is_electrodes(path: Path) -> bool:
     """Whether the name is that of a BIDS file of electrodes."""
     return path.name.lower().endswith(ENDING)
 
 
-def read_electrodes(path: Path, problems: Problems) -> Electrodes:
-    """Read electrodes; `Unreadable` if there are problems.
+def read_electrodes(path: Path, problems: Problems) -> Markup:
+    """Read the electrodes that have a position; `Unreadable` if there are problems.
 
     Positions are taken for scanner coordinates (RAS), as `iEEGCoordinateSystem` ACPC, ScanRAS, a template's or Other
     are; without a ``coordsystem.json`` they are in mm, which is remarked.
@@ -96,7 +59,15 @@ def read_electrodes(path: Path, problems: Problems) -> Electrodes:
         problems.add(path, "", "found no electrode with a position")
     metres = _unit(path, problems)
     problems.require_none()
-    return Electrodes(tuple(names), metres * np.array(points), header, cells, np.array(rows), metres)
+
+    def moved_text(moved: Floats) -> str:
+        table = [list(row) for row in cells]
+        for row, position in zip(rows, moved / metres, strict=True):
+            for name, value in zip("xyz", position, strict=True):
+                table[row][header.index(name)] = f"{value:.9g}"
+        return "".join("\t".join(row) + "\n" for row in (header, *table))
+
+    return Markup(metres * np.array(points), tuple(names), moved_text)
 
 
 def _unit(path: Path, problems: Problems) -> float:

@@ -31,7 +31,7 @@ COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 
 @dataclass(frozen=True, eq=False)
 class Markup:
-    """Control points.
+    """Control points of a file, or electrodes.
 
     Attributes
     ----------
