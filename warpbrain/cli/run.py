@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -15,10 +16,10 @@ from warpbrain.cases.drawn import FromPrior, with_prior_draw, with_prior_middle
 from warpbrain.cases.shipped import find_case
 from warpbrain.cli import run_specimen, warp
 from warpbrain.cli.options import drawn, note_device
-from warpbrain.cli.run_progress import watching
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
+from warpbrain.physics.words import tabled
 from warpbrain.report import summary as tables
 from warpbrain.report.comparison import describe_comparisons, describe_mesh_error, recorded_rows, write_comparisons
 from warpbrain.report.files import write_result, write_summary
@@ -26,15 +27,21 @@ from warpbrain.report.page import lines
 from warpbrain.report.run_page import write_run_page
 from warpbrain.report.state_files import read_state
 from warpbrain.report.summary import describe_prior
+from warpbrain.simulation.equilibrium import NewtonStep
 from warpbrain.simulation.mesh_error import MeshError, mesh_error, observe_without
 from warpbrain.simulation.observation import Observed
+from warpbrain.simulation.relaxation import RelaxationStep
 from warpbrain.simulation.result import Result
-from warpbrain.simulation.run import Course, Running
+from warpbrain.simulation.run import Course, Running, Watching
 from warpbrain.simulation.system import System, begin_loading_kernels, find_device, find_precision
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import choose_folder, results_in
+
+#: Newton iterations that are printed one by one.
+_LONG_HISTORY = 16
+_INDENT = 12 * " "
 
 
 def run(options: argparse.Namespace) -> None:
@@ -232,3 +239,64 @@ def _mesh_error(
         return None, {"unknown": str(error)}
     without = observe_without(case, result, estimated_error, outcome.get("time_s"))
     return estimated_error, describe_mesh_error(estimated_error, system.model.elements, observed, without)
+
+
+@contextmanager
+def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[Watching]:
+    """Who is told of the steps, after the head of their table is printed."""
+    if options.until is not None:
+        name, columns = "slow change", "     time [s]   Newton    CG   min J   largest [mm]"
+    elif options.steps is not None:
+        name, columns = "motion", "        time [ms]     CG   min J   kinetic energy [mJ]"
+    elif options.to_rest:
+        name, columns = "to rest", "        time [s]  step [s]   residual    CG   min J"
+    else:
+        name, columns = "equilibrium", "   load   Newton   residual    CG   step   min J"
+    say("", name + columns, sep="\n")
+    count = 0
+
+    def on_newton(step: NewtonStep) -> None:
+        nonlocal count
+        count += 1
+        # a long history is told by its load steps, not by every iteration
+        if count <= _LONG_HISTORY or step.iteration == 1:
+            row(
+                f"{100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} "
+                f"{step.cg_iterations:>5}  {step.step:>5.3g}   {step.min_J:>5.3f}"
+                + ("   indefinite tangent" if step.indefinite else "")
+            )
+        if count == _LONG_HISTORY:
+            say(_INDENT + "(from here on, the first iteration of each load step)")
+        progress.show(step.load, f"Newton {step.iteration}")
+
+    def on_relaxation(step: RelaxationStep) -> None:
+        row(
+            f"{step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}   "
+            f"{step.min_J:>5.3f}"
+        )
+        decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
+        progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
+
+    def on_motion(number: int, time: float, noted: dict[str, Any] | None) -> None:
+        if noted is not None:
+            energy = f"{1000 * noted['kinetic_J']:.4g}"
+            row(f"{1000 * time:>11.4g} {noted['cg_iterations']:>6}   {noted['min_J']:>5.3f}   {energy}")
+        progress.show(number / options.steps, f"{1000 * time:.0f} ms")
+
+    def on_moment(number: int, moments: int, noted: dict[str, Any]) -> None:
+        if number % max(1, moments // 10) == 0 or number == moments:
+            row(
+                f"{noted['time_s']:>12.4g} {noted['newton_iterations']:>8} {noted['cg_iterations']:>5}"
+                f"   {noted['min_J']:>5.3f}   {tabled(noted['largest_displacement_mm']):>9}"
+            )
+        progress.show(number / moments, f"{noted['time_s']:.3g} s")
+
+    def on_slow_newton(part: float, step: NewtonStep) -> None:
+        progress.show(part, f"Newton {step.iteration}")
+
+    def row(text: str) -> None:
+        progress.clear()
+        say(_INDENT + text)
+
+    with Progress(name, options.quiet) as progress:
+        yield Watching(on_newton, on_relaxation, on_motion, on_slow_newton, on_moment)

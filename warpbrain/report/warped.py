@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats
+from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
 from warpbrain.images.continuation import LENGTH
 from warpbrain.images.displacement import DisplacementField, displacement_field, inverse, resampled
@@ -18,11 +20,19 @@ from warpbrain.images.moving_points import PointFile, move_points, read_point_fi
 from warpbrain.images.reading import Image, labels_of, read_image, require
 from warpbrain.images.writing import write_displacement, write_transform, write_volume
 from warpbrain.mesh import TetMesh
-from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.page import lines
-from warpbrain.report.slicer import BACK, DEVIATION, FORTH, TRUST_MAP, write_slicer_scene
-from warpbrain.report.state_files import LEFT, TRUST, SavedState
+from warpbrain.recordings.electrodes import is_electrodes
+from warpbrain.report.files import MILLIMETRES, write_body
+from warpbrain.report.page import lines, rendered
+from warpbrain.report.state_files import LEFT, SEEN, TRUST, UNSEEN, SavedState
 
+#: Names of the transforms: what they do to an image.
+FORTH, BACK = "transform-before-to-after.nii.gz", "transform-after-to-before.nii.gz"
+#: Maps of where not to believe the displacement.
+DEVIATION, TRUST_MAP = "displacement_sd.nii.gz", "trust.nii.gz"
+SCRIPT = "load_in_slicer.py"
+SURFACES = ("surface-before.vtu", "surface-after.vtu")
+#: Red, green and blue of what `trust.nii.gz` says.
+_COLOURS = {SEEN: (0.0, 0.62, 0.45), UNSEEN: (0.6, 0.6, 0.6), LEFT: (0.84, 0.37, 0.0)}
 #: Edges of voxels, and how far they reach beyond the body, where there is no image [mm].
 _SPACING, _MARGIN = 2.0, 40.0
 #: Of a voxel of the transforms [mm], at most: between the centres of larger ones the inverse is off by more than 0.05
@@ -130,10 +140,7 @@ def write_warped(
     moved = [move_points(file, state.mesh, state.u, state.middles, field) for file in request.points]
     if moved:
         files += write_moved(folder, moved)
-    image_after, labels_after = (
-        None if each is None else _after(each.path) for each in (request.image, request.labels)
-    )
-    files += write_slicer_scene(folder, state, request.image, image_after, labels_after, request.points, files)
+    files += _write_slicer_scene(folder, state, request, files)
     shown = _shown(request, state, field, inside)
     return lines("warped.txt", "warped", request, state, shown, field.grid, back, moved, LENGTH, _APART), files
 
@@ -233,3 +240,38 @@ def _shown(
         "trust": {} if trust is None else {TRUST[value]: share(trust == value) for value in TRUST},
         "left": trust is not None and bool((trust == LEFT).any()),
     }
+
+
+def _write_slicer_scene(folder: Path, state: SavedState, request: WarpRequest, files: Sequence[str]) -> list[str]:
+    """Write the surfaces before and after, and a script for Slicer's Python console that loads all with colours, beside
+    the files that are there already; returns the names of those added."""
+    import meshio
+
+    size = MILLIMETRES * np.linalg.norm(state.u, axis=1)
+    faces = state.mesh.boundary
+    nodes, numbers = np.unique(faces, return_inverse=True)
+    for name, moved in zip(SURFACES, (0.0, 1.0), strict=True):
+        corners, triangles = MILLIMETRES * (state.mesh.points + moved * state.u)[nodes], numbers.reshape(-1, 3)
+        sizes = {"displacement_size": size[nodes]}
+        write_body(folder / name, meshio.Mesh(corners, [("triangle", triangles)], point_data=sizes))
+    image, labels = request.image, request.labels
+    volumes = [] if image is None else [image.path.resolve().as_posix(), _after(image.path)]
+    markups = [file for file in request.points if not is_electrodes(file.path)]
+    meanings = [[value, meaning, *_COLOURS[value]] for value, meaning in TRUST.items()]
+    values = {
+        "folder": folder.resolve().as_posix(),
+        "volumes": [name for name in volumes if not name.lower().endswith((".mgz", ".mgh"))],
+        "labels": [] if labels is None else [_after(labels.path)],
+        "deviation": [name for name in files if name == DEVIATION],
+        "trust": [[name, meanings] for name in files if name == TRUST_MAP],
+        "surfaces": [[SURFACES[0], 0.3], [SURFACES[1], 1.0]],
+        "markups": [[file.path.resolve().as_posix(), file.moved_name] for file in markups],
+        "electrodes": [file.path.name for file in request.points if is_electrodes(file.path)],
+        "transform": FORTH,
+        "largest": max(float(size.max()), 1e-6),
+    }
+    path = (folder / SCRIPT).resolve().as_posix()
+    script = rendered("load_in_slicer.txt", path=path, **{name: json.dumps(value) for name, value in values.items()})
+    with whole_file(folder / SCRIPT) as scratch:
+        scratch.write_text(script + "\n", encoding="utf-8")
+    return [*SURFACES, SCRIPT]
