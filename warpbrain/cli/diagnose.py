@@ -10,7 +10,7 @@ from typing import Any
 from warpbrain.atomic import safe_name
 from warpbrain.cases.shipped import find_case
 from warpbrain.cli import warp
-from warpbrain.cli.options import note_case
+from warpbrain.cli.log import note_case
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.estimation.options import Listener
 from warpbrain.report.diagnosis.description import describe

@@ -13,7 +13,7 @@ from typing import Any
 from warpbrain.atomic import safe_name
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
-from warpbrain.cli.options import note_case
+from warpbrain.cli.log import note_case
 from warpbrain.ensemble.results import EnsembleResult, results_of
 from warpbrain.ensemble.run import SAMPLES, chosen_samples, chosen_workers, compute_missing, overloaded
 from warpbrain.ensemble.sample import Sample

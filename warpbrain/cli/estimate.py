@@ -15,7 +15,7 @@ from warpbrain.atomic import output_folder, safe_name
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.cli import warp
-from warpbrain.cli.options import drawn, note_case
+from warpbrain.cli.log import drawn, note_case
 from warpbrain.diagnosis.locating import ScoreMap, map_of_search
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.estimate import Estimation

@@ -15,7 +15,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import FromPrior, with_prior_draw, with_prior_middle
 from warpbrain.cases.shipped import find_case
 from warpbrain.cli import run_specimen, warp
-from warpbrain.cli.options import drawn, note_device
+from warpbrain.cli.log import drawn, note_device
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from warpbrain.cases.case import Case
-from warpbrain.cli.options import note_device
+from warpbrain.cli.log import note_device
 from warpbrain.errors import InputError
 from warpbrain.report import specimen as text
 from warpbrain.report.comparison import describe_comparisons
