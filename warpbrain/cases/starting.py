@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpbrain.atomic import check_new_folder, check_writable, whole_file, whole_folder
+from warpbrain.atomic import check_new_folder, check_writable, whole_folder, write_text
 from warpbrain.cases.building.errors import BuildError, check_volume_in, cm3, require_extra
 from warpbrain.cases.building.label_fields import label_volumes, read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
@@ -231,8 +231,7 @@ def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path
         # what its user wrote into it, and recordings, are not ours to lose
         (folder / CASE_FILE).replace(folder / f"{CASE_FILE}.old")
         write_mesh(folder / "mesh.vtu", mesh, unit="mm")
-        with whole_file(folder / CASE_FILE) as scratch:
-            scratch.write_text(text, encoding="utf-8")
+        write_text(folder / CASE_FILE, text)
         return
     with whole_folder(folder) as place:
         write_mesh(place / "mesh.vtu", mesh, unit="mm")

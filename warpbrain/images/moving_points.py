@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import whole_file, write_text
 from warpbrain.errors import InputError
 from warpbrain.images.displacement import DisplacementField
 from warpbrain.images.grid import MILLIMETRES
@@ -133,8 +133,7 @@ def write_moved(folder: Path, moved: Sequence[MovedPoints]) -> list[str]:
     for points in moved:
         name = points.file.moved_name
         text = points.file.moved_text(points.points)
-        with whole_file(folder / name) as scratch:
-            scratch.write_text(text, encoding="utf-8")
+        write_text(folder / name, text)
         names.append(name)
     with whole_file(folder / "moved.csv") as scratch, scratch.open("w", encoding="utf-8", newline="") as stream:
         rows = csv.writer(stream)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from warpbrain.atomic import write_text
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.inference.calibration import percent
 from warpbrain.report import views
@@ -24,7 +25,7 @@ from warpbrain.report.estimate import (
     recorded_points,
 )
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
-from warpbrain.report.page import Top, document, lines, sections_of, write_document
+from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.picture import Moved, Pictures, draw
 from warpbrain.report.run_page import BADGES
@@ -111,5 +112,5 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
         facts.append(("probability that nothing else acts", percent(nothing["probability"])))
     sentences = [*summary["identifiability"]["sentences"], *judged.sentences]
     top = Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts)
-    write_document(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))
+    write_text(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))
     return pictures

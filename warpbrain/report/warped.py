@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import write_text
 from warpbrain.errors import InputError
 from warpbrain.images.continuation import LENGTH
 from warpbrain.images.displacement import DisplacementField, displacement_field, inverse, resampled
@@ -272,6 +272,5 @@ def _write_slicer_scene(folder: Path, state: SavedState, request: WarpRequest, f
     }
     path = (folder / SCRIPT).resolve().as_posix()
     script = rendered("load_in_slicer.txt", path=path, **{name: json.dumps(value) for name, value in values.items()})
-    with whole_file(folder / SCRIPT) as scratch:
-        scratch.write_text(script + "\n", encoding="utf-8")
+    write_text(folder / SCRIPT, script + "\n")
     return [*SURFACES, SCRIPT]

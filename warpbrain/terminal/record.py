@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import write_text
 
 #: Name of the log in a folder of results.
 LOG = "warpbrain.log"
@@ -80,8 +80,7 @@ class Record:
         # what was printed is indented: no title of a case is taken for a line of the head
         printed = [f"    {line}".rstrip() for text in self._lines for line in text.splitlines()]
         before = "" if replace else _text_of(folder)
-        with whole_file(folder / LOG) as scratch:
-            scratch.write_text(before + "\n".join([*lines, "", *printed]) + "\n\n", encoding="utf-8")
+        write_text(folder / LOG, before + "\n".join([*lines, "", *printed]) + "\n\n")
 
 
 def files_of(folder: Path) -> list[str]:
