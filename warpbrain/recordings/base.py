@@ -96,9 +96,9 @@ class Recording:
         Recording or None
             None if there were problems.
         """
-        with collected(path, problems) as found:
-            values, unit = cls._read(path, frame, found, given)
-        if found:
+        with collected(path, problems) as of_file:
+            values, unit = cls._read(path, frame, of_file, given)
+        if of_file:
             return None
         return cls(sigma=None if sigma is None else unit * sigma, **given, **values)
 

@@ -51,8 +51,8 @@ def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh:
     """
     require_readable(path, problems)
     if (size := path.stat().st_size) > LARGEST_FILE:
-        found = f"found {size / 1e6:.0f} MB, expected a surface of at most {LARGEST_FILE / 1e6:.0f} MB"
-        problems.refuse(path, "", found)
+        message = f"found {size / 1e6:.0f} MB, expected a surface of at most {LARGEST_FILE / 1e6:.0f} MB"
+        problems.refuse(path, "", message)
     try:
         if path.suffix.lower() == ".vtp":
             from warpbrain.recordings.vtp import read_vtp
@@ -124,8 +124,8 @@ def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh:
         problems.refuse(path, "", "found no points")
     bad = np.flatnonzero(~(np.abs(points) <= LARGEST).all(axis=1))
     if len(bad):
-        found = f"found a coordinate that is not finite ({len(bad)} such points in all)"
-        problems.refuse(path, f"point {bad[0]}", found)
+        message = f"found a coordinate that is not finite ({len(bad)} such points in all)"
+        problems.refuse(path, f"point {bad[0]}", message)
     if raw.axes not in (None, *AXES):
         problems.refuse(path, "SPACE", f"found {shown(raw.axes)}, expected RAS or LPS")
     if faces is None:
@@ -133,8 +133,8 @@ def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh:
     wrong = np.flatnonzero(((faces < 0) | (faces >= count)).any(axis=1))
     if len(wrong):
         what = "a face" if len(wrong) == 1 else f"{len(wrong)} faces"
-        found = f"found {what} with points that are not there (there are {count})"
-        problems.refuse(path, f"face {wrong[0]}", found)
+        message = f"found {what} with points that are not there (there are {count})"
+        problems.refuse(path, f"face {wrong[0]}", message)
     corner = points[faces]
     sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])

@@ -135,8 +135,8 @@ class Table:
                 if values[index] < values[last] or (strictly and values[index] == values[last]):
                     whose = f" of {shown(key)}" if of is not None else ""
                     rule = "a later time" if strictly else "no earlier time"
-                    found = f"found {values[index]:.12g} s after {values[last]:.12g} s (row {self.rows[last]}){whose}"
-                    self.problem(index, "t", f"{found}, expected {rule}")
+                    message = f"found {values[index]:.12g} s after {values[last]:.12g} s (row {self.rows[last]}){whose}"
+                    self.problem(index, "t", f"{message}, expected {rule}")
             before[key] = index
         return values
 
@@ -184,10 +184,10 @@ def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table:
         elif not any(fields):
             continue  # what spreadsheets write for an empty line
         elif len(fields) != len(header):
-            found = (
+            message = (
                 f"found {len(fields)} field{'s' if len(fields) != 1 else ''}, expected {len(header)} as in the header"
             )
-            problems.add(path, f"row {number}", found, "is the file cut off?" if len(fields) < len(header) else "")
+            problems.add(path, f"row {number}", message, "is the file cut off?" if len(fields) < len(header) else "")
             broken += 1
         else:
             cells.append(fields)

@@ -21,13 +21,13 @@ def collected(path: Path, problems: Problems) -> Iterator[Problems]:
 
     The block ends where nothing more can be read (`Unreadable`); then there are problems.
     """
-    found = Problems(COUNTED)
+    of_file = Problems(COUNTED)
     with suppress(Unreadable):
-        yield found
-    problems.found.extend(found.found[:LISTED])
-    problems.remarks.extend(found.remarks)
-    others = len(found.found) - LISTED
-    if found.enough:
+        yield of_file
+    problems.found.extend(of_file.found[:LISTED])
+    problems.remarks.extend(of_file.remarks)
+    others = len(of_file.found) - LISTED
+    if of_file.enough:
         problems.add(path, "", f"and more than {others} more problems in this file, whose reading stopped there")
     elif others > 0:
         problems.add(path, "", f"and {others} more problem{'s' if others > 1 else ''} in this file")
@@ -81,8 +81,8 @@ def read_text(path: Path, problems: Problems) -> str:
         text = data.decode("utf-8").lstrip("\ufeff")
     except UnicodeDecodeError as error:
         row = data.count(b"\n", 0, error.start) + 1
-        found = f"found byte 0x{data[error.start]:02x} at position {error.start}, expected UTF-8 text"
-        problems.refuse(path, f"row {row}", found, "save the file as UTF-8")
+        message = f"found byte 0x{data[error.start]:02x} at position {error.start}, expected UTF-8 text"
+        problems.refuse(path, f"row {row}", message, "save the file as UTF-8")
     if not text.strip():
         problems.refuse(path, "", "is empty: it holds white space only")
     return text

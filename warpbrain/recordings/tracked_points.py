@@ -129,7 +129,7 @@ def _check_unique(table: Table, ids: tuple[str, ...]) -> None:
     first: dict[str, int] = {}
     for index, name in enumerate(ids):
         if name in first:
-            found = f"found {shown(name)} again (row {table.rows[first[name]]})"
-            table.problem(index, "id", f"{found}, expected each id once where there is no time t")
+            message = f"found {shown(name)} again (row {table.rows[first[name]]})"
+            table.problem(index, "id", f"{message}, expected each id once where there is no time t")
         elif name:
             first[name] = index

@@ -52,13 +52,13 @@ class Named:
     frame: Frame
     problems: Problems
 
-    def nodes(self, table: Reading, found: MeshInFile) -> str | None:
+    def nodes(self, table: Reading, in_file: MeshInFile) -> str | None:
         """Name of the node set that the key `nodes` of a table names; None, and a problem noted, if there is none.
 
         Parameters
         ----------
         table : Reading
-        found : MeshInFile
+        in_file : MeshInFile
             How the file of the mesh numbers its nodes.
         """
         if not table.has("nodes"):
@@ -66,7 +66,7 @@ class Named:
         name: str = table.get("nodes")
         if name.lower().endswith(".csv"):
             path = table.path("nodes")
-            members = None if path is None else _read_members(path, found, self.problems)
+            members = None if path is None else _read_members(path, in_file, self.problems)
             if path is None or members is None:
                 return None
             name = path.stem
@@ -126,11 +126,11 @@ class Named:
             self.mesh = replace(self.mesh, element_sets={**self.mesh.element_sets, name: members})
 
 
-def _read_members(path: Path, found: MeshInFile, problems: Problems) -> Bools | None:
+def _read_members(path: Path, in_file: MeshInFile, problems: Problems) -> Bools | None:
     """Members (n,) of a set given as a file of node numbers, one a line, from 0; None if something is wrong."""
-    where = np.full(found.file_nodes, -1, dtype=np.int64)
-    where[found.node_numbers] = np.arange(len(found.node_numbers))
-    members = np.zeros(len(found.mesh.points), dtype=bool)
+    where = np.full(in_file.file_nodes, -1, dtype=np.int64)
+    where[in_file.node_numbers] = np.arange(len(in_file.node_numbers))
+    members = np.zeros(len(in_file.mesh.points), dtype=bool)
     with collected(path, problems) as wrong:
         text = read_text(path, wrong)
         remark_open_end(path, text, wrong)
