@@ -18,7 +18,7 @@ from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.plugins import added_by_packages
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, Unreadable
 from warpbrain.recordings import tracked_points
 from warpbrain.recordings.recording import TrackedPoints
 
@@ -131,6 +131,7 @@ def test_what_a_reader_gets_wrong_is_told_of_its_file(tmp_path, monkeypatch, rea
     monkeypatch.setattr(
         tracked_points, "added_readers", lambda: {".xyz": lambda path: TrackedPoints(**{**sound, **read})}
     )
-    assert tracked_points.tracked_points(path, Frame("mm", "RAS"), None, problems) is None
+    with pytest.raises(Unreadable):
+        tracked_points.tracked_points(path, Frame("mm", "RAS"), None, problems)
     [problem] = problems.found
     assert problem.file == path and re.match(message, problem.message)

@@ -50,6 +50,12 @@ def whole_file(path: Path) -> Iterator[Path]:
         _unfinished.discard(temporary)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text as UTF-8, whole; see `whole_file`."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
     """A temporary folder beside `path` to fill; it becomes `path` when the block ends without error.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 from warpbrain.errors import InputError
 
@@ -31,6 +32,10 @@ def _shortened(text: str, most: int) -> str:
     return one_line if len(one_line) <= most else f"{one_line[: most - 20]}...{one_line[-20:]}"
 
 
+class Unreadable(Exception):
+    """Nothing is to be had of a file; why is among the problems already."""
+
+
 class Problems:
     """A list of problems that readers add to and go on reading; from `most` on one may stop, see `enough`."""
 
@@ -50,6 +55,16 @@ class Problems:
     def add(self, file: Path, place: str, message: str, cure: str = "") -> None:
         """Note a problem; text that came with line breaks is put on one line, and one without an end is given one."""
         self.found.append(Problem(file, _shortened(place, _PLACE), _shortened(message, _MESSAGE), cure))
+
+    def refuse(self, file: Path, place: str, message: str, cure: str = "") -> NoReturn:
+        """Note a problem after which nothing more of a file can be read, and raise `Unreadable`."""
+        self.add(file, place, message, cure)
+        raise Unreadable
+
+    def require_none(self) -> None:
+        """Raise `Unreadable` if there is a problem."""
+        if self.found:
+            raise Unreadable
 
     def remark(self, file: Path, message: str) -> None:
         """Note what is not wrong and should be known."""

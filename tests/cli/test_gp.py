@@ -182,7 +182,7 @@ def test_a_folder_of_that_name_is_not_touched(tmp_path):
 
 def test_a_comparison_goes_on_where_it_was_interrupted(tmp_path, monkeypatch):
     few = list({study.paper: study for study in read_studies()}.values())[:6]
-    monkeypatch.setattr("warpbrain.gp.literature.studies.read_studies", lambda variant: few)
+    monkeypatch.setattr("warpbrain.cli.gp.read_studies", lambda variant: few)
     path = tmp_path / "scores.csv"
     only = ("gp", "compare", "--leave", "study", "--csv", path, "--only")
     first = warpbrain(*only, "moduli only")

@@ -109,8 +109,8 @@ def require_groups(case: Case, labels: Sequence[int], model: Process) -> None:
     for label in labels:
         group = case.tissues[label].prior
         if group not in model.groups:
-            found = f"the generative model '{model.name}' ({model.variant}) has seen no study of '{group}'"
+            message = f"the generative model '{model.name}' ({model.variant}) has seen no study of '{group}'"
             raise InputError(
-                f"{case.path}: [tissue.{label}] prior: {found if group else 'missing, but a draw is of a group'}: "
+                f"{case.path}: [tissue.{label}] prior: {message if group else 'missing, but a draw is of a group'}: "
                 f"expected one of {', '.join(model.groups)}"
             )

@@ -69,14 +69,14 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     if accuracy := head.get("registration"):
         registration = Registration(0.001 * accuracy["mm"], math.radians(accuracy["degrees"]))
 
-    mesh_file, found, specimen = read_anatomy(context)
-    context.mesh = None if found is None else found.mesh
+    mesh_file, in_file, specimen = read_anatomy(context)
+    context.mesh = None if in_file is None else in_file.mesh
     tissues = read_tissues(context)
     density, poisson, heterogeneity = read_body(context)
-    named = None if found is None else Named(found.mesh, tissues, context.frame, problems)
-    boundaries = read_boundaries(context, named, found)
+    named = None if in_file is None else Named(in_file.mesh, tissues, context.frame, problems)
+    boundaries = read_boundaries(context, named, in_file)
     mechanisms = read_mechanisms(context, named, axis, density)
-    recordings = read_recordings(context, named, found, {boundary.name for boundary in boundaries})
+    recordings = read_recordings(context, named, in_file, {boundary.name for boundary in boundaries})
     if named is None:
         return None
     # with the sets and vectors that keys name

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpbrain.atomic import check_new_folder, check_writable, whole_file, whole_folder
+from warpbrain.atomic import check_new_folder, check_writable, whole_folder, write_text
 from warpbrain.cases.building.errors import BuildError, check_volume_in, cm3, require_extra
 from warpbrain.cases.building.label_fields import label_volumes, read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
@@ -65,6 +65,11 @@ class StartedCase:
     cavity: float
     labelled_cavity: float
     notes: tuple[str, ...]
+
+    @property
+    def volumes(self) -> dict[int, float]:
+        """Volume [m3] of each tissue in the mesh, by its number."""
+        return {number: _tissue_volume(self.mesh, number) for number in self.tissues}
 
 
 def start_from_labels(
@@ -204,38 +209,6 @@ def start_from_mesh(
     return StartedCase(folder, mesh, tissues, measure(mesh), None, None, _cavity_volume(mesh), 0.0, tuple(notes))
 
 
-def summary(case: StartedCase) -> list[str]:
-    """What a user should read about a new case, as lines of text."""
-    quality = case.quality
-    lines = [
-        f"mesh      {quality.nodes} nodes, {quality.tetrahedra} tetrahedra, "
-        f"mean edge {1000 * quality.mean_edge:.3g} mm",
-        f"angles    smallest dihedral {quality.min_dihedral:.1f}, first percentile "
-        f"{quality.first_percentile_dihedral:.1f} degrees",
-    ]
-    for number, name in case.tissues.items():
-        line = f"tissue {number:<3d} {name}: {cm3(_tissue_volume(case.mesh, number))}"
-        if case.labelled is not None and case.in_place is not None:
-            line += f" (labels {cm3(case.labelled[number])}, {100 * case.in_place[number]:.0f} % of them in place)"
-        lines.append(line)
-    if case.cavity or case.labelled_cavity:
-        labels = f" (labels {cm3(case.labelled_cavity)})" if case.labelled is not None else ""
-        lines.append(f"cavities  {cm3(case.cavity)}{labels}")
-    counts = ", ".join(f"{name} {int(members.sum())}" for name, members in case.mesh.node_sets.items())
-    lines.append(f"node sets {counts}")
-    lines += [f"note      {note}" for note in case.notes]
-    return [
-        *lines,
-        f"written to {case.folder}",
-        "Held at the node set 'base', the outer nodes that face down in the lower third: a first guess, check it.",
-        "Nothing acts yet: say in case.toml what does, or with --with, such as "
-        "--with gravity:direction=0/-1/0,level=60 for a patient on the back.",
-        f"next: warpbrain cases check {case.folder}",
-        f"      warpbrain cases show {case.folder}",
-        f"      warpbrain run --case {case.folder}",
-    ]
-
-
 def _check_folder(folder: Path, overwrite: bool) -> None:
     """`InputError` if a case cannot be begun there."""
     if overwrite and (folder / CASE_FILE).is_file():
@@ -258,8 +231,7 @@ def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path
         # what its user wrote into it, and recordings, are not ours to lose
         (folder / CASE_FILE).replace(folder / f"{CASE_FILE}.old")
         write_mesh(folder / "mesh.vtu", mesh, unit="mm")
-        with whole_file(folder / CASE_FILE) as scratch:
-            scratch.write_text(text, encoding="utf-8")
+        write_text(folder / CASE_FILE, text)
         return
     with whole_folder(folder) as place:
         write_mesh(place / "mesh.vtu", mesh, unit="mm")

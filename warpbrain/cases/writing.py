@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.atomic import output_folder, safe_name, whole_file
+from warpbrain.atomic import output_folder, safe_name, write_text
 from warpbrain.cases.boundary import Boundary, Contact, Displaced
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.format.tables import BODY, BOUNDARY, CASE, MECHANISM, PRIOR, RECORDING, TISSUE
@@ -82,8 +82,7 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
         tables["recording"] = [_recording(folder, recording, frame) for recording in case.recordings]
     import tomli_w
 
-    with whole_file(target) as temporary:
-        temporary.write_text(_HEAD + tomli_w.dumps(tables), encoding="utf-8")
+    write_text(target, _HEAD + tomli_w.dumps(tables))
     return target
 
 

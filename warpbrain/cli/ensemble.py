@@ -7,88 +7,47 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from warpbrain.cli.options import add_to, note_case, require_poisson, require_tolerance, require_whole
-from warpbrain.ensemble.defaults import SAMPLES
+from warpbrain.atomic import safe_name
+from warpbrain.cases.case import Case
+from warpbrain.cases.shipped import find_case
+from warpbrain.cli.log import note_case
+from warpbrain.ensemble.results import EnsembleResult, results_of
+from warpbrain.ensemble.run import SAMPLES, chosen_samples, chosen_workers, compute_missing, overloaded
+from warpbrain.ensemble.sample import Sample
+from warpbrain.ensemble.store import Store, discard
+from warpbrain.ensemble.workers import Job, Workers
 from warpbrain.errors import InputError, SolveError
+from warpbrain.gp.trained import find_model
+from warpbrain.report import summary as tables
+from warpbrain.report.ensemble import (
+    describe_ensemble,
+    ensemble_lines,
+    table_of,
+    write_fields,
+    write_spread_picture,
+    write_table,
+)
+from warpbrain.report.files import fingerprints, write_summary
+from warpbrain.simulation.model import Model
+from warpbrain.simulation.of_case import model_of
 from warpbrain.terminal.progress import Progress
-
-if TYPE_CHECKING:
-    from warpbrain.cases.case import Case
-    from warpbrain.ensemble.results import EnsembleResult
-    from warpbrain.ensemble.sample import Sample
-    from warpbrain.ensemble.store import Store
-    from warpbrain.ensemble.workers import Job, Workers
-    from warpbrain.simulation.model import Model
-    from warpbrain.terminal.record import Record
+from warpbrain.terminal.quiet import start_warp_quietly
+from warpbrain.terminal.record import Record
+from warpbrain.terminal.result_folder import choose_folder, results_in
+from warpbrain.threads import processors
 
 #: Samples that are named one by one where something is said of many.
 _NAMED = 12
 
 
-def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "ensemble",
-        help="simulate many samples of a case",
-        description="Simulates a case with many laws of the generative model, to rest or for some steps, and "
-        "writes samples.csv, fields.vtu, spread.png and summary.json. What a killed run has computed is kept: the same "
-        "command goes on with what is missing.",
-    )
-    add = partial(add_to, parser)
-    add("--case", help="synthetic (the phantom), 0529, ... (see warpbrain cases), or the path of a case folder")
-    add("--tissue", "--model")
-    chosen = parser.add_mutually_exclusive_group()
-    chosen.add_argument(
-        "--samples", type=int, metavar="N", help=f"draws 0 to N - 1 of the tissues' joint prior (default: {SAMPLES})"
-    )
-    chosen.add_argument(
-        "--grid",
-        action="store_true",
-        help="the paper's sweep instead: curves of -2 to 2 standard deviations, 17 for a tissue, 289 pairs for two",
-    )
-    add("--seed", help="another sequence of draws (default: 0)")
-    add("--gp", help="generative model: hierarchical (default), coregionalised (default of --grid) or a folder")
-    add("--poisson")
-    motion = parser.add_mutually_exclusive_group()
-    add_to(motion, "--steps")
-    add_to(motion, "--to-rest", help="follow the damped motion until it is at rest (default)")
-    add("--tolerance", help="out-of-balance force at rest, relative to all nodal forces (default: 1e-8)")
-    add("--device", "--precision")
-    add("--batch", default="auto", metavar="B", help="samples at a time on a device (default: auto, by its memory)")
-    add("--processes", type=int, metavar="P", help="processes on the CPU (default: one for each processor)")
-    add(
-        "--dask",
-        metavar="ADDRESS",
-        help="spread over a Dask cluster, one worker a device: tcp://host:8786, or local[:N] for processes of this "
-        "machine",
-    )
-    add("--out", help="folder for the results (default: warpbrain-ensemble-CASE-TISSUE)")
-    add("--overwrite", help="compute all anew, whatever is in that folder")
-    add("--quiet")
-    parser.set_defaults(call=_ensemble)
-
-
-def _ensemble(options: argparse.Namespace) -> None:
+def ensemble(options: argparse.Namespace) -> None:
+    """Simulate many samples of a case, and go on where that was left."""
     _check(options)
     record: Record = options.record
     say = record.say
-
-    from warpbrain.atomic import safe_name
-    from warpbrain.ensemble.results import results_of
-    from warpbrain.ensemble.run import chosen_workers
-    from warpbrain.ensemble.store import Store, discard
-    from warpbrain.ensemble.workers import Job
-    from warpbrain.report import summary as tables
-    from warpbrain.report.ensemble import describe_ensemble, ensemble_lines
-    from warpbrain.report.files import fingerprints
-    from warpbrain.simulation.of_case import model_of
-    from warpbrain.terminal.quiet import start_warp_quietly
-    from warpbrain.terminal.result_folder import choose_folder, results_in
-    from warpbrain.threads import processors
 
     start_warp_quietly()
     case = _case(options)
@@ -147,9 +106,6 @@ def _write(
     out: Path, result: EnsembleResult, summary: dict[str, Any], chosen: str, title: str, count: int
 ) -> list[str]:
     """Write what an ensemble gave; returns the names of the files."""
-    from warpbrain.report.ensemble import table_of, write_fields, write_spread_picture, write_table
-    from warpbrain.report.files import write_summary
-
     files = [*write_table(out, table_of(result)), "summary.json"]
     if result.fields is not None:
         write_fields(out / "fields.vtu", result.fields)
@@ -162,10 +118,7 @@ def _write(
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse bad numbers before anything heavy is imported; reads the size of a batch."""
-    require_whole(options, samples=1, steps=1, processes=1, seed=0)
-    require_poisson(options.poisson)
-    require_tolerance(options.tolerance)
+    """Refuse options that mean nothing together; reads the size of a batch."""
     if options.grid and options.seed is not None:
         raise InputError(f"--seed {options.seed}: means nothing with --grid")
     if options.dask is not None and options.processes is not None:
@@ -180,8 +133,6 @@ def _check(options: argparse.Namespace) -> None:
 
 def _case(options: argparse.Namespace) -> Case:
     """The case as the arguments change it."""
-    from warpbrain.cases.shipped import find_case
-
     case = find_case(options.case, options.tissue)
     if case.specimen is not None:
         raise InputError(f"{case.path}: [specimen]: a specimen's tests are run one by one: see warpbrain run")
@@ -192,9 +143,6 @@ def _case(options: argparse.Namespace) -> Case:
 
 def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str]:
     """The samples, and in words how they were chosen."""
-    from warpbrain.ensemble.run import chosen_samples
-    from warpbrain.gp.trained import find_model
-
     if options.grid and options.gp is None:
         process = find_model("coregionalised", "as_published")
     else:
@@ -210,8 +158,6 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
 
 def _warn(model: Model, samples: list[Sample], options: argparse.Namespace, say: Callable[..., None]) -> None:
     """Say what is likely to fail before it is computed."""
-    from warpbrain.ensemble.run import overloaded
-
     device = None if options.dask is not None else options.device
     load = overloaded(model, samples, device)
     soft = load.numbers
@@ -229,8 +175,6 @@ def _compute(
     job: Job, store: Store, workers: Workers, say: Callable[..., None], progress: Progress
 ) -> tuple[float, int]:
     """Compute what the store lacks; returns the seconds that it took and how many samples they were."""
-    from warpbrain.ensemble.run import compute_missing
-
     total, there = len(job.samples), len(store.numbers())
     if there:
         say(f"  resumed   {there} of {total} samples are there, {total - there} are missing")

@@ -6,24 +6,52 @@ import argparse
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.linalg import LinAlgError
+
+from warpbrain.atomic import output_folder, safe_name
+from warpbrain.cases.case import Case
+from warpbrain.cases.shipped import find_case
 from warpbrain.cli import warp
-from warpbrain.cli.options import WARPED, add_results, add_to, drawn, note_case
+from warpbrain.cli.log import drawn, note_case
+from warpbrain.diagnosis.locating import ScoreMap, map_of_search
 from warpbrain.errors import InputError, SolveError
+from warpbrain.estimation.estimate import Estimation
+from warpbrain.estimation.finer_mesh import Discretisation
+from warpbrain.estimation.fit import GaussNewtonStep
+from warpbrain.estimation.likelihood import Likelihood
+from warpbrain.estimation.options import EstimationOptions, Listener
+from warpbrain.estimation.parameters import Parameters
+from warpbrain.estimation.posterior import Posterior
+from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
+from warpbrain.gp.trained import find_model
+from warpbrain.recordings.registration import Registration
+from warpbrain.report import views
+from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
+from warpbrain.report.estimate_page import write_estimate_page
+from warpbrain.report.estimate_picture import agreement_figure, densities_figure, residuals_figure
+from warpbrain.report.files import fingerprint_of, write_summary
+from warpbrain.report.state_files import read_state
+from warpbrain.report.sweep import (
+    TABLE,
+    columns,
+    estimated_in,
+    read_sweep,
+    sweep_lines,
+    write_sweep,
+    write_sweep_picture,
+)
+from warpbrain.report.warped import WarpRequest
+from warpbrain.simulation.system import find_device
 from warpbrain.terminal.progress import Progress
-
-if TYPE_CHECKING:
-    from warpbrain.cases.case import Case
-    from warpbrain.diagnosis.locating import ScoreMap
-    from warpbrain.estimation.options import EstimationOptions
-    from warpbrain.estimation.posterior import Posterior
-    from warpbrain.recordings.registration import Registration
-    from warpbrain.report.warped import WarpRequest
-    from warpbrain.terminal.record import Record
-    from warpbrain.worlds.body.uncertainty import AveragedTissue
+from warpbrain.terminal.quiet import start_warp_quietly
+from warpbrain.terminal.record import Record
+from warpbrain.terminal.result_folder import choose_folder, results_in
+from warpbrain.worlds.body.hypotheses import screened
+from warpbrain.worlds.body.uncertainty import AveragedTissue, averaged_tissue
+from warpbrain.worlds.options import DiagnosisOptions
 
 #: Nodes up to which it is said unasked what else may act: its cost grows faster than that of an estimate.
 _LARGEST = 20_000
@@ -31,62 +59,11 @@ _LARGEST = 20_000
 _HEADER = "  step    objective   to go [sd]    taken   Newton"
 
 
-def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "estimate",
-        help="estimate tissue from a case's recordings",
-        description="Estimates the laws of a case's tissues from its recordings, and says how well they are known. "
-        "Writes report.html, estimate.json, state.vtu, predictions and figures, or sweep.csv and its figure.",
-    )
-    add = partial(add_to, parser)
-    add("--case", "--tissue", "--model")
-    add(
-        "--method",
-        choices=("posterior", "grid"),
-        default="posterior",
-        help="posterior (default), or the paper's sweep over 17 curves a tissue",
-    )
-    add("--gp", help="generative model: hierarchical (default), coregionalised (default of --method grid) or a folder")
-    add(
-        "--registration",
-        nargs=2,
-        type=float,
-        metavar=("MM", "DEG"),
-        help="standard deviations of a rigid error of registration, estimated along (default: the case's, else 1 1)",
-    )
-    add("--no-registration", action="store_true", help="take positions as they were recorded")
-    add(
-        "--nu",
-        type=float,
-        default=4.0,
-        metavar="NU",
-        help="inf: no point is a gross error; any other number: those that are are found (default: 4)",
-    )
-    add("--no-discretisation")
-    add(
-        "--causes",
-        action=argparse.BooleanOptionalAction,
-        help="whether to say how probable it is that nothing acts but what the case says, and tissue averaged over "
-        f"what may (default: on meshes of up to {_LARGEST} nodes)",
-    )
-    add("--samples", type=int, default=40, metavar="N", help="equilibria that check the posterior (default: 40)")
-    add("--seed", default=0, help="of these draws (default: 0)")
-    add("--device", *WARPED)
-    add_results(parser, "warpbrain-estimate-CASE-TISSUE")
-    parser.set_defaults(call=_run)
-
-
-def _run(options: argparse.Namespace) -> None:
+def estimate(options: argparse.Namespace) -> None:
+    """Estimate the tissue of a case, by a posterior or by a sweep."""
     settings, registration = _options(options), _registration(options)
     record: Record = options.record
     say = record.say
-
-    from warpbrain.atomic import safe_name
-    from warpbrain.cases.shipped import find_case
-    from warpbrain.simulation.system import find_device
-    from warpbrain.terminal.quiet import start_warp_quietly
-    from warpbrain.terminal.result_folder import choose_folder
 
     start_warp_quietly()
     device = find_device(options.device).alias
@@ -112,13 +89,11 @@ def _run(options: argparse.Namespace) -> None:
     if options.method == "grid":
         _sweep(options, case, out)
     else:
-        _estimate(options, settings, case, images, out)
+        _posterior(options, settings, case, images, out)
 
 
 def _registration(options: argparse.Namespace) -> Registration | None:
     """The accuracy that is asked for in the place of the case's."""
-    from warpbrain.recordings.registration import Registration
-
     if options.registration is None or options.no_registration:
         return None
     shift, turn = options.registration
@@ -129,12 +104,6 @@ def _registration(options: argparse.Namespace) -> Registration | None:
 
 def _options(options: argparse.Namespace) -> EstimationOptions:
     """What is asked for; refuses bad numbers before anything is computed."""
-    from warpbrain.estimation.finer_mesh import Discretisation
-    from warpbrain.estimation.likelihood import Likelihood
-    from warpbrain.estimation.options import EstimationOptions
-
-    if not options.nu > 0.0:
-        raise InputError(f"--nu {options.nu:g}: expected a positive number of degrees of freedom, or inf")
     return EstimationOptions(
         Likelihood(None) if math.isinf(options.nu) else Likelihood(),
         None if options.no_discretisation else Discretisation(),
@@ -144,21 +113,9 @@ def _options(options: argparse.Namespace) -> EstimationOptions:
     )
 
 
-def _estimate(
+def _posterior(
     options: argparse.Namespace, settings: EstimationOptions, case: Case, images: WarpRequest | None, out: Path
 ) -> None:
-    from warpbrain.estimation.estimate import Estimation
-    from warpbrain.estimation.fit import GaussNewtonStep
-    from warpbrain.estimation.options import Listener
-    from warpbrain.gp.trained import find_model
-    from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
-    from warpbrain.report.estimate_page import write_estimate_page
-    from warpbrain.report.estimate_picture import agreement_figure, densities_figure, residuals_figure
-    from warpbrain.report.files import write_summary
-    from warpbrain.report.state_files import read_state
-    from warpbrain.report.views import save
-    from warpbrain.simulation.system import find_device
-    from warpbrain.terminal.result_folder import results_in
 
     record: Record = options.record
     say = record.say
@@ -187,9 +144,9 @@ def _estimate(
     with results_in(out, record, options.overwrite):
         write_predictions(out / "predictions.csv", posterior)
         write_estimated_state(out / "state.vtu", posterior, where)
-        save(densities_figure(posterior, narrow=False), out / "posterior.png", case.title, 10.0)
-        save(agreement_figure(posterior, narrow=False), out / "predicted.png", case.title, 10.0)
-        save(residuals_figure(posterior), out / "residuals.png", case.title)
+        views.save(densities_figure(posterior, narrow=False), out / "posterior.png", case.title, 10.0)
+        views.save(agreement_figure(posterior, narrow=False), out / "predicted.png", case.title, 10.0)
+        views.save(residuals_figure(posterior), out / "residuals.png", case.title)
         write_summary(out / "estimate.json", described)
         record.files += ["estimate.json", "predictions.csv", "state.vtu"]
         record.files += ["posterior.png", "predicted.png", "residuals.png"]
@@ -202,15 +159,6 @@ def _what_else(
     posterior: Posterior, device: str | None, on_stage: Callable[[str], None]
 ) -> tuple[AveragedTissue | None, ScoreMap | None]:
     """Tissue averaged over what may act, and where something is left; None if that cannot be known, which is said."""
-    import numpy as np
-    from numpy.linalg import LinAlgError
-
-    from warpbrain.diagnosis.locating import map_of_search
-    from warpbrain.estimation.options import Listener
-    from warpbrain.worlds.body.hypotheses import screened
-    from warpbrain.worlds.body.uncertainty import averaged_tissue
-    from warpbrain.worlds.options import DiagnosisOptions
-
     prior, mesh_error = posterior.best.problem.mode.gaussian, posterior.options.discretisation is not None
     try:
         search = screened(posterior.case, device, Listener(on_stage), prior, mesh_error=mesh_error)
@@ -222,22 +170,6 @@ def _what_else(
 
 
 def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
-    from warpbrain.atomic import output_folder
-    from warpbrain.estimation.parameters import Parameters
-    from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
-    from warpbrain.gp.trained import find_model
-    from warpbrain.report.files import fingerprint_of
-    from warpbrain.report.sweep import (
-        TABLE,
-        columns,
-        estimated_in,
-        read_sweep,
-        sweep_lines,
-        write_sweep,
-        write_sweep_picture,
-    )
-    from warpbrain.terminal.result_folder import results_in
-
     record: Record = options.record
     say = record.say
 

@@ -3,85 +3,45 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
 
-from warpbrain.cli.options import add_to, require_poisson, require_whole
+from warpbrain.atomic import check_new_folder, check_writable, output_folder, whole_folder
 from warpbrain.errors import InputError
+from warpbrain.gp import leaving_out
+from warpbrain.gp.asymmetry import asymmetries_of_papers, asymmetry
+from warpbrain.gp.hierarchy import Hierarchical
+from warpbrain.gp.leaving_out import DEFAULT, candidates
+from warpbrain.gp.literature.studies import read_studies
+from warpbrain.gp.process import Process
+from warpbrain.gp.sampling import draw_many, law_of_curve, moduli, unstable
+from warpbrain.gp.trained import KINDS, find_model, fit_model, trained, write_model
+from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
+from warpbrain.report.generative_text import (
+    LawRow,
+    asymmetry_lines,
+    law_lines,
+    moduli_lines,
+    redrawn_lines,
+    write_laws,
+    write_moduli,
+)
+from warpbrain.report.page import lines
 from warpbrain.terminal.progress import Progress
 
-if TYPE_CHECKING:
-    from warpbrain.gp.process import Process
-    from warpbrain.report.generative_text import LawRow
-
-#: As in `warpbrain.gp`, which takes time to import: variants of the literature, kinds of models and laws; the default
-#: of each stands first.
-VARIANTS: tuple[Literal["corrected"], Literal["as_published"]] = ("corrected", "as_published")
-KINDS = ("hierarchical", "coregionalised")
-LAWS = ("neo-hookean", "mooney-rivlin", "ogden")
-_GP = "hierarchical (default), coregionalised (the paper's) or a folder of warpbrain gp fit"
-
-
-def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
-    """Add the command to the parser."""
-    gp = commands.add_parser(
-        "gp",
-        help="what 73 published strain energies make likely of tissue",
-        description="The generative model of tissue, learnt from 73 published strain energies.",
-    )
-    actions = gp.add_subparsers(dest="action", required=True, metavar="ACTION")
-    for add_action in (_add_show, _add_fit, _add_sample, _add_compare):
-        add_action(actions)
+#: Laws that moduli are shown of, the default first.
+_LAWS = ("neo-hookean", "mooney-rivlin", "ogden")
 
 
 def _chosen_model(options: argparse.Namespace) -> Process:
     """The model that `--gp` and `--variant` name."""
-    from warpbrain.gp.trained import find_model
-
     if options.variant is not None and options.gp not in KINDS:
         raise InputError(f"--variant {options.variant}: the model in {options.gp} says itself what it learnt from")
-    return find_model(options.gp, options.variant or VARIANTS[0])
+    return find_model(options.gp, options.variant or "corrected")
 
 
-def _add_show(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser(
-        "show",
-        help="draw a model and print the shear moduli that it makes likely",
-        description="Writes studies.png (the published energies), draws.png (the distribution with draws from it), "
-        "extrapolation.png (beyond the data, beside the other kind of model) and moduli.csv, and prints the table: "
-        "laws fitted to the mean curve and to those two standard deviations from it, and what 95 %% of draws have; of "
-        "hyperelastic groups also whether tissue is stiffer in compression or in tension, with its posterior interval.",
-    )
-    add = partial(add_to, parser)
-    add("--group", metavar="GROUP", help='only this one, such as "hyperelastic/brain"')
-    add("--gp", default=KINDS[0], help=_GP)
-    add("--variant", help="of the literature that it learnt from (default: corrected)")
-    parser.add_argument(
-        "--model", choices=LAWS, help="only laws of this kind (default: all three of a --group, else neo-hookean)"
-    )
-    add("--draws", type=int, default=1000, metavar="N", help="for the intervals (default: 1000)")
-    add("--seed", default=0, help="of the draws (default: 0)")
-    add("--poisson", default=0.45, help="of the laws (default: 0.45)")
-    add("--out", help="folder for the results (default: warpbrain-gp)")
-    parser.set_defaults(call=_show)
-
-
-def _show(options: argparse.Namespace) -> None:
-    if options.draws < 40:
-        raise InputError(f"--draws {options.draws}: expected at least 40, for an interval that holds 95 % of them")
-    require_whole(options, seed=0)
-    require_poisson(options.poisson)
-
-    from warpbrain.atomic import output_folder
-    from warpbrain.gp.asymmetry import asymmetries_of_papers, asymmetry
-    from warpbrain.gp.hierarchy import Hierarchical
-    from warpbrain.gp.sampling import moduli
-    from warpbrain.gp.trained import trained
-    from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
-    from warpbrain.report.generative_text import asymmetry_lines, moduli_lines, write_moduli
-
+def show(options: argparse.Namespace) -> None:
+    """Draw a generative model and print the shear moduli that it makes likely."""
     model = _chosen_model(options)
     if options.group is not None and options.group not in model.groups:
         raise InputError(
@@ -89,7 +49,7 @@ def _show(options: argparse.Namespace) -> None:
         )
     out = output_folder(options.out or Path("warpbrain-gp"))
     groups = model.groups if options.group is None else (options.group,)
-    laws = (options.model,) if options.model else LAWS[:1] if options.group is None else LAWS
+    laws = (options.model,) if options.model else _LAWS[:1] if options.group is None else _LAWS
     wanted = [(group, law) for group in groups for law in laws]
     studies = [study for study in model.studies if study.group in groups]
     print(
@@ -110,7 +70,7 @@ def _show(options: argparse.Namespace) -> None:
     if curved and isinstance(model, Hierarchical):
         papers = asymmetries_of_papers(model.studies)
         print("", *asymmetry_lines([asymmetry(model, group) for group in curved], papers), sep="\n")
-    other = trained("coregionalised" if model.name == KINDS[0] else "hierarchical", options.variant or VARIANTS[0])
+    other = trained("coregionalised" if model.name == KINDS[0] else "hierarchical", options.variant or "corrected")
     write_moduli(out / "moduli.csv", rows)
     save(draw_studies(model, options.group), out / "studies.png")
     save(draw_draws(model, options.group, options.seed), out / "draws.png")
@@ -118,35 +78,10 @@ def _show(options: argparse.Namespace) -> None:
     print("", f"written to {out}: moduli.csv, studies.png, draws.png, extrapolation.png", sep="\n")
 
 
-def _add_fit(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser(
-        "fit",
-        help="fit a model to the literature and to your own studies",
-        description="Fits a model and writes a folder that --gp takes wherever a model is asked for. See "
-        "docs/generative-model.md for the file of studies: three lines a study.",
-    )
-    add = partial(add_to, parser)
-    add("--add", type=Path, metavar="FILE", help="your own studies, a TOML file")
-    add("--gp", choices=KINDS, metavar=None, default=KINDS[0], help=f"kind of model (default: {KINDS[0]})")
-    add("--variant", default=VARIANTS[0], help=f"default: {VARIANTS[0]}")
-    add(
-        "--climbs",
-        type=int,
-        metavar="N",
-        help="from how many starts the coregionalised model is climbed in full (default: 1)",
-    )
-    add("--out", help="folder to make (default: warpbrain-gp-KIND-VARIANT)")
-    parser.set_defaults(call=_fit)
-
-
-def _fit(options: argparse.Namespace) -> None:
-    require_whole(options, climbs=1)
+def fit(options: argparse.Namespace) -> None:
+    """Fit a generative model and write it."""
     if options.climbs is not None and options.gp == KINDS[0]:
         raise InputError(f"--climbs {options.climbs}: means nothing with the {KINDS[0]} model")
-
-    from warpbrain.atomic import check_new_folder, whole_folder
-    from warpbrain.gp.trained import fit_model, write_model
-    from warpbrain.report.page import lines
 
     out = options.out or Path(f"warpbrain-gp-{options.gp}-{options.variant}")
     check_new_folder(out)
@@ -164,11 +99,6 @@ def _fit(options: argparse.Namespace) -> None:
 
 def _print_change(options: argparse.Namespace, model: Process) -> None:
     """What a user's studies changed: the moduli of their groups before and after."""
-    from warpbrain.gp.literature.studies import read_studies
-    from warpbrain.gp.sampling import moduli
-    from warpbrain.gp.trained import trained
-    from warpbrain.report.generative_text import moduli_lines
-
     added = model.studies[len(read_studies(options.variant)) :]
     for group in dict.fromkeys(study.group for study in added):
         tables = {
@@ -186,45 +116,12 @@ def _print_change(options: argparse.Namespace, model: Process) -> None:
             print("  (there was no study of this group before)")
 
 
-def _add_sample(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser(
-        "sample",
-        help="draw laws of one or several tissues",
-        description="Draws curves of one or several groups, jointly, and fits a law to each; an unstable draw is told "
-        "and drawn again. With --sweep, takes the curves at even distances from the mean instead, as the paper does.",
-    )
-    add = partial(add_to, parser)
-    add("--group", required=True, nargs="+", metavar="GROUP", help='such as "hyperelastic/brain"')
-    how = parser.add_mutually_exclusive_group()
-    how.add_argument("-n", "--number", type=int, default=10, metavar="N", help="of draws (default: 10)")
-    how.add_argument(
-        "--sweep",
-        type=int,
-        metavar="N",
-        help="laws of N curves from 2 standard deviations below the mean to 2 above (the paper: 17), in all "
-        "combinations over groups",
-    )
-    parser.add_argument("--model", choices=LAWS, default=LAWS[0], help=f"law (default: {LAWS[0]})")
-    add("--seed", help="of the draws (default: 0)")
-    add("--gp", default=KINDS[0], help=_GP)
-    add("--variant", help="of the literature that it learnt from (default: corrected)")
-    add("--poisson", default=0.45, help="to be stable with (default: 0.45)")
-    add("--csv", help="write the table there instead of printing it")
-    parser.set_defaults(call=_sample)
-
-
-def _sample(options: argparse.Namespace) -> None:
-    if options.number < 1:
-        raise InputError(f"-n {options.number}: expected a whole number of at least 1")
-    require_whole(options, sweep=2, seed=0)
+def sample(options: argparse.Namespace) -> None:
+    """Draw laws of one or several tissues."""
     if options.sweep is not None and options.seed is not None:
         raise InputError(f"--seed {options.seed}: means nothing with --sweep, which draws nothing")
-    require_poisson(options.poisson)
     if len(set(options.group)) < len(options.group):
         raise InputError(f"--group {' '.join(options.group)}: a group is given twice")
-
-    from warpbrain.atomic import check_writable
-    from warpbrain.report.generative_text import law_lines, write_laws
 
     if options.csv is not None:
         check_writable(options.csv.absolute())
@@ -247,9 +144,6 @@ def _sample(options: argparse.Namespace) -> None:
 
 
 def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
-    from warpbrain.gp.sampling import draw_many
-    from warpbrain.report.generative_text import LawRow, redrawn_lines
-
     draws, seed = [], options.seed or 0
     with Progress("draws") as bar:
         for drawn in draw_many(model, options.group, options.model, options.number, seed, options.poisson):
@@ -260,9 +154,6 @@ def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
 
 
 def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
-    from warpbrain.gp.sampling import law_of_curve, unstable
-    from warpbrain.report.generative_text import LawRow
-
     places = [-2.0 + 4.0 * i / (options.sweep - 1) for i in range(options.sweep)]
     fits = {(group, k): law_of_curve(model, group, k, options.model) for group in options.group for k in places}
     reasons = {key: unstable(fitted, options.poisson) for key, fitted in fits.items()}
@@ -276,29 +167,8 @@ def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
     return rows, sentences + sorted({f"  {reason}" for row in rows for reason in row.reasons})
 
 
-def _add_compare(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser(
-        "compare",
-        help="score models on studies that they have not seen",
-        description="Leaves out each study of the literature, or each paper with all its studies, fits every model "
-        "again without it and scores what it says of it: log predictive density, with a sign test against the "
-        "default model, and how many levels are within intervals, by method of measurement. Takes minutes to half an "
-        "hour; models that are in the file already are not scored again, so that it goes on where it was interrupted.",
-    )
-    add = partial(add_to, parser)
-    add("--variant", default=VARIANTS[0], help=f"default: {VARIANTS[0]}")
-    add("--leave", choices=("paper", "study"), default="paper", help="what is left out (default: paper)")
-    add("--only", metavar="TEXT", default="", help="only models that have this in their name")
-    add("--csv", help="file to write (default: warpbrain-gp-VARIANT-LEAVE.csv)")
-    parser.set_defaults(call=_compare)
-
-
-def _compare(options: argparse.Namespace) -> None:
-    from warpbrain.atomic import check_writable
-    from warpbrain.gp import leaving_out
-    from warpbrain.gp.leaving_out import DEFAULT, candidates
-    from warpbrain.gp.literature.studies import read_studies
-
+def compare(options: argparse.Namespace) -> None:
+    """Score models on studies that they have not seen."""
     path = options.csv or Path(f"warpbrain-gp-{options.variant}-{options.leave}.csv")
     check_writable(path)
     studies = read_studies(options.variant)
@@ -321,11 +191,11 @@ def _compare(options: argparse.Namespace) -> None:
     print(*leaving_out.score_lines(shown), sep="\n")
     for score in shown:
         if score.levels:
-            lines = leaving_out.calibration_lines(
+            calibrated = leaving_out.calibration_lines(
                 leaving_out.calibration(score, leaving_out.methods_of(left)), options.leave
             )
             title = f"{score.name}: {options.leave}s whose level is within an interval (95 % interval of that part)"
-            print("", title, *lines, sep="\n")
+            print("", title, *calibrated, sep="\n")
     default = next((score for score in scores if score.name == DEFAULT), None)
     others = [score for score in shown if score.name != DEFAULT]
     if default is not None and others:

@@ -4,124 +4,51 @@ from __future__ import annotations
 
 import argparse
 import math
-import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from warpbrain.atomic import safe_name
+from warpbrain.cases.assuming import assume
+from warpbrain.cases.case import Case
+from warpbrain.cases.drawn import FromPrior, with_prior_draw, with_prior_middle
+from warpbrain.cases.shipped import find_case
 from warpbrain.cli import run_specimen, warp
-from warpbrain.cli.options import (
-    WARPED,
-    add_results,
-    add_to,
-    drawn,
-    note_device,
-    require_poisson,
-    require_positive,
-    require_tolerance,
-    require_whole,
-)
-from warpbrain.cli.run_progress import watching
+from warpbrain.cli.log import drawn, note_device
 from warpbrain.errors import InputError, SolveError
+from warpbrain.gp.trained import find_model
+from warpbrain.physics.laws.stability import UnstableLawError, require_stable
+from warpbrain.physics.words import tabled
+from warpbrain.report import summary as tables
+from warpbrain.report.comparison import describe_comparisons, describe_mesh_error, recorded_rows, write_comparisons
+from warpbrain.report.files import write_result, write_summary
+from warpbrain.report.page import lines
+from warpbrain.report.run_page import write_run_page
+from warpbrain.report.state_files import read_state
+from warpbrain.report.summary import describe_prior
+from warpbrain.simulation.equilibrium import NewtonStep
+from warpbrain.simulation.mesh_error import MeshError, mesh_error, observe_without
+from warpbrain.simulation.observation import Observed, observe
+from warpbrain.simulation.relaxation import RelaxationStep
+from warpbrain.simulation.result import Result, nodal_state_of
+from warpbrain.simulation.run import Course, Running, Watching
+from warpbrain.simulation.system import System, begin_loading_kernels, find_device, find_precision
 from warpbrain.terminal.progress import Progress
+from warpbrain.terminal.quiet import start_warp_quietly
+from warpbrain.terminal.record import Record
+from warpbrain.terminal.result_folder import choose_folder, results_in
 
-if TYPE_CHECKING:
-    from warpbrain.cases.case import Case
-    from warpbrain.cases.drawn import FromPrior
-    from warpbrain.simulation.mesh_error import MeshError
-    from warpbrain.simulation.observation import Observed
-    from warpbrain.simulation.result import Result
-    from warpbrain.simulation.system import System
-    from warpbrain.terminal.record import Record
+#: Newton iterations that are printed one by one.
+_LONG_HISTORY = 16
+_INDENT = 12 * " "
 
 
-def add_parser(commands: argparse._SubParsersAction[Any]) -> None:
-    """Add the command to the parser."""
-    parser = commands.add_parser(
-        "run",
-        help="simulate a case",
-        description="Simulates a case and writes result.vtu, summary.json, deformation.png, report.html and "
-        "comparison.csv. Without --steps, --to-rest or --until it finds the static equilibrium.",
-    )
-    add = partial(add_to, parser)
-    add("--case", help="0529, phantom, ... (see warpbrain cases), or the path of a case folder")
-    add("--tissue")
-    add(
-        "--model",
-        help="neo-hookean, mooney-rivlin or ogden for every tissue, at the shear modulus that the case gives "
-        "(default: the case's own law)",
-    )
-    add("--mu", nargs="+", metavar="PA", default=[], help="shear modulus [Pa] of every tissue, or LABEL=PA for one")
-    add("--sample", type=int, metavar="N", help="draw number N (from 0) of the tissues' joint prior gives every law")
-    add("--seed", help="another sequence of draws for --sample (default: 0)")
-    add(
-        "--gp",
-        help='generative model of --sample and of mu = "prior": hierarchical (default), coregionalised or a folder',
-    )
-    add(
-        "--with",
-        dest="assumed",
-        action="append",
-        default=[],
-        metavar="MECHANISM",
-        help="assume one more mechanism, such as gravity:level=60 (see docs/mechanisms); can be given several times",
-    )
-    add("--poisson")
-    add(
-        "--elements",
-        choices=("tet4", "tet4-averaged", "tet10", "tet10-mixed"),
-        help="plain tetrahedra (default up to nu = 0.49); averaged gradients, which lock less; quadratic tetrahedra, "
-        "with nodes in the middle of edges; or these with a continuous linear pressure (P2-P1), which do not lock in "
-        "nearly incompressible tissue (default above, where what acts allows it)",
-    )
-    add(
-        "--mesh-error",
-        nargs="?",
-        choices=("elements", "size"),
-        const="size",
-        help="estimate the error of the mesh: 'elements', what locks, at about twice the cost of the run, or 'size' "
-        "(if nothing is said), with elements of half the size too, at ten times or more",
-    )
-    add("--device", "--precision")
-    add_to(parser.add_mutually_exclusive_group(), "--steps", "--to-rest")
-    add(
-        "--until",
-        type=float,
-        metavar="SECONDS",
-        help="follow slow change without inertia until then, in --steps steps that grow (default: 20): for drainage "
-        "and viscoelasticity",
-    )
-    add("--tolerance", help="out-of-balance force at equilibrium, relative to all nodal forces (default: 1e-8)")
-    add(
-        "--legacy-rmse",
-        action="store_true",
-        help="print also what the paper's own code calls rmse, the root of the mean distance in sqrt(mm)",
-    )
-    add("--allow-unstable", action="store_true", help="accept a law that breaks the paper's stability conditions")
-    add(*WARPED)
-    add_results(parser, "warpbrain-CASE-TISSUE")
-    parser.set_defaults(call=_run)
-
-
-def _run(options: argparse.Namespace) -> None:
-    start = time.perf_counter()
+def run(options: argparse.Namespace) -> None:
+    """Simulate a case, print what happened and write it."""
     _check(options)
     record: Record = options.record
     say = record.say
-
-    from warpbrain.atomic import safe_name
-    from warpbrain.report import summary as tables
-    from warpbrain.report.comparison import describe_comparisons, recorded_rows, write_comparisons
-    from warpbrain.report.files import write_result, write_summary
-    from warpbrain.report.page import lines
-    from warpbrain.report.run_page import write_run_page
-    from warpbrain.report.state_files import read_state
-    from warpbrain.report.summary import describe_prior
-    from warpbrain.simulation.run import Course, Running
-    from warpbrain.simulation.system import begin_loading_kernels, find_device, find_precision
-    from warpbrain.terminal.quiet import start_warp_quietly
-    from warpbrain.terminal.result_folder import choose_folder, results_in
 
     start_warp_quietly()
     begin_loading_kernels(find_device(options.device), find_precision(options.precision))
@@ -157,7 +84,7 @@ def _run(options: argparse.Namespace) -> None:
     for line in lines("run.txt", "ending", done.followed.solution):
         say(line)
     outcome, counts = done.followed.solution, done.followed.calls
-    first_step = done.followed.begun - start
+    first_step = done.followed.begun - record.clock
     seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **done.followed.seconds}
     result, observed = done.result, done.observed
     displacements = tables.describe_result(result)
@@ -194,21 +121,16 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse bad numbers before anything heavy is imported; reads the moduli."""
-    require_whole(options, steps=1)
-    require_poisson(options.poisson)
-    require_tolerance(options.tolerance)
+    """Refuse options that mean nothing together; reads the moduli."""
     if options.mesh_error is not None and options.elements in ("tet10", "tet10-mixed"):
         raise InputError(f"--mesh-error: is not known of --elements {options.elements}: expected tet4 or tet4-averaged")
     if options.mesh_error == "elements" and options.elements == "tet4-averaged":
         raise InputError("--mesh-error elements: compares with tet4-averaged: --mesh-error size says what is left")
-    require_positive("until", options.until, "a positive number of seconds")
     if options.until is not None and options.to_rest:
         raise InputError(f"--until {options.until:g}: means nothing with --to-rest")
     if options.until is not None and options.mesh_error is not None:
         raise InputError(f"--until {options.until:g}: the error of the mesh is not estimated for slow change yet")
     options.moduli = parse_moduli(options.mu)
-    require_whole(options, sample=0, seed=0)
     if options.sample is not None and options.mu:
         raise InputError(
             f"--sample {options.sample}: gives every law; --mu {' '.join(options.mu)} means nothing with it"
@@ -219,10 +141,6 @@ def _check(options: argparse.Namespace) -> None:
 
 def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     """The case as the arguments change it, and which of its laws are the generative model's, if any."""
-    from warpbrain.cases.assuming import assume
-    from warpbrain.cases.shipped import find_case
-    from warpbrain.physics.laws.stability import UnstableLawError, require_stable
-
     case = find_case(options.case, options.tissue)
     if options.model is not None:
         case = case.with_law(options.model)
@@ -253,9 +171,6 @@ def _from_prior(options: argparse.Namespace, case: Case) -> FromPrior | None:
         if options.gp is not None:
             raise InputError(f'--gp {options.gp}: means nothing without --sample or a tissue of mu = "prior"')
         return None
-
-    from warpbrain.cases.drawn import with_prior_draw, with_prior_middle
-    from warpbrain.gp.trained import find_model
 
     model = find_model(options.gp or "hierarchical")
     if options.sample is None:
@@ -306,10 +221,6 @@ def _mesh_error(
     """The error of the mesh and what is to be said of it; nothing, if it was not asked for, no error if not found."""
     if options.mesh_error is None:
         return None, None
-    from warpbrain.report.comparison import describe_mesh_error
-    from warpbrain.simulation.mesh_error import mesh_error, observe_without
-    from warpbrain.simulation.observation import observe
-    from warpbrain.simulation.result import nodal_state_of
 
     smaller = options.mesh_error == "size"
     try:
@@ -331,3 +242,64 @@ def _mesh_error(
     # of a motion the error is that of its end
     at_end = observed if time is None else observe(case, nodal_state_of(system, time), time)
     return estimated_error, describe_mesh_error(estimated_error, system.model.elements, at_end, without)
+
+
+@contextmanager
+def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[Watching]:
+    """Who is told of the steps, after the head of their table is printed."""
+    if options.until is not None:
+        name, columns = "slow change", "     time [s]   Newton    CG   min J   largest [mm]"
+    elif options.steps is not None:
+        name, columns = "motion", "        time [ms]     CG   min J   kinetic energy [mJ]"
+    elif options.to_rest:
+        name, columns = "to rest", "        time [s]  step [s]   residual    CG   min J"
+    else:
+        name, columns = "equilibrium", "   load   Newton   residual    CG   step   min J"
+    say("", name + columns, sep="\n")
+    count = 0
+
+    def on_newton(step: NewtonStep) -> None:
+        nonlocal count
+        count += 1
+        # a long history is told by its load steps, not by every iteration
+        if count <= _LONG_HISTORY or step.iteration == 1:
+            row(
+                f"{100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} "
+                f"{step.cg_iterations:>5}  {step.step:>5.3g}   {step.min_J:>5.3f}"
+                + ("   indefinite tangent" if step.indefinite else "")
+            )
+        if count == _LONG_HISTORY:
+            say(_INDENT + "(from here on, the first iteration of each load step)")
+        progress.show(step.load, f"Newton {step.iteration}")
+
+    def on_relaxation(step: RelaxationStep) -> None:
+        row(
+            f"{step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}   "
+            f"{step.min_J:>5.3f}"
+        )
+        decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
+        progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
+
+    def on_motion(number: int, time: float, noted: dict[str, Any] | None) -> None:
+        if noted is not None:
+            energy = f"{1000 * noted['kinetic_J']:.4g}"
+            row(f"{1000 * time:>11.4g} {noted['cg_iterations']:>6}   {noted['min_J']:>5.3f}   {energy}")
+        progress.show(number / options.steps, f"{1000 * time:.0f} ms")
+
+    def on_moment(number: int, moments: int, noted: dict[str, Any]) -> None:
+        if number % max(1, moments // 10) == 0 or number == moments:
+            row(
+                f"{noted['time_s']:>12.4g} {noted['newton_iterations']:>8} {noted['cg_iterations']:>5}"
+                f"   {noted['min_J']:>5.3f}   {tabled(noted['largest_displacement_mm']):>9}"
+            )
+        progress.show(number / moments, f"{noted['time_s']:.3g} s")
+
+    def on_slow_newton(part: float, step: NewtonStep) -> None:
+        progress.show(part, f"Newton {step.iteration}")
+
+    def row(text: str) -> None:
+        progress.clear()
+        say(_INDENT + text)
+
+    with Progress(name, options.quiet) as progress:
+        yield Watching(on_newton, on_relaxation, on_motion, on_slow_newton, on_moment)

@@ -4,32 +4,29 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from warpbrain.cli.options import note_device
+from warpbrain.cases.case import Case
+from warpbrain.cli.log import note_device
 from warpbrain.errors import InputError
+from warpbrain.report import specimen as text
+from warpbrain.report.comparison import describe_comparisons
+from warpbrain.report.files import write_summary
+from warpbrain.report.page import lines
+from warpbrain.report.run_page import write_specimen_page
+from warpbrain.report.specimen import write_tests_picture
+from warpbrain.report.summary import describe_opening, machine
+from warpbrain.simulation.observation import Observed
+from warpbrain.simulation.specimen import SpecimenRunning
 from warpbrain.terminal.progress import Progress
-
-if TYPE_CHECKING:
-    from warpbrain.cases.case import Case
-    from warpbrain.terminal.record import Record
+from warpbrain.terminal.record import Record
+from warpbrain.terminal.result_folder import results_in
 
 
 def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any] | None = None) -> None:
     """Simulate every test of a case with a specimen, as the options of `warpbrain run` change it; `prior` is what is to
     be said of laws that the generative model gave."""
     _check(options, case)
-
-    from warpbrain.report import specimen as text
-    from warpbrain.report.comparison import describe_comparisons
-    from warpbrain.report.files import write_summary
-    from warpbrain.report.page import lines
-    from warpbrain.report.run_page import write_specimen_page
-    from warpbrain.report.specimen import write_tests_picture
-    from warpbrain.report.summary import describe_opening, machine
-    from warpbrain.simulation.observation import Observed
-    from warpbrain.simulation.specimen import SpecimenRunning
-    from warpbrain.terminal.result_folder import results_in
 
     record: Record = options.record
     say = record.say

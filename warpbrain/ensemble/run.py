@@ -14,7 +14,6 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups, with_prior_draw
 from warpbrain.cases.shipped import as_case
-from warpbrain.ensemble.defaults import SAMPLES
 from warpbrain.ensemble.results import EnsembleResult, results_of
 from warpbrain.ensemble.sample import Sample
 from warpbrain.ensemble.store import Store
@@ -32,6 +31,8 @@ from warpbrain.simulation.system import System
 
 #: Standard deviations from the mean curve that the paper's sweep takes, for each tissue.
 SWEEP = tuple(np.linspace(-2.0, 2.0, 17).tolist())
+#: Samples unless others are asked for: as many as the paper's sweep of two tissues has.
+SAMPLES = 289
 
 
 def swept_samples(case: Case, process: Process) -> list[Sample]:

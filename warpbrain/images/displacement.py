@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import map_coordinates
 
 from warpbrain.arrays import Bools, Floats, Ints, Singles
 from warpbrain.images.continuation import continued
@@ -50,8 +51,6 @@ class DisplacementField:
 
     def at_indices(self, indices: Floats) -> Floats:
         """Vectors (n, 3) [mm, RAS] at voxel numbers (n, 3), which need not be whole."""
-        from scipy.ndimage import map_coordinates
-
         vectors = np.empty((len(indices), 3))
         last = np.array(self.grid.shape) - 1
         for first in range(0, len(indices), _BATCH):
@@ -143,8 +142,6 @@ def _inverted(field: DisplacementField, voxels: Ints) -> tuple[Floats, int]:
 
 def _errors(field: DisplacementField, back: DisplacementField, tissue: Bools) -> Floats:
     """Errors (n,) [mm] of forward after back, between the voxels of moved tissue."""
-    from scipy.ndimage import map_coordinates
-
     grid = field.grid
     moved = np.linalg.norm(field.vectors, axis=-1)
     # places whose voxel may hold moved tissue: those around it as far as anything moves
@@ -179,8 +176,6 @@ def resampled(
     type: whole numbers are rounded. They are zero where there was no image, and not a number where most of what is
     interpolated was none: it does not spread.
     """
-    from scipy.ndimage import map_coordinates
-
     after = back.grid
     moved = np.zeros(after.shape, dtype=values.dtype)
     # single precision only where it holds every value

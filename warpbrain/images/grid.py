@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import map_coordinates
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.mesh import TetMesh
@@ -95,8 +96,6 @@ class Grid:
 
     def sampled(self, values: NDArray[Any], points: Floats) -> Floats:
         """Values (n,) of a field (i, j, k) on this grid at positions (n, 3) [mm, RAS], linear between voxels."""
-        from scipy.ndimage import map_coordinates
-
         back = np.linalg.inv(self.affine)
         at = back[:3, :3] @ points.T + back[:3, 3:]
         return np.asarray(map_coordinates(values, at, order=1, mode="nearest", output=np.float64))

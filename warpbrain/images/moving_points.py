@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import whole_file, write_text
 from warpbrain.errors import InputError
 from warpbrain.images.displacement import DisplacementField
 from warpbrain.images.grid import MILLIMETRES
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.quadratic import quadratic_interpolant
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, Unreadable
 from warpbrain.recordings.electrodes import is_electrodes, read_electrodes
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.markups import ENDINGS, is_markup, read_markup
@@ -94,9 +95,9 @@ def read_point_file(path: Path) -> PointFile:
     if not (is_electrodes(path) or is_markup(path)):
         raise InputError(f"{path}: found ending '{path.suffix}', expected .mrk.json, .fcsv or a BIDS electrodes.tsv")
     problems = Problems()
-    file = read_electrodes(path, problems) if is_electrodes(path) else read_markup(path, problems)
+    with suppress(Unreadable):
+        file = read_electrodes(path, problems) if is_electrodes(path) else read_markup(path, problems)
     problems.stop()
-    assert file is not None
     moved_text = file.moved_text
     remarks = tuple(problems.remarks)
     return PointFile(
@@ -132,8 +133,7 @@ def write_moved(folder: Path, moved: Sequence[MovedPoints]) -> list[str]:
     for points in moved:
         name = points.file.moved_name
         text = points.file.moved_text(points.points)
-        with whole_file(folder / name) as scratch:
-            scratch.write_text(text, encoding="utf-8")
+        write_text(folder / name, text)
         names.append(name)
     with whole_file(folder / "moved.csv") as scratch, scratch.open("w", encoding="utf-8", newline="") as stream:
         rows = csv.writer(stream)

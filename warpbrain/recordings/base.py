@@ -96,16 +96,15 @@ class Recording:
         Recording or None
             None if there were problems.
         """
-        with collected(path, problems) as found:
-            content = cls._read(path, frame, found, given)
-        if content is None or found:
+        with collected(path, problems) as of_file:
+            values, unit = cls._read(path, frame, of_file, given)
+        if of_file:
             return None
-        values, unit = content
         return cls(sigma=None if sigma is None else unit * sigma, **given, **values)
 
     @classmethod
-    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
-        """What a file holds, None if there were problems; what is no field is taken out of `given`."""
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content:
+        """What a file holds, or `Unreadable`; what is no field is taken out of `given`."""
         raise NotImplementedError
 
     @classmethod

@@ -6,15 +6,14 @@ https://bids-specification.readthedocs.io/en/stable/modality-specific-files/intr
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats, Ints
+from warpbrain.arrays import Floats
 from warpbrain.problems import Problems
+from warpbrain.recordings.markups import Markup
 from warpbrain.recordings.tables import position_of
 from warpbrain.recordings.text import lines_of, read_text, shown
 
@@ -26,63 +25,22 @@ _ELSEWHERE = ("pixels", "ctf", "elektaneuromag", "4dbti", "kityokogawa", "chieti
 _NOTHING = "n/a"
 
 
-@dataclass(frozen=True, eq=False)
-class Electrodes:
-    """Electrodes of a file.
-
-    Attributes
-    ----------
-    labels : tuple of str
-        Of those that have a position.
-    points : (n, 3) array
-        [m, RAS]
-    header : list of str
-        Columns.
-    cells : list of rows
-        All rows as text.
-    rows : (n,) int array
-        Which rows have a position.
-    metres : float
-        Of one unit of the file.
-    """
-
-    labels: tuple[str, ...]
-    points: Floats
-    header: list[str]
-    cells: list[list[str]]
-    rows: Ints
-    metres: float
-
-    def moved_text(self, points: ArrayLike) -> str:
-        """The file with the electrodes at other places (n, 3) [m, RAS], everything else as it was."""
-        cells = [list(row) for row in self.cells]
-        for row, position in zip(self.rows, np.asarray(points, dtype=np.float64) / self.metres, strict=True):
-            for name, value in zip("xyz", position, strict=True):
-                cells[row][self.header.index(name)] = f"{value:.9g}"
-        return "".join("\t".join(row) + "\n" for row in (self.header, *cells))
-
-
 def is_electrodes(path: Path) -> bool:
     """Whether the name is that of a BIDS file of electrodes."""
     return path.name.lower().endswith(ENDING)
 
 
-def read_electrodes(path: Path, problems: Problems) -> Electrodes | None:
-    """Read electrodes; None if there were problems.
+def read_electrodes(path: Path, problems: Problems) -> Markup:
+    """Read the electrodes that have a position; `Unreadable` if there are problems.
 
     Positions are taken for scanner coordinates (RAS), as `iEEGCoordinateSystem` ACPC, ScanRAS, a template's or Other
     are; without a ``coordsystem.json`` they are in mm, which is remarked.
     """
-    text = read_text(path, problems)
-    if text is None:
-        return None
-    before = len(problems.found)
-    header, *cells = [line.split("\t") for line in lines_of(text) if line.strip()]
+    header, *cells = [line.split("\t") for line in lines_of(read_text(path, problems)) if line.strip()]
     for name in ("name", "x", "y", "z"):
         if name not in header:
             problems.add(path, "header", f"found no column '{name}', found {', '.join(header)[:100]}")
-    if len(problems.found) > before:
-        return None
+    problems.require_none()
     names, points, rows = [], [], []
     for number, row in enumerate(cells):
         if len(row) != len(header):
@@ -97,16 +55,23 @@ def read_electrodes(path: Path, problems: Problems) -> Electrodes | None:
         names.append(row[header.index("name")].strip())
         points.append(values)
         rows.append(number)
-    if not points and len(problems.found) == before:
+    if not points and not problems:
         problems.add(path, "", "found no electrode with a position")
     metres = _unit(path, problems)
-    if metres is None or len(problems.found) > before:
-        return None
-    return Electrodes(tuple(names), metres * np.array(points), header, cells, np.array(rows), metres)
+    problems.require_none()
+
+    def moved_text(moved: Floats) -> str:
+        table = [list(row) for row in cells]
+        for row, position in zip(rows, moved / metres, strict=True):
+            for name, value in zip("xyz", position, strict=True):
+                table[row][header.index(name)] = f"{value:.9g}"
+        return "".join("\t".join(row) + "\n" for row in (header, *table))
+
+    return Markup(metres * np.array(points), tuple(names), moved_text)
 
 
-def _unit(path: Path, problems: Problems) -> float | None:
-    """Metres of one unit of a file, None if its coordinate system cannot be used."""
+def _unit(path: Path, problems: Problems) -> float:
+    """Metres of one unit of a file; that its coordinate system cannot be used is a problem."""
     side = _coordinate_file(path)
     if side is None:
         problems.remark(path, "no coordsystem.json beside it: positions are taken for mm in scanner coordinates (RAS)")
@@ -114,19 +79,16 @@ def _unit(path: Path, problems: Problems) -> float | None:
     try:
         content: Any = json.loads(side.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
-        problems.add(side, "", f"found no valid JSON ({error})")
-        return None
+        problems.refuse(side, "", f"found no valid JSON ({error})")
     if not isinstance(content, dict):
-        problems.add(side, "", "found no object, expected that of a BIDS coordsystem.json")
-        return None
+        problems.refuse(side, "", "found no object, expected that of a BIDS coordsystem.json")
     kind = next((kind for kind in ("iEEG", "EEG", "MEG", "NIRS") if f"{kind}CoordinateSystem" in content), "iEEG")
     system, unit = (content.get(f"{kind}Coordinate{what}") for what in ("System", "Units"))
     if str(system).lower() in _ELSEWHERE:
         cure = "give positions in scanner coordinates (ScanRAS or ACPC) of the image"
         problems.add(side, f"{kind}CoordinateSystem", f"found {shown(system)}, expected one of an image", cure)
     if not isinstance(unit, str) or unit not in _METRES:
-        problems.add(side, f"{kind}CoordinateUnits", f"found {shown(unit)}, expected one of {', '.join(_METRES)}")
-        return None
+        problems.refuse(side, f"{kind}CoordinateUnits", f"found {shown(unit)}, expected one of {', '.join(_METRES)}")
     return _METRES[unit]
 
 

@@ -45,18 +45,16 @@ class ForceRecording(Recording):
     torque: Floats | None = None
 
     @classmethod
-    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content:
         """Read ``.csv``: columns ``t`` [s] and one or more of ``fx``, ``fy``, ``fz`` [N] and ``torque`` [N m].
 
         `sigma` is of the force, or of the torque if that is all there is.
         """
         table = read_csv(path, problems, ("t", *FORCE, "torque"))
-        if table is None:
-            return None
         recorded = [column for column in FORCE if column in table]
         if not recorded and "torque" not in table:
-            table.require("fx")
-        time = table.times(strictly=True) if table.require("t") else None
+            table.has("fx")
+        time = table.times(strictly=True) if table.has("t") else None
         force = np.full((len(table), 3), np.nan)
         for column in recorded:
             force[:, FORCE.index(column)] = table.numbers(column)

@@ -45,16 +45,16 @@ def check_possible(
     """Note as a problem points that move (n, 3) [m] farther than the body is long, and noise [m] larger than it."""
     size = extent(mesh.points)
     moved = np.zeros(0) if displacement is None else np.linalg.norm(displacement, axis=1)
-    with collected(path, problems) as found:
+    with collected(path, problems) as of_file:
         for row in np.flatnonzero(moved > size):
-            if found.enough:
+            if of_file.enough:
                 break
             message = f"moves {_metres(float(moved[row]))} in a body of {_metres(size)}"
-            found.add(path, f"point {row + 1}", message, _FAR_MOVED)
+            of_file.add(path, f"point {row + 1}", message, _FAR_MOVED)
         largest = max((float(np.max(noise)) for noise in noises if noise is not None), default=0.0)
         if largest > size:
             message = f"a noise of {_metres(largest)} in a body of {_metres(size)}"
-            found.add(path, "sigma", message, "in units of the case, one standard deviation of one component")
+            of_file.add(path, "sigma", message, "in units of the case, one standard deviation of one component")
 
 
 def _metres(length: float) -> str:
@@ -84,7 +84,7 @@ def check_points_inside(recording: TrackedPoints, mesh: TetMesh, path: Path, pro
     far = far[np.argsort(-place.distance[far], kind="stable")]
     cure = "" if inside else _mistake(recording.points[far], mesh)
     cure = cure or 'check units and axes, or write outside = "nearest" for this recording'
-    with collected(path, problems) as found:
+    with collected(path, problems) as of_file:
         named: set[str] = set()
         for row in far if inside else far[:1]:
             place_name = _name(recording, int(row))
@@ -95,7 +95,7 @@ def check_points_inside(recording: TrackedPoints, mesh: TetMesh, path: Path, pro
             x, y, z = 1000.0 * recording.points[row]
             at = f"({x:.4g}, {y:.4g}, {z:.4g}) mm RAS"
             limit = f"expected within one edge length, {1000.0 * place.edge[row]:.3g} mm"
-            found.add(
+            of_file.add(
                 path, place_name, f"{head}{at} is {1000.0 * place.distance[row]:.4g} mm outside the mesh, {limit}", cure
             )
 

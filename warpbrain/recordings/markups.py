@@ -31,7 +31,7 @@ COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 
 @dataclass(frozen=True, eq=False)
 class Markup:
-    """Control points.
+    """Control points of a file, or electrodes.
 
     Attributes
     ----------
@@ -53,25 +53,20 @@ def is_markup(path: Path) -> bool:
     return path.name.lower().endswith(ENDINGS)
 
 
-def read_markup(path: Path, problems: Problems) -> Markup | None:
-    """Read a markup of one point list, curve or line; None if there were problems."""
-    text = read_text(path, problems)
-    if text is None:
-        return None
-    before = len(problems.found)
+def read_markup(path: Path, problems: Problems) -> Markup:
+    """Read a markup of one point list, curve or line; `Unreadable` if there are problems."""
     read = _read_fcsv if path.suffix.lower() == ".fcsv" else _read_json
-    markup = read(path, text, problems)
-    if markup is not None and not markup.labels and len(problems.found) == before:
-        problems.add(path, "", "found no control points")
-    return markup if len(problems.found) == before else None
+    markup = read(path, read_text(path, problems), problems)
+    if not markup.labels:
+        problems.refuse(path, "", "found no control points")
+    return markup
 
 
-def paired(start: Markup, end: Markup, path: Path, moved: Path, problems: Problems) -> Floats | None:
-    """Positions (n, 3) in `end` of the points of `start`, paired by label; None if that cannot be done.
+def paired(start: Markup, end: Markup, path: Path, moved: Path, problems: Problems) -> Floats:
+    """Positions (n, 3) in `end` of the points of `start`, paired by label; `Unreadable` if that cannot be done.
 
     Every label must be there once in both.
     """
-    before = len(problems.found)
     for markup, file in ((start, path), (end, moved)):
         if not all(markup.labels):
             at = markup.labels.index("")
@@ -82,25 +77,21 @@ def paired(start: Markup, end: Markup, path: Path, moved: Path, problems: Proble
     for markup, other, file, partner in ((start, end, path, moved), (end, start, moved, path)):
         for label in sorted(set(markup.labels) - set(other.labels) - {""}):
             problems.add(file, f"label {shown(label)}", f"found no point of this label in {partner.name}")
-    if len(problems.found) > before:
-        return None
+    problems.require_none()
     row = {label: index for index, label in enumerate(end.labels)}
     return end.points[[row[label] for label in start.labels]]
 
 
-def _read_json(path: Path, text: str, problems: Problems) -> Markup | None:
+def _read_json(path: Path, text: str, problems: Problems) -> Markup:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        problems.add(path, "", f"found no valid JSON ({error})", "is the file cut off?")
-        return None
+        problems.refuse(path, "", f"found no valid JSON ({error})", "is the file cut off?")
     markups = content.get("markups") if isinstance(content, dict) else None
     if not isinstance(markups, list):
-        problems.add(path, "", "found no list 'markups', expected a 3D Slicer markup")
-        return None
+        problems.refuse(path, "", "found no list 'markups', expected a 3D Slicer markup")
     if len(markups) != 1 or not isinstance(markups[0], dict):
-        problems.add(path, "markups", f"found {len(markups)} markups, expected one", "save each in its own file")
-        return None
+        problems.refuse(path, "markups", f"found {len(markups)} markups, expected one", "save each in its own file")
     markup = markups[0]
     axes = _axes(markup.get("coordinateSystem", "LPS"), path, "coordinateSystem", problems)
     unit = markup.get("coordinateUnits", "mm")
@@ -109,27 +100,28 @@ def _read_json(path: Path, text: str, problems: Problems) -> Markup | None:
         problems.add(path, "coordinateUnits", f"found {shown(code)}, expected 'mm'")
     controls = markup.get("controlPoints", [])
     if not isinstance(controls, list) or not all(isinstance(control, dict) for control in controls):
-        problems.add(path, "controlPoints", "expected a list of control points")
-        return None
+        problems.refuse(path, "controlPoints", "expected a list of control points")
     positions = [_position(control, number, path, problems) for number, control in enumerate(controls, 1)]
-    labels = tuple(str(control.get("label", "")).strip() for control in controls)
+    problems.require_none()
+    frame, labels = Frame("mm", axes), tuple(str(control.get("label", "")).strip() for control in controls)
 
     def moved_text(points: Floats) -> str:
-        for control, position in zip(controls, Frame("mm", axes or "LPS").file_lengths(points), strict=True):
+        for control, position in zip(controls, frame.file_lengths(points), strict=True):
             control["position"] = position.tolist()
         return json.dumps(content, indent=4, ensure_ascii=False) + "\n"
 
-    return _markup([position for position in positions if position is not None], labels, axes, moved_text)
+    return Markup(frame.lengths(np.array(positions).reshape(-1, 3)), labels, moved_text)
 
 
-def _position(control: dict[str, Any], number: int, path: Path, problems: Problems) -> list[float] | None:
+def _position(control: dict[str, Any], number: int, path: Path, problems: Problems) -> list[float]:
+    """Where a control point is; nothing, and a problem noted, if that is no place."""
     label = control.get("label")
     place = f"control point {number}" + (f" {shown(label)}" if label else "")
     status = control.get("positionStatus", "defined")
     if status != "defined":
         cure = "place the point in Slicer, or delete it"
         problems.add(path, place, f"found its position {shown(status)}, expected 'defined'", cure)
-        return None
+        return []
     position = control.get("position")
     if isinstance(position, list) and len(position) == 3:
         # true is an integer for Python, and integers of JSON may be larger than any float
@@ -137,12 +129,11 @@ def _position(control: dict[str, Any], number: int, path: Path, problems: Proble
         if len(numbers) == 3:
             return numbers
     problems.add(path, place, f"found position {shown(position)}, expected three finite numbers")
-    return None
+    return []
 
 
-def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
-    axes: str | None = None
-    named = False
+def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup:
+    axes, named = "", False
     columns = COLUMNS.split(",")
     positions: list[list[float]] = []
     labels: list[str] = []
@@ -158,8 +149,7 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
             elif key.strip() == "columns":
                 columns = [name.strip() for name in value.split(",")]
                 if not {"x", "y", "z", "label"} <= set(columns):
-                    problems.add(path, f"row {row}", f"found columns {shown(value)}, expected {COLUMNS}")
-                    return None
+                    problems.refuse(path, f"row {row}", f"found columns {shown(value)}, expected {COLUMNS}")
         elif line.strip():
             try:
                 fields = next(csv.reader([line]))
@@ -182,31 +172,23 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup | None:
     if not named:
         cure = "write '# CoordinateSystem = RAS' or LPS as its second line, or save it as .mrk.json"
         problems.add(path, "header", "found no coordinate system", cure)
+    problems.require_none()
+    frame = Frame("mm", axes)
 
     def moved_text(points: Floats) -> str:
         moved = list(lines)
-        for (at, fields, where), position in zip(
-            points_in, Frame("mm", axes or "RAS").file_lengths(points), strict=True
-        ):
+        for (at, fields, where), position in zip(points_in, frame.file_lengths(points), strict=True):
             written = dict(zip(where, (f"{value:.6f}" for value in position), strict=True))
             line = io.StringIO()
             csv.writer(line, lineterminator="").writerow([written.get(k, field) for k, field in enumerate(fields)])
             moved[at] = line.getvalue()
         return "\n".join(moved)
 
-    return _markup(positions, tuple(labels), axes, moved_text)
+    return Markup(frame.lengths(np.array(positions).reshape(-1, 3)), tuple(labels), moved_text)
 
 
-def _axes(value: object, path: Path, place: str, problems: Problems) -> str | None:
-    axes = AXES_NAMED.get(str(value).strip())
-    if axes is None:
+def _axes(value: object, path: Path, place: str, problems: Problems) -> str:
+    axes = AXES_NAMED.get(str(value).strip(), "")
+    if not axes:
         problems.add(path, place, f"found coordinate system {shown(value)}, expected RAS, LPS, 0 (RAS) or 1 (LPS)")
     return axes
-
-
-def _markup(
-    positions: list[list[float]], labels: tuple[str, ...], axes: str | None, moved_text: Callable[[Floats], str]
-) -> Markup | None:
-    if axes is None:
-        return None
-    return Markup(Frame("mm", axes).lengths(np.array(positions).reshape(-1, 3)), labels, moved_text)

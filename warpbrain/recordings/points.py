@@ -58,7 +58,7 @@ class PointsRecording(TrackedPoints, Recording):
     moved_file: str | None = None
 
     @classmethod
-    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content:
         """Read ``.csv``, ``.tag``, a pair of 3D Slicer markups (``.mrk.json``, ``.fcsv``), or an ending that another
         package reads (`warpbrain.recordings.tracked_points.Reader`).
 
@@ -66,8 +66,7 @@ class PointsRecording(TrackedPoints, Recording):
         and markups are in mm and in their own axes. `moved` is the markup with the same labels where the points have
         gone: needed if `path` is a markup, and refused if not.
         """
-        tracked = tracked_points(path, frame, given.pop("moved", None), problems)
-        return None if tracked is None else (vars(tracked), frame.metres)
+        return vars(tracked_points(path, frame, given.pop("moved", None), problems)), frame.metres
 
     @property
     def count(self) -> int:

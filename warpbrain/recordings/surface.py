@@ -60,28 +60,28 @@ class SurfaceRecording(Recording):
     faces: Ints | None = None
 
     @classmethod
-    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content:
         """Read ``.csv``, a 3D Slicer markup or a surface mesh.
 
         A CSV file has columns ``x,y,z`` and perhaps ``t`` [s] and ``nx,ny,nz``; of a mesh (``.vtp``, ``.stl``,
         ``.ply``, ``.obj``, ``.vtu``, ...) points and triangles are taken. Axes that a mesh states itself take
         precedence, and a markup is in mm and its own.
         """
-        values: dict[str, Any] = {}
+        values: dict[str, Any]
         if path.suffix.lower() == ".csv":
             table = read_table(path, problems, (*POSITION, *NORMAL, "t"))
-            if table is not None and table.require(*POSITION):
-                values = {"points": frame.lengths(table.vectors(*POSITION)), "normals": _normals(table, frame)}
-                values["time"] = table.times(strictly=False) if "t" in table else None
+            table.require(*POSITION)
+            values = {"points": frame.lengths(table.vectors(*POSITION)), "normals": _normals(table, frame)}
+            values["time"] = table.times(strictly=False) if "t" in table else None
         elif is_markup(path):
-            if (markup := read_markup(path, problems)) is not None:
-                values = {"points": markup.points}
-        elif (mesh := read_surface_mesh(path, problems)) is not None:
+            values = {"points": read_markup(path, problems).points}
+        else:
+            mesh = read_surface_mesh(path, problems)
             if mesh.axes not in (None, frame.axes):
                 problems.remark(path, f"the file says that its axes are {mesh.axes}, which counts for it")
             points = Frame(frame.unit, mesh.axes or frame.axes).lengths(mesh.points)
             values = {"points": points, "faces": mesh.faces}
-        return (values, frame.metres) if values else None
+        return values, frame.metres
 
     @property
     def count(self) -> int:
@@ -116,7 +116,7 @@ class SurfaceRecording(Recording):
 
 def _normals(table: Table, frame: Frame) -> Floats | None:
     """Unit normals (n, 3), RAS; all three columns or none of them."""
-    if not any(column in table for column in NORMAL) or not table.require(*NORMAL):
+    if not any(column in table for column in NORMAL) or not table.has(*NORMAL):
         return None
     normals = frame.directions(table.vectors(*NORMAL))
     lengths = np.linalg.norm(normals, axis=1)

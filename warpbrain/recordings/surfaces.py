@@ -14,9 +14,9 @@ from warpbrain.frame import AXES
 from warpbrain.mesh.files import LARGEST_FILE, ends_inside_a_number
 from warpbrain.mesh.patience import patience
 from warpbrain.mesh.vtu import axes_of_vtu, read_vtu
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, Unreadable
 from warpbrain.recordings.tables import LARGEST
-from warpbrain.recordings.text import is_readable, shown
+from warpbrain.recordings.text import require_readable, shown
 
 Ints = NDArray[np.int32]
 
@@ -43,46 +43,43 @@ class SurfaceMesh:
     axes: str | None
 
 
-def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh | None:
-    """Read a surface mesh or a cloud of points; None if there were problems.
+def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh:
+    """Read a surface mesh or a cloud of points; `Unreadable` if there are problems.
 
     Polygons are cut into triangles; triangles without area are left out, and so are points that no triangle uses where
     there are triangles.
     """
-    if not is_readable(path, problems):
-        return None
+    require_readable(path, problems)
     if (size := path.stat().st_size) > LARGEST_FILE:
-        found = f"found {size / 1e6:.0f} MB, expected a surface of at most {LARGEST_FILE / 1e6:.0f} MB"
-        problems.add(path, "", found)
-        return None
-    before = len(problems.found)
+        message = f"found {size / 1e6:.0f} MB, expected a surface of at most {LARGEST_FILE / 1e6:.0f} MB"
+        problems.refuse(path, "", message)
     try:
         if path.suffix.lower() == ".vtp":
             from warpbrain.recordings.vtp import read_vtp
 
             with patience(path):
                 points, faces, axes = read_vtp(path)
-            raw: SurfaceMesh | None = SurfaceMesh(points, faces if len(faces) else None, axes)
+            raw = SurfaceMesh(points, faces if len(faces) else None, axes)
         else:
             raw = _from_meshio(path, problems)
+    except Unreadable:
+        raise
     except Exception as error:  # whatever the parsers raise
         detail = " ".join(str(error).split())[:100] or type(error).__name__
         cure = "is the file whole? .vtp, .stl, .ply, .obj and .vtu can be read"
-        problems.add(path, "", f"found no surface mesh ({detail})", cure)
-        return None
-    if raw is None or len(problems.found) > before:
-        return None
+        problems.refuse(path, "", f"found no surface mesh ({detail})", cure)
     if ends_inside_a_number(path):
         problems.remark(path, "the last line ends in a number without a line break: is the file cut off?")
     return _checked(raw, path, problems)
 
 
-def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
+def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh:
     import meshio
 
     if path.suffix.lower() not in meshio.extension_to_filetypes:
-        problems.add(path, "", f"found ending {shown(path.suffix)}, expected .csv, .vtp, .stl, .ply, .obj, .vtu, ...")
-        return None
+        problems.refuse(
+            path, "", f"found ending {shown(path.suffix)}, expected .csv, .vtp, .stl, .ply, .obj, .vtu, ..."
+        )
     with path.open("rb") as file:
         head = file.read(2**16)
     whole = _WHOLE_HEADER.get(path.suffix.lower())
@@ -94,8 +91,7 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
         raw = read_vtu(path) if path.suffix.lower() == ".vtu" else meshio.read(path)
     foreign = {block.type for block in raw.cells} - {*_WITHOUT_AREA, *_WITH_AREA}
     if foreign:
-        problems.add(path, "", f"found cells of type {', '.join(sorted(foreign))}, expected triangles of a surface")
-        return None
+        problems.refuse(path, "", f"found cells of type {', '.join(sorted(foreign))}, expected triangles of a surface")
     fans = [np.empty((0, 3), dtype=np.int32)]
     for block in raw.cells:
         if block.type in _WITH_AREA:
@@ -104,8 +100,7 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh | None:
     faces = np.concatenate(fans)
     points = np.asarray(raw.points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
-        problems.add(path, "", f"found points of shape {points.shape}, expected (n, 3)")
-        return None
+        problems.refuse(path, "", f"found points of shape {points.shape}, expected (n, 3)")
     axes = axes_of_vtu(path) if path.suffix.lower() == ".vtu" else None
     if axes is None and (mark := _SPACE.search(head[:2048])):
         axes = mark.group(1).decode()
@@ -122,34 +117,30 @@ def _check_stl(path: Path, head: bytes) -> None:
         raise ValueError(f"its header says {count} triangles, its bytes are {there:.10g}")
 
 
-def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh | None:
+def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh:
     points, faces = raw.points, raw.faces
     count = len(points)
     if count == 0:
-        problems.add(path, "", "found no points")
-        return None
+        problems.refuse(path, "", "found no points")
     bad = np.flatnonzero(~(np.abs(points) <= LARGEST).all(axis=1))
     if len(bad):
-        problems.add(path, f"point {bad[0]}", f"found a coordinate that is not finite ({len(bad)} such points in all)")
-        return None
+        message = f"found a coordinate that is not finite ({len(bad)} such points in all)"
+        problems.refuse(path, f"point {bad[0]}", message)
     if raw.axes not in (None, *AXES):
-        problems.add(path, "SPACE", f"found {shown(raw.axes)}, expected RAS or LPS")
-        return None
+        problems.refuse(path, "SPACE", f"found {shown(raw.axes)}, expected RAS or LPS")
     if faces is None:
         return raw
     wrong = np.flatnonzero(((faces < 0) | (faces >= count)).any(axis=1))
     if len(wrong):
         what = "a face" if len(wrong) == 1 else f"{len(wrong)} faces"
-        found = f"found {what} with points that are not there (there are {count})"
-        problems.add(path, f"face {wrong[0]}", found)
-        return None
+        message = f"found {what} with points that are not there (there are {count})"
+        problems.refuse(path, f"face {wrong[0]}", message)
     corner = points[faces]
     sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     sound = np.linalg.norm(normal, axis=1) > 1e-12 * sides**2
     if not sound.any():
-        problems.add(path, "", "found faces without area only")
-        return None
+        problems.refuse(path, "", "found faces without area only")
     if not sound.all():
         problems.remark(path, f"{np.count_nonzero(~sound)} of {len(faces)} faces have no area and are left out")
     faces = faces[sound]

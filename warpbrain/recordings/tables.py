@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, Unreadable
 from warpbrain.recordings.text import lines_of, read_text, remark_open_end, shown, without_comment
 
 #: No length, time, force or stress that anybody records is larger, in whatever unit; squares of it are still numbers.
@@ -58,7 +58,7 @@ class Table:
         """Note a problem with the value of column `name` in a row, counted from 0."""
         self._problems.add(self.path, f"row {self.rows[index]}, column {name}", message, cure)
 
-    def require(self, *names: str) -> bool:
+    def has(self, *names: str) -> bool:
         """Whether all these columns are there; each that is not is a problem."""
         missing = [name for name in names if name not in self.header]
         for name in missing:
@@ -67,6 +67,11 @@ class Table:
             cure = f"is {shown(near)} meant?" if near else ""
             self._problems.add(self.path, "header", f"found no column '{name}', found {found[:100]}", cure)
         return not missing
+
+    def require(self, *names: str) -> None:
+        """`Unreadable` if one of these columns is not there."""
+        if not self.has(*names):
+            raise Unreadable
 
     def words(self, name: str) -> tuple[str, ...]:
         """A column as text, none of it empty."""
@@ -130,13 +135,13 @@ class Table:
                 if values[index] < values[last] or (strictly and values[index] == values[last]):
                     whose = f" of {shown(key)}" if of is not None else ""
                     rule = "a later time" if strictly else "no earlier time"
-                    found = f"found {values[index]:.12g} s after {values[last]:.12g} s (row {self.rows[last]}){whose}"
-                    self.problem(index, "t", f"{found}, expected {rule}")
+                    message = f"found {values[index]:.12g} s after {values[last]:.12g} s (row {self.rows[last]}){whose}"
+                    self.problem(index, "t", f"{message}, expected {rule}")
             before[key] = index
         return values
 
 
-def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table | None:
+def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table:
     """Read a CSV file.
 
     Parameters
@@ -147,14 +152,12 @@ def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table | 
     known : sequence of str
         Columns that mean something: none of them may be there twice.
 
-    Returns
-    -------
-    Table or None
-        None if there is no table to speak of: no readable text, no header or no rows.
+    Raises
+    ------
+    Unreadable
+        If there is no table to speak of: no readable text, no header or no rows.
     """
     text = read_text(path, problems)
-    if text is None:
-        return None
     remark_open_end(path, text, problems)
     header: list[str] = []
     separator = ","
@@ -177,43 +180,41 @@ def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table | 
             continue
         if not header:
             header = fields
-            if not _is_header(path, number, header, known, problems):
-                return None
+            _check_header(path, number, header, known, problems)
         elif not any(fields):
             continue  # what spreadsheets write for an empty line
         elif len(fields) != len(header):
-            found = (
+            message = (
                 f"found {len(fields)} field{'s' if len(fields) != 1 else ''}, expected {len(header)} as in the header"
             )
-            problems.add(path, f"row {number}", found, "is the file cut off?" if len(fields) < len(header) else "")
+            problems.add(path, f"row {number}", message, "is the file cut off?" if len(fields) < len(header) else "")
             broken += 1
         else:
             cells.append(fields)
             rows.append(number)
     if not rows and not broken:
-        problems.add(path, "", "found a header and no rows" if header else "found comments only, expected a header")
-    return Table(path, header, cells, rows, problems) if rows else None
+        problems.refuse(path, "", "found a header and no rows" if header else "found comments only, expected a header")
+    if not rows:
+        raise Unreadable
+    return Table(path, header, cells, rows, problems)
 
 
-def _is_header(path: Path, number: int, header: list[str], known: Sequence[str], problems: Problems) -> bool:
+def _check_header(path: Path, number: int, header: list[str], known: Sequence[str], problems: Problems) -> None:
     if all(_number(name) is not None for name in header):
         cure = "the line with the names must not start with #"
-        problems.add(path, f"row {number}", f"found numbers, expected a header such as {','.join(known[:6])}", cure)
-        return False
+        problems.refuse(path, f"row {number}", f"found numbers, expected a header such as {','.join(known[:6])}", cure)
     for name in known:
         if header.count(name) > 1:
             problems.add(path, "header", f"found column '{name}' {header.count(name)} times, expected it once")
     others = [name for name in header if name and name not in known]
     if others:
         problems.remark(path, f"ignores column{'s' if len(others) > 1 else ''} {', '.join(others)[:150]}")
-    return True
 
 
-def read_csv(path: Path, problems: Problems, known: Sequence[str]) -> Table | None:
+def read_csv(path: Path, problems: Problems, known: Sequence[str]) -> Table:
     """The same of a file that must be called ``.csv``."""
     if path.suffix.lower() != ".csv":
-        problems.add(path, "", f"found ending {shown(path.suffix)}, expected .csv")
-        return None
+        problems.refuse(path, "", f"found ending {shown(path.suffix)}, expected .csv")
     return read_table(path, problems, known)
 
 

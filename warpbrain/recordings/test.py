@@ -90,7 +90,7 @@ class TestRecording(Recording):
     control: str = "displacement"
 
     @classmethod
-    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content | None:
+    def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content:
         """Read ``.csv``: columns of one pair of `QUANTITIES` of the mode, and perhaps ``t`` [s].
 
         They are ``displacement`` (in the unit of `frame`) and ``force`` [N], ``stretch`` and ``stress``, or ``angle``
@@ -102,9 +102,7 @@ class TestRecording(Recording):
         # what is so if a key is absent
         given |= {"specimen": given.get("specimen") or "", "axis": given.get("axis") or Z}
         table = read_csv(path, problems, ("t", *(column for pair in QUANTITIES[mode] for column in pair)))
-        pair = _pair(table, mode, problems) if table is not None else None
-        if table is None or pair is None:
-            return None
+        pair = _pair(table, mode, problems)
         time = table.times(strictly=True) if "t" in table else None
         if pair[0] == "stretch":
             imposed = table.bounded("stretch", 0.0, itself=False)
@@ -185,18 +183,18 @@ def nominal_stress(mode: str, stretch: Floats, values: Floats, kind: str) -> Flo
     return np.asarray(values / stretch)
 
 
-def _pair(table: Table, mode: str, problems: Problems) -> tuple[str, str] | None:
-    """The pair of quantities that was recorded, if it is one."""
+def _pair(table: Table, mode: str, problems: Problems) -> tuple[str, str]:
+    """The pair of quantities that was recorded."""
     known = QUANTITIES[mode]
     complete = [pair for pair in known if all(column in table for column in pair)]
     if len(complete) == 1:
         return complete[0]
     if complete:
         names = " and ".join(" with ".join(pair) for pair in complete)
-        problems.add(table.path, "header", f"found {names}, expected one pair", "leave out or rename the other")
-    else:
-        table.require(*max(known, key=lambda pair: sum(column in table for column in pair)))
-    return None
+        problems.refuse(table.path, "header", f"found {names}, expected one pair", "leave out or rename the other")
+    nearest = max(known, key=lambda pair: sum(column in table for column in pair))
+    table.require(*nearest)
+    return nearest
 
 
 def turn_of(axis: tuple[float, float, float], sheared: tuple[float, float, float] | None) -> Floats:

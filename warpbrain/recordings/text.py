@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, Unreadable
 
 #: Largest text file that is read [bytes].
 LIMIT = 64 * 2**20
@@ -17,13 +17,17 @@ LISTED, COUNTED = 20, 2000
 
 @contextmanager
 def collected(path: Path, problems: Problems) -> Iterator[Problems]:
-    """Problems of one file: in the end the first `LISTED` and the number of the others go to `problems`."""
-    found = Problems(COUNTED)
-    yield found
-    problems.found.extend(found.found[:LISTED])
-    problems.remarks.extend(found.remarks)
-    others = len(found.found) - LISTED
-    if found.enough:
+    """Problems of one file: in the end the first `LISTED` and the number of the others go to `problems`.
+
+    The block ends where nothing more can be read (`Unreadable`); then there are problems.
+    """
+    of_file = Problems(COUNTED)
+    with suppress(Unreadable):
+        yield of_file
+    problems.found.extend(of_file.found[:LISTED])
+    problems.remarks.extend(of_file.remarks)
+    others = len(of_file.found) - LISTED
+    if of_file.enough:
         problems.add(path, "", f"and more than {others} more problems in this file, whose reading stopped there")
     elif others > 0:
         problems.add(path, "", f"and {others} more problem{'s' if others > 1 else ''} in this file")
@@ -35,55 +39,52 @@ def shown(text: object) -> str:
     return f"'{words[:30]}...'" if len(words) > 33 else f"'{words}'"
 
 
-def is_readable(path: Path, problems: Problems) -> bool:
-    """Whether there is a file of that name that is not empty and may be read; if not, that is a problem."""
+def require_readable(path: Path, problems: Problems) -> None:
+    """Refuse a file that is not there, empty, or may not be read."""
     try:
         if path.is_dir():
-            problems.add(path, "", "found a folder, expected a file")
-        elif not path.exists():
-            problems.add(path, "", "no such file", _nearest_name(path))
-        elif not os.access(path, os.R_OK):
-            problems.add(path, "", "cannot be read", "check its permissions")
-        elif path.stat().st_size == 0:
-            problems.add(path, "", "is empty (0 bytes)")
-        else:
-            return True
+            problems.refuse(path, "", "found a folder, expected a file")
+        if not path.exists():
+            problems.refuse(path, "", "no such file", _nearest_name(path))
+        if not os.access(path, os.R_OK):
+            problems.refuse(path, "", "cannot be read", "check its permissions")
+        if path.stat().st_size == 0:
+            problems.refuse(path, "", "is empty (0 bytes)")
     except OSError as error:
-        problems.add(path, "", f"cannot be read: {error.strerror}")
-    return False
+        problems.refuse(path, "", f"cannot be read: {error.strerror}")
 
 
-def read_text(path: Path, problems: Problems) -> str | None:
-    """The text of a UTF-8 file, with or without byte order mark; None if there were problems.
+def read_text(path: Path, problems: Problems) -> str:
+    """The text of a UTF-8 file, with or without byte order mark.
 
     Parameters
     ----------
     path : Path
     problems : Problems
         Gets what is wrong: no such file, a folder, no permission, nothing in it, larger than `LIMIT`, not UTF-8.
+
+    Raises
+    ------
+    Unreadable
+        If there was a problem.
     """
-    if not is_readable(path, problems):
-        return None
+    require_readable(path, problems)
     try:
         size = path.stat().st_size
         if size > LIMIT:
-            problems.add(path, "", f"is {size / 2**20:.0f} MB, expected no more than {LIMIT // 2**20} MB of text")
-            return None
+            problems.refuse(path, "", f"is {size / 2**20:.0f} MB, expected no more than {LIMIT // 2**20} MB of text")
         data = path.read_bytes()
     except OSError as error:
-        problems.add(path, "", f"cannot be read: {error.strerror}")
-        return None
+        problems.refuse(path, "", f"cannot be read: {error.strerror}")
     try:
         # some programs put a byte order mark before the one that is there
         text = data.decode("utf-8").lstrip("\ufeff")
     except UnicodeDecodeError as error:
         row = data.count(b"\n", 0, error.start) + 1
-        found = f"found byte 0x{data[error.start]:02x} at position {error.start}, expected UTF-8 text"
-        problems.add(path, f"row {row}", found, "save the file as UTF-8")
-        return None
+        message = f"found byte 0x{data[error.start]:02x} at position {error.start}, expected UTF-8 text"
+        problems.refuse(path, f"row {row}", message, "save the file as UTF-8")
     if not text.strip():
-        problems.add(path, "", "is empty: it holds white space only")
-        return None
+        problems.refuse(path, "", "is empty: it holds white space only")
     return text
 
 

@@ -15,7 +15,7 @@ from warpbrain.recordings.base import DISPLACEMENT, POSITION, TrackedPoints
 from warpbrain.recordings.markups import is_markup, paired, read_markup
 from warpbrain.recordings.tables import Table, read_table
 from warpbrain.recordings.tags import read_tags
-from warpbrain.recordings.text import is_readable, shown
+from warpbrain.recordings.text import collected, require_readable, shown
 
 #: Reads a file of the ending that it is registered for (entry points of the group `warpbrain.recordings`, named like
 #: ``".trc"``). It raises `ValueError`, or an error that derives from it, with what is wrong; the file is named for it.
@@ -28,8 +28,8 @@ def added_readers() -> dict[str, Reader]:
     return added_by_packages("recordings", dict.fromkeys((".csv", ".tag", ".json", ".fcsv")))
 
 
-def tracked_points(path: Path, frame: Frame, moved: Path | None, problems: Problems) -> TrackedPoints | None:
-    """Points of a file; None if there were problems.
+def tracked_points(path: Path, frame: Frame, moved: Path | None, problems: Problems) -> TrackedPoints:
+    """Points of a file.
 
     Parameters
     ----------
@@ -40,34 +40,34 @@ def tracked_points(path: Path, frame: Frame, moved: Path | None, problems: Probl
         The second markup of a pair.
     problems : Problems
         Gets what is wrong.
+
+    Raises
+    ------
+    Unreadable
+        If there is nothing to be had of the file.
     """
     ending = path.suffix.lower()
     if is_markup(path):
         return _of_markups(path, moved, problems)
     if ending not in (".csv", ".tag", *added_readers()):
         others = "".join(f"{name}, " for name in added_readers())
-        problems.add(path, "", f"found ending {shown(ending)}, expected .csv, .tag, {others}.mrk.json or .fcsv")
-        return None
+        problems.refuse(path, "", f"found ending {shown(ending)}, expected .csv, .tag, {others}.mrk.json or .fcsv")
     if moved is not None:
-        problems.add(path, "moved", f"a {ending} file holds where points went; 'moved' goes with 3D Slicer markups")
-        return None
+        problems.refuse(path, "moved", f"a {ending} file holds where points went; 'moved' goes with 3D Slicer markups")
     if ending == ".csv":
         return _of_csv(path, frame, problems)
     return _of_tags(path, problems) if ending == ".tag" else _of_package(path, added_readers()[ending], problems)
 
 
-def _of_package(path: Path, read: Reader, problems: Problems) -> TrackedPoints | None:
-    if not is_readable(path, problems):
-        return None
+def _of_package(path: Path, read: Reader, problems: Problems) -> TrackedPoints:
+    require_readable(path, problems)
     try:
         tracked = read(path)
     except (ValueError, OSError) as error:
-        problems.add(path, "", str(error))
-        return None
-    fault = _fault(tracked)
-    if fault:
-        problems.add(path, "", fault)
-    return None if fault else tracked
+        problems.refuse(path, "", str(error))
+    if fault := _fault(tracked):
+        problems.refuse(path, "", fault)
+    return tracked
 
 
 def _fault(tracked: TrackedPoints) -> str:
@@ -87,10 +87,9 @@ def _fault(tracked: TrackedPoints) -> str:
     return ""
 
 
-def _of_csv(path: Path, frame: Frame, problems: Problems) -> TrackedPoints | None:
+def _of_csv(path: Path, frame: Frame, problems: Problems) -> TrackedPoints:
     table = read_table(path, problems, (*POSITION, *DISPLACEMENT, "t", "id", "sigma", "weight"))
-    if table is None or not table.require(*POSITION, *DISPLACEMENT):
-        return None
+    table.require(*POSITION, *DISPLACEMENT)
     ids = table.words("id") if "id" in table else None
     if ids is not None and "t" not in table:
         _check_unique(table, ids)
@@ -104,29 +103,25 @@ def _of_csv(path: Path, frame: Frame, problems: Problems) -> TrackedPoints | Non
     )
 
 
-def _of_tags(path: Path, problems: Problems) -> TrackedPoints | None:
-    tags = read_tags(path, problems)
-    if tags is None:
-        return None
-    start, end, labels = tags
+def _of_tags(path: Path, problems: Problems) -> TrackedPoints:
+    start, end, labels = read_tags(path, problems)
     frame = Frame("mm", "RAS")
     return TrackedPoints(points=frame.lengths(start), displacement=frame.lengths(end - start), ids=labels)
 
 
-def _of_markups(path: Path, moved: Path | None, problems: Problems) -> TrackedPoints | None:
+def _of_markups(path: Path, moved: Path | None, problems: Problems) -> TrackedPoints:
     if moved is None:
         cure = "name a second markup with the same labels as 'moved'"
-        problems.add(path, "moved", "a 3D Slicer markup holds where points are, not where they went", cure)
-        return None
+        problems.refuse(path, "moved", "a 3D Slicer markup holds where points are, not where they went", cure)
     if not is_markup(moved):
-        problems.add(moved, "", f"found ending {shown(moved.suffix)}, expected a 3D Slicer markup as {path.name} is")
-        return None
-    start, end = read_markup(path, problems), read_markup(moved, problems)
-    if start is None or end is None:
-        return None
+        problems.refuse(moved, "", f"found ending {shown(moved.suffix)}, expected a 3D Slicer markup as {path.name} is")
+    # what is wrong with either is told
+    with collected(path, problems) as wrong:
+        start = read_markup(path, wrong)
+    with collected(moved, problems) as wrong:
+        end = read_markup(moved, wrong)
+    problems.require_none()
     positions = paired(start, end, path, moved, problems)
-    if positions is None:
-        return None
     return TrackedPoints(points=start.points, displacement=positions - start.points, ids=start.labels)
 
 
@@ -134,7 +129,7 @@ def _check_unique(table: Table, ids: tuple[str, ...]) -> None:
     first: dict[str, int] = {}
     for index, name in enumerate(ids):
         if name in first:
-            found = f"found {shown(name)} again (row {table.rows[first[name]]})"
-            table.problem(index, "id", f"{found}, expected each id once where there is no time t")
+            message = f"found {shown(name)} again (row {table.rows[first[name]]})"
+            table.problem(index, "id", f"{message}, expected each id once where there is no time t")
         elif name:
             first[name] = index

@@ -11,10 +11,11 @@ import numpy as np
 from markupsafe import Markup
 
 from warpbrain.arrays import Floats
+from warpbrain.atomic import write_text
 from warpbrain.mesh import TetMesh
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.page import Section, Top, document, part, write_document
+from warpbrain.report.page import Section, Top, document, part
 from warpbrain.report.page.figures import TEXT, colour_bar, data, inlined, panels
 from warpbrain.report.page.scene import Arrows, Field, View, viewer
 from warpbrain.report.picture import Moved, Pictures, annotations_of, arrow_colours, heading, round_factor, scene_of
@@ -167,4 +168,4 @@ def write_view_page(path: Path, state: SavedState, exaggeration: float | None) -
     largest = MILLIMETRES * float(np.linalg.norm(state.u, axis=1).max())
     facts = [("largest displacement", f"{largest:.3g} mm"), ("nodes", f"{len(state.mesh.points)}")]
     top = Top(str(state.path), "a deformed body", (QUIET, "#ffffff"), [], facts)
-    write_document(path, document(f"warpbrain: {state.path.name}", top, [Section("In three dimensions", body)]))
+    write_text(path, document(f"warpbrain: {state.path.name}", top, [Section("In three dimensions", body)]))

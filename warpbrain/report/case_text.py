@@ -1,6 +1,8 @@
-"""A case in words: all that it says, and what checking it found."""
+"""A case in words: all that it says, what checking it found, and what there is to a new one."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.checking import Checked
@@ -9,6 +11,9 @@ from warpbrain.recordings.recording import Recording
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page import lines
 from warpbrain.report.summary import SET_TITLES, STAND_IN
+
+if TYPE_CHECKING:
+    from warpbrain.cases.starting import StartedCase
 
 
 def recording_line(recording: Recording) -> str:
@@ -29,3 +34,8 @@ def check_lines(checked: Checked, cannot: str) -> list[str]:
     """What checking found, as printed: problems first; `cannot` says why a sound case cannot be run yet."""
     recorded = [] if checked.case is None else list(map(recording_line, checked.case.recordings))
     return lines("case.txt", "check", checked, cannot, recorded, SET_TITLES)
+
+
+def started_lines(started: StartedCase) -> list[str]:
+    """What a user should read about a new case, as printed."""
+    return lines("case.txt", "started", started)

@@ -13,7 +13,6 @@ from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import INTERVALS, Marginal, OverallErrors, Posterior, Prediction
 from warpbrain.estimation.registration import registration_of
-from warpbrain.physics.words import tabled
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report.comparison import SHOWN, error_text
 from warpbrain.report.diagnosis.files import seen
@@ -24,9 +23,6 @@ from warpbrain.worlds.body.uncertainty import AveragedTissue
 
 #: More than this part of a recording being gross errors is said.
 _UNEXPLAINED = 0.3
-#: Correlations that are smaller are not told.
-_TIED = 0.3
-_METHODS = {"laplace": "Laplace's approximation", "chain": "a Markov chain"}
 
 
 def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissue | None = None) -> dict[str, Any]:
@@ -250,8 +246,7 @@ def estimate_lines(summary: Mapping[str, Any]) -> list[str]:
     """What is printed of what `describe_estimate` says."""
     averaged = () if summary["nothing_else"] is None else map(averaged_row, summary["nothing_else"]["tissue"])
     tissue, recorded = map(parameter_row, summary["parameters"]), map(prediction_row, summary["predictions"])
-    tables = (list(tissue), list(averaged), correlated(summary), checks(summary), list(recorded))
-    return lines("estimate.txt", "estimate", summary, *tables)
+    return lines("estimate.txt", "estimate", summary, list(tissue), list(averaged), list(recorded))
 
 
 def parameter_row(parameter: Mapping[str, Any]) -> list[str]:
@@ -296,44 +291,6 @@ def prediction_row(prediction: Mapping[str, Any]) -> list[Any]:
         unit,
         "check" if prediction["role"] == "check" else "",
     ]
-
-
-def correlated(summary: Mapping[str, Any]) -> list[str]:
-    """Parameters that are tied to each other."""
-    names, matrix = summary["correlation"]["names"], summary["correlation"]["matrix"]
-    return [
-        f"correlation of {names[i]} and {names[j]}: {matrix[i][j]:.2f}"
-        for i in range(len(names))
-        for j in range(i)
-        if abs(matrix[i][j]) >= _TIED
-    ]
-
-
-def checks(summary: Mapping[str, Any]) -> list[str]:
-    """How far an estimate is to be believed."""
-    check, chain, mesh = summary["check_of_laplace"], summary["chain"], summary["discretisation"]
-    sentences = [
-        f"{_METHODS[summary['method']]}: Pareto k {check['pareto_k']:.2f} of {check['draws']} weighted draws, "
-        f"{check['effective_draws']:.0f} of them effective, {check['without_equilibrium']} without equilibrium, "
-        f"{check['unstable_laws']} of unstable laws",
-        *(f"Laplace's approximation fails: {doubt}" for doubt in check["doubts"]),
-    ]
-    if chain is not None:
-        sentences.append(
-            f"chain of {chain['equilibria']} equilibria, {100 * chain['accepted']:.0f} % accepted, worth "
-            f"{min(chain['effective_draws']):.0f} independent draws"
-        )
-    sentences.append(f"noise: {summary['likelihood']['noise_scale']:.2f} times as large as declared")
-    if mesh is not None:
-        sentences.append(
-            f"error of the mesh: {mesh['amount']:.2f} ± {mesh['standard_deviation']:.2f} times what elements of half "
-            f"the size change, {tabled(mesh['difference_root_mean_square_mm'])} mm root mean square"
-        )
-    if summary["registration"] is not None:
-        moved = (summary["registration"][key] for key in ("shift_mm", "turn_degrees"))
-        shift, turn = (", ".join(f"{x:.2f}" for x in values) for values in moved)
-        sentences.append(f"registration: shifted by ({shift}) mm, turned by ({turn}) degrees")
-    return sentences
 
 
 def _number(value: float) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from warpbrain.atomic import write_text
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.inference.calibration import percent
 from warpbrain.report import views
@@ -19,14 +20,12 @@ from warpbrain.report.body_sections import before_and_after, body_view, fields_o
 from warpbrain.report.comparison import Explained, explained
 from warpbrain.report.estimate import (
     averaged_row,
-    checks,
-    correlated,
     parameter_row,
     prediction_row,
     recorded_points,
 )
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
-from warpbrain.report.page import Top, document, sections_of, write_document
+from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.picture import Moved, Pictures, draw
 from warpbrain.report.run_page import BADGES
@@ -69,8 +68,8 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     case, judged, nothing = summary["case"], judged_of(summary), summary["nothing_else"]
     whole, state, moved = posterior.case.mesh, read_state(folder / "state.vtu"), moved_of(posterior)
     titles = {label: tissue.name for label, tissue in posterior.case.tissues.items()}
-    lines = ["the most probable state of the estimate", *judged.sentences]
-    pictures = draw(folder / "deformation.png", whole, state.mesh, state.u, titles, moved, case["title"], lines)
+    subtitles = ["the most probable state of the estimate", *judged.sentences]
+    pictures = draw(folder / "deformation.png", whole, state.mesh, state.u, titles, moved, case["title"], subtitles)
     places = views.places(whole)
     tissue = [parameter_row(parameter) for parameter in summary["parameters"]]
     names = ", ".join(f"{row[0]}, {row[1]}" for row in tissue)
@@ -84,7 +83,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     sections = sections_of(
         "estimate.html", summary=summary, agreement=agreement,
         tissue=tissue,
-        tied=correlated(summary), checks=checks(summary),
+        tied=lines("estimate.txt", "tied", summary), checks=lines("estimate.txt", "checks", summary),
         densities=inlined(
             lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
             "Each parameter before (dashed, filled) and after (line); dotted: the ends of its 95 % interval.",
@@ -113,5 +112,5 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
         facts.append(("probability that nothing else acts", percent(nothing["probability"])))
     sentences = [*summary["identifiability"]["sentences"], *judged.sentences]
     top = Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts)
-    write_document(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))
+    write_text(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))
     return pictures

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import whole_file, write_text
 from warpbrain.cases.case import Case
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.vtu import write_vtu
@@ -71,8 +71,7 @@ def file_of_result(result: Result) -> Any:
 def write_summary(path: Path, summary: dict[str, Any]) -> None:
     """Write a summary as JSON; numbers that are not finite become null."""
     text = json.dumps(plain(summary), indent=2, allow_nan=False)
-    with whole_file(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
+    write_text(path, text + "\n")
 
 
 def plain(value: Any) -> Any:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from warpbrain.atomic import write_text
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view
 from warpbrain.report.comparison import (
@@ -21,7 +22,7 @@ from warpbrain.report.comparison import (
     explained_of,
     recorded_rows,
 )
-from warpbrain.report.page import Top, document, lines, sections_of, write_document
+from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
 from warpbrain.report.picture import Moved, Pictures, draw
@@ -124,4 +125,4 @@ def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> N
         ],
         seconds=[[name, f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()],
     )  # fmt: skip
-    write_document(path, document(f"{case['name']}: {case['title']}", top, sections))
+    write_text(path, document(f"{case['name']}: {case['title']}", top, sections))

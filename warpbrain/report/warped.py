@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
+from warpbrain.atomic import write_text
 from warpbrain.errors import InputError
 from warpbrain.images.continuation import LENGTH
-from warpbrain.images.displacement import DisplacementField, Inverse, displacement_field, inverse, resampled
+from warpbrain.images.displacement import DisplacementField, displacement_field, inverse, resampled
 from warpbrain.images.grid import Grid
 from warpbrain.images.inside import VoxelsInside, voxels_inside
-from warpbrain.images.moving_points import MovedPoints, PointFile, move_points, read_point_file, write_moved
+from warpbrain.images.moving_points import PointFile, move_points, read_point_file, write_moved
 from warpbrain.images.reading import Image, labels_of, read_image, require
 from warpbrain.images.writing import write_displacement, write_transform, write_volume
 from warpbrain.mesh import TetMesh
-from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.slicer import BACK, DEVIATION, FORTH, TRUST_MAP, write_slicer_scene
-from warpbrain.report.state_files import LEFT, TRUST, SavedState
+from warpbrain.recordings.electrodes import is_electrodes
+from warpbrain.report.files import MILLIMETRES, write_body
+from warpbrain.report.page import lines, rendered
+from warpbrain.report.state_files import LEFT, SEEN, TRUST, UNSEEN, SavedState
 
+#: Names of the transforms: what they do to an image.
+FORTH, BACK = "transform-before-to-after.nii.gz", "transform-after-to-before.nii.gz"
+#: Maps of where not to believe the displacement.
+DEVIATION, TRUST_MAP = "displacement_sd.nii.gz", "trust.nii.gz"
+SCRIPT = "load_in_slicer.py"
+SURFACES = ("surface-before.vtu", "surface-after.vtu")
+#: Red, green and blue of what `trust.nii.gz` says.
+_COLOURS = {SEEN: (0.0, 0.62, 0.45), UNSEEN: (0.6, 0.6, 0.6), LEFT: (0.84, 0.37, 0.0)}
 #: Edges of voxels, and how far they reach beyond the body, where there is no image [mm].
 _SPACING, _MARGIN = 2.0, 40.0
 #: Of a voxel of the transforms [mm], at most: between the centres of larger ones the inverse is off by more than 0.05
@@ -129,12 +140,9 @@ def write_warped(
     moved = [move_points(file, state.mesh, state.u, state.middles, field) for file in request.points]
     if moved:
         files += write_moved(folder, moved)
-    image_after, labels_after = (
-        None if each is None else _after(each.path) for each in (request.image, request.labels)
-    )
-    files += write_slicer_scene(folder, state, request.image, image_after, labels_after, request.points, files)
-    lines = [*_lines(request, field, inside, back, moved), *_partly_outside(request, state.mesh), *_trust_lines(state)]
-    return lines, files
+    files += _write_slicer_scene(folder, state, request, files)
+    shown = _shown(request, state, field, inside)
+    return lines("warped.txt", "warped", request, state, shown, field.grid, back, moved, LENGTH, _APART), files
 
 
 def in_the_way(folder: Path, request: WarpRequest) -> list[str]:
@@ -183,17 +191,6 @@ def check_place(request: WarpRequest, mesh: TetMesh, path: Path) -> None:
             )
 
 
-def _partly_outside(request: WarpRequest, mesh: TetMesh) -> list[str]:
-    """What to say of images that hold a part of the body only."""
-    points, weights = MILLIMETRES * mesh.points, mesh.node_volumes
-    lines = []
-    for image in request.images:
-        share = float(weights[~image.grid.contains(points)].sum() / weights.sum())
-        if share > _CUT_OFF:
-            lines.append(f"note      {image.path.name}: {100 * share:.2g} % of the body are outside of it")
-    return lines
-
-
 def _span(points: Floats) -> str:
     """The box (n, 3) points are in, as text."""
     return " x ".join(
@@ -225,51 +222,55 @@ def _write_maps(folder: Path, state: SavedState, inside: VoxelsInside) -> list[s
     return files
 
 
-def _trust_lines(state: SavedState) -> list[str]:
-    """Where not to believe a displacement."""
-    lines = []
-    if state.deviation is not None:
-        lines.append(
-            f"sd        standard deviation of the displacement: up to {MILLIMETRES * state.deviation.max():.2g} mm"
-            + (", more where something is left" if state.trust is not None and (state.trust == LEFT).any() else "")
-        )
-    if state.trust is not None:
-        volumes = state.mesh.node_volumes
-        shares = {value: volumes[state.trust == value].sum() / volumes.sum() for value in TRUST}
-        meanings = "; ".join(f"in {100.0 * share:.0f} % of the body {TRUST[value]}" for value, share in shares.items())
-        lines.append(f"trust     {meanings}")
-    return lines
+def _shown(
+    request: WarpRequest, state: SavedState, field: DisplacementField, inside: VoxelsInside
+) -> dict[str, float | bool | dict[str, float]]:
+    """Numbers that are printed: the largest displacement [mm], parts of the body [%] outside of each image and of each
+    trust, and whether something is left."""
+    points, volumes = MILLIMETRES * state.mesh.points, state.mesh.node_volumes
+
+    def share(nodes: Bools) -> float:
+        return 100.0 * float(volumes[nodes].sum() / volumes.sum())
+
+    outside = {image.path.name: share(~image.grid.contains(points)) for image in request.images}
+    trust = state.trust
+    return {
+        "largest": float(np.linalg.norm(field.vectors[inside.mask], axis=1).max(initial=0.0)),
+        "outside": {name: part for name, part in outside.items() if part > 100.0 * _CUT_OFF},
+        "trust": {} if trust is None else {TRUST[value]: share(trust == value) for value in TRUST},
+        "left": trust is not None and bool((trust == LEFT).any()),
+    }
 
 
-def _lines(
-    request: WarpRequest, field: DisplacementField, inside: VoxelsInside, back: Inverse, moved: list[MovedPoints]
-) -> list[str]:
-    sizes = np.linalg.norm(field.vectors[inside.mask], axis=1)
-    shape = " x ".join(str(n) for n in field.grid.shape)
-    edges = " x ".join(f"{edge:.3g}" for edge in field.grid.voxel)
-    folds = (
-        f"; at {back.unsolved} voxels it did not converge, where the map folds or nearly so" if back.unsolved else ""
-    )
-    lines = [
-        f"warped    {shape} voxels of {edges} mm; displacement in the body up to {sizes.max(initial=0.0):.3g} mm, "
-        f"continued outside, where it falls to 1/e in {LENGTH:g} mm",
-        f"inverse   forward after inverse is off by {back.error_99:.2g} mm at the 99th percentile in tissue, at most "
-        f"{back.error_largest:.2g} mm{folds}",
-    ]
-    for points in moved:
-        count = len(points.points)
-        out = np.count_nonzero(points.outside > 0.0)
-        line = f"points    {points.file.path.name}: {count} moved"
-        if out:
-            line += f", {out} of them outside the mesh, by up to {points.outside.max():.3g} mm"
-        if points.beyond.any():
-            line += (
-                f", {np.count_nonzero(points.beyond)} beyond the image, which stay where they are if outside the mesh"
-            )
-        if len(far := points.apart[points.apart > _APART]):
-            line += (
-                f"; {len(far)} of them {_APART:g} to {far.max():.2g} mm from where the transform puts them, which is "
-                "linear between voxels: at a wall (moved.csv)"
-            )
-        lines += [line, *(f"note      {remark}" for remark in points.file.remarks)]
-    return lines + [f"note      {note}" for image in request.images for note in image.notes]
+def _write_slicer_scene(folder: Path, state: SavedState, request: WarpRequest, files: Sequence[str]) -> list[str]:
+    """Write the surfaces before and after, and a script for Slicer's Python console that loads all with colours, beside
+    the files that are there already; returns the names of those added."""
+    import meshio
+
+    size = MILLIMETRES * np.linalg.norm(state.u, axis=1)
+    faces = state.mesh.boundary
+    nodes, numbers = np.unique(faces, return_inverse=True)
+    for name, moved in zip(SURFACES, (0.0, 1.0), strict=True):
+        corners, triangles = MILLIMETRES * (state.mesh.points + moved * state.u)[nodes], numbers.reshape(-1, 3)
+        sizes = {"displacement_size": size[nodes]}
+        write_body(folder / name, meshio.Mesh(corners, [("triangle", triangles)], point_data=sizes))
+    image, labels = request.image, request.labels
+    volumes = [] if image is None else [image.path.resolve().as_posix(), _after(image.path)]
+    markups = [file for file in request.points if not is_electrodes(file.path)]
+    meanings = [[value, meaning, *_COLOURS[value]] for value, meaning in TRUST.items()]
+    values = {
+        "folder": folder.resolve().as_posix(),
+        "volumes": [name for name in volumes if not name.lower().endswith((".mgz", ".mgh"))],
+        "labels": [] if labels is None else [_after(labels.path)],
+        "deviation": [name for name in files if name == DEVIATION],
+        "trust": [[name, meanings] for name in files if name == TRUST_MAP],
+        "surfaces": [[SURFACES[0], 0.3], [SURFACES[1], 1.0]],
+        "markups": [[file.path.resolve().as_posix(), file.moved_name] for file in markups],
+        "electrodes": [file.path.name for file in request.points if is_electrodes(file.path)],
+        "transform": FORTH,
+        "largest": max(float(size.max()), 1e-6),
+    }
+    path = (folder / SCRIPT).resolve().as_posix()
+    script = rendered("load_in_slicer.txt", path=path, **{name: json.dumps(value) for name, value in values.items()})
+    write_text(folder / SCRIPT, script + "\n")
+    return [*SURFACES, SCRIPT]

@@ -10,8 +10,6 @@ from typing import Any
 
 from warpbrain.errors import InputError
 
-SHELLS = ("bash", "zsh", "fish", "powershell")
-
 
 def complete(parser: argparse.ArgumentParser) -> None:
     """Answer a shell that asks, which it does by a variable of the environment, and end; else nothing."""

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import write_text
 
 #: Name of the log in a folder of results.
 LOG = "warpbrain.log"
@@ -24,7 +24,8 @@ class Record:
         self.arguments = tuple(arguments)
         self._quiet = quiet
         self._begun = datetime.now(UTC)
-        self._clock = time.perf_counter()
+        #: When the command began, as `time.perf_counter` counts.
+        self.clock = time.perf_counter()
         self._facts: dict[str, str] = {}
         self._lines: list[str] = []
         self._warnings: list[str] = []
@@ -70,7 +71,7 @@ class Record:
             "in": str(Path.cwd()),
             "begun": self._begun.isoformat(timespec="seconds"),
             **self._facts,
-            "took": f"{time.perf_counter() - self._clock:.1f} s",
+            "took": f"{time.perf_counter() - self.clock:.1f} s",
             "ended": " ".join(ending.split()),
         }
         lines = [f"{name:<10}{text}" for name, text in head.items()]
@@ -79,8 +80,7 @@ class Record:
         # what was printed is indented: no title of a case is taken for a line of the head
         printed = [f"    {line}".rstrip() for text in self._lines for line in text.splitlines()]
         before = "" if replace else _text_of(folder)
-        with whole_file(folder / LOG) as scratch:
-            scratch.write_text(before + "\n".join([*lines, "", *printed]) + "\n\n", encoding="utf-8")
+        write_text(folder / LOG, before + "\n".join([*lines, "", *printed]) + "\n\n")
 
 
 def files_of(folder: Path) -> list[str]:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from warpbrain.arrays import Bools, Ints, Singles
 from warpbrain.cases.building.errors import check_volume
@@ -77,8 +78,6 @@ def make_regions(image: Image, assignment: Assignment) -> Regions:
     InputError
         If the volume is none that a brain can have.
     """
-    from scipy import ndimage
-
     codes, grid = _cropped(image, assignment)
     unit = image.grid.voxel_volume
     counts = np.bincount(codes.ravel(), minlength=256)
@@ -180,9 +179,7 @@ def make_fields(regions: Regions, size: float) -> LabelFields:
         return np.pad(_resampled(regions.codes == code, blocks, splits), [(m, m) for m in margin])
 
     def smooth(share: Singles) -> Singles:
-        from scipy.ndimage import gaussian_filter
-
-        return np.asarray(gaussian_filter(share, sigma, truncate=4.0))
+        return np.asarray(ndimage.gaussian_filter(share, sigma, truncate=4.0))
 
     codes = range(1, regions.tissues + 1)
     tissues, volumes = [], []

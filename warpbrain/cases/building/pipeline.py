@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats, Singles
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import write_text
 from warpbrain.cases.building.cleaning import SMALLEST_PIECE, cut_body, finished, first_pass, small_pieces
 from warpbrain.cases.building.errors import BuildError, require_extra
 from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
@@ -83,8 +83,7 @@ def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], 
             f"{wanted.file}: {quality.nodes} nodes, {quality.tetrahedra} tetrahedra, smallest dihedral angle "
             f"{quality.min_dihedral:.1f}, first percentile {quality.first_percentile_dihedral:.1f} degrees"
         )
-    with whole_file(folder / "meshes.json") as scratch:
-        scratch.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+    write_text(folder / "meshes.json", json.dumps(record, indent=2) + "\n")
     return folder
 
 

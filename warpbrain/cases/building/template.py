@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import ndimage
 
 from warpbrain.arrays import Bools, Floats, Singles
 from warpbrain.cases.building.errors import BuildError
@@ -122,8 +123,6 @@ def template_anatomy() -> Anatomy:
 
 def _lateral_ventricles(maps: _Maps) -> Bools:
     """The lateral ventricles: the deep component of fluid whose middle lies above the thalami."""
-    from scipy import ndimage
-
     fluid = maps.brain & (maps.grey + maps.white < 0.5)
     deep = fluid & (ndimage.distance_transform_edt(maps.brain) > VENTRICLE_DEPTH)
     number, count = ndimage.label(deep)
@@ -136,8 +135,6 @@ def _lateral_ventricles(maps: _Maps) -> Bools:
 
 
 def _brain(maps: _Maps, ventricles: Bools) -> Singles:
-    from scipy import ndimage
-
     tissue = maps.grey + maps.white
     fluid = np.where(ventricles, 0, np.clip(1 - tissue, 0, 1)) * maps.brain
     solid = np.where(ventricles, 1, tissue) - FLUID_WEIGHT * fluid
@@ -153,8 +150,6 @@ def _brain(maps: _Maps, ventricles: Bools) -> Singles:
 
 def _clefts(maps: _Maps) -> Bools:
     """Longitudinal fissure and Sylvian stems."""
-    from scipy import ndimage
-
     x, y, z = maps.axes
     hull = ndimage.gaussian_filter(maps.brain.astype(np.float32), 4.0) > 0.5
     depth = ndimage.distance_transform_edt(hull)
@@ -173,16 +168,12 @@ def _ramp(values: Floats, ends: tuple[float, float]) -> Floats:
 
 def _grown(region: Bools, by: float) -> Bools:
     """A region and all within a distance of it; less all within that distance of its outside if negative."""
-    from scipy import ndimage
-
     if by < 0:
         return np.asarray(ndimage.distance_transform_edt(region) > -by)
     return np.asarray(ndimage.distance_transform_edt(~region) <= by)
 
 
 def _ventricle(fluid: Bools) -> Singles:
-    from scipy import ndimage
-
     closed = _grown(_grown(fluid, SEPTUM), -SEPTUM)
     field = ndimage.gaussian_filter(closed.astype(np.float32), VENTRICLE_SMOOTHING) - np.float32(VENTRICLE_LEVEL)
     crumbs = (field > 0) & ~_largest(field > 0, keep=2, smallest=1000)
@@ -191,8 +182,6 @@ def _ventricle(fluid: Bools) -> Singles:
 
 def _white(maps: _Maps, inside: Bools) -> Singles:
     """White matter by majority among tissue only, so that the interface meets fluid squarely, without slivers."""
-    from scipy import ndimage
-
     white = ndimage.gaussian_filter(maps.white, WHITE_SMOOTHING)
     tissue = ndimage.gaussian_filter(maps.white + maps.grey, WHITE_SMOOTHING)
     share = (white / np.maximum(tissue, 1e-3)).astype(np.float32)
@@ -209,8 +198,6 @@ def _white(maps: _Maps, inside: Bools) -> Singles:
 
 def _largest(region: Bools, keep: int = 1, smallest: float = 0.0) -> Bools:
     """The `keep` largest components of a region that have at least `smallest` voxels."""
-    from scipy import ndimage
-
     number, count = ndimage.label(region)
     sizes = np.bincount(number.ravel(), minlength=count + 1)
     sizes[0] = 0

@@ -76,9 +76,9 @@ def _read_mesh(context: Context, path: Path, tissue: str | None) -> MeshInFile |
     return _sound(context, path, replace(in_file, mesh=mesh))
 
 
-def _sound(context: Context, path: Path, found: MeshInFile) -> MeshInFile | None:
+def _sound(context: Context, path: Path, in_file: MeshInFile) -> MeshInFile | None:
     """The mesh, if it is one body of a size that a body can have."""
-    mesh, problems = found.mesh, context.problems
+    mesh, problems = in_file.mesh, context.problems
     volume = mesh.volume
     if not SMALLEST_VOLUME < volume < LARGEST_VOLUME:
         unit = context.frame.unit
@@ -93,7 +93,7 @@ def _sound(context: Context, path: Path, found: MeshInFile) -> MeshInFile | None
         return None
     pairs = coincident_nodes(mesh.points)
     if len(pairs):
-        a, b = found.node_numbers[pairs[0]]
+        a, b = in_file.node_numbers[pairs[0]]
         problems.add(
             path,
             f"node {a}",
@@ -108,6 +108,6 @@ def _sound(context: Context, path: Path, found: MeshInFile) -> MeshInFile | None
     if len(pinched := pinched_nodes(faces)):
         problems.remark(
             path,
-            f"the surface touches itself at {len(pinched)} node(s), first at node {found.node_numbers[pinched[0]]}",
+            f"the surface touches itself at {len(pinched)} node(s), first at node {in_file.node_numbers[pinched[0]]}",
         )
-    return found
+    return in_file

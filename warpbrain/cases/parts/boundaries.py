@@ -16,12 +16,12 @@ from warpbrain.recordings.tables import read_table
 from warpbrain.recordings.text import collected
 
 
-def read_boundaries(context: Context, named: Named | None, found: MeshInFile | None) -> tuple[Boundary, ...]:
+def read_boundaries(context: Context, named: Named | None, in_file: MeshInFile | None) -> tuple[Boundary, ...]:
     """Boundaries in the order of the file, as far as they are right."""
     boundaries: list[Boundary] = []
     names: set[str] = set()
     for table in context.lists(BOUNDARY):
-        nodes = None if named is None or found is None else named.nodes(table, found)
+        nodes = None if named is None or in_file is None else named.nodes(table, in_file)
         name = table.get("name") or table.get("nodes") or ""
         if name in names:
             table.problem("name", f"a second boundary '{name}'", "recordings name boundaries: give each its own")
@@ -62,12 +62,11 @@ def _history(table: Reading) -> dict[str, Any] | None:
     path, problems, columns = table.path("value"), table.context.problems, ("ux", "uy", "uz")
     if path is None:
         return None
-    with collected(path, problems) as found:
-        rows = read_table(path, found, ("t", *columns))
-        if rows is None or not rows.require("t", *columns):
-            return None
+    with collected(path, problems) as of_file:
+        rows = read_table(path, of_file, ("t", *columns))
+        rows.require("t", *columns)
         times, values = rows.times(strictly=True), rows.vectors(*columns)
-    if found:
+    if of_file:
         return None
     displacements = _triples(table.context.frame.lengths(values))
     return {"times": tuple(times.tolist()), "values": displacements, "file": table.get("value")}

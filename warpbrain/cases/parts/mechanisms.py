@@ -58,11 +58,11 @@ def read_mechanisms(
     return tuple(acting[place] for place in sorted(acting))
 
 
-def _require_turns(tables: Sequence[tuple[int, str, Reading]], found: Mapping[int, Mechanism]) -> None:
+def _require_turns(tables: Sequence[tuple[int, str, Reading]], acting: Mapping[int, Mechanism]) -> None:
     """Note a problem where loads of a kind of which a case has one at a time act together."""
     for kind in dict.fromkeys(kind for _, kind, _ in tables):
         of_kind = [(place, table) for place, name, table in tables if name == kind]
-        loads = [found[place] for place, _ in of_kind if place in found]
+        loads = [acting[place] for place, _ in of_kind if place in acting]
         one_at_a_time = issubclass(mechanisms()[kind], Load) and not mechanisms()[kind].several
         if one_at_a_time and len(loads) > 1 and not take_turns(loads):
             cure = "give each a ramp, so that their factors add up to no more than 1 at any time"

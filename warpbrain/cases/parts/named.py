@@ -20,10 +20,10 @@ from warpbrain.recordings.surfaces import read_surface_mesh
 from warpbrain.recordings.tables import read_table
 from warpbrain.recordings.text import (
     collected,
-    is_readable,
     lines_of,
     read_text,
     remark_open_end,
+    require_readable,
     shown,
     without_comment,
 )
@@ -52,13 +52,13 @@ class Named:
     frame: Frame
     problems: Problems
 
-    def nodes(self, table: Reading, found: MeshInFile) -> str | None:
+    def nodes(self, table: Reading, in_file: MeshInFile) -> str | None:
         """Name of the node set that the key `nodes` of a table names; None, and a problem noted, if there is none.
 
         Parameters
         ----------
         table : Reading
-        found : MeshInFile
+        in_file : MeshInFile
             How the file of the mesh numbers its nodes.
         """
         if not table.has("nodes"):
@@ -66,7 +66,7 @@ class Named:
         name: str = table.get("nodes")
         if name.lower().endswith(".csv"):
             path = table.path("nodes")
-            members = None if path is None else _read_members(path, found, self.problems)
+            members = None if path is None else _read_members(path, in_file, self.problems)
             if path is None or members is None:
                 return None
             name = path.stem
@@ -126,20 +126,18 @@ class Named:
             self.mesh = replace(self.mesh, element_sets={**self.mesh.element_sets, name: members})
 
 
-def _read_members(path: Path, found: MeshInFile, problems: Problems) -> Bools | None:
+def _read_members(path: Path, in_file: MeshInFile, problems: Problems) -> Bools | None:
     """Members (n,) of a set given as a file of node numbers, one a line, from 0; None if something is wrong."""
-    text = read_text(path, problems)
-    if text is None:
-        return None
-    where = np.full(found.file_nodes, -1, dtype=np.int64)
-    where[found.node_numbers] = np.arange(len(found.node_numbers))
-    remark_open_end(path, text, problems)
-    members = np.zeros(len(found.mesh.points), dtype=bool)
-    words = [(number, without_comment(line).strip().rstrip(",;")) for number, line in enumerate(lines_of(text), 1)]
-    words = [(number, word) for number, word in words if word]
-    if words and words[0][1].lower() in ("id", "ids", "node", "nodes"):
-        del words[0]
+    where = np.full(in_file.file_nodes, -1, dtype=np.int64)
+    where[in_file.node_numbers] = np.arange(len(in_file.node_numbers))
+    members = np.zeros(len(in_file.mesh.points), dtype=bool)
     with collected(path, problems) as wrong:
+        text = read_text(path, wrong)
+        remark_open_end(path, text, wrong)
+        words = [(number, without_comment(line).strip().rstrip(",;")) for number, line in enumerate(lines_of(text), 1)]
+        words = [(number, word) for number, word in words if word]
+        if words and words[0][1].lower() in ("id", "ids", "node", "nodes"):
+            del words[0]
         for number, word in words:
             if wrong.enough:
                 break
@@ -147,9 +145,8 @@ def _read_members(path: Path, found: MeshInFile, problems: Problems) -> Bools | 
                 wrong.add(path, f"row {number}", fault)
             else:
                 members[where[int(word)]] = True
-    if not wrong and not members.any():
-        problems.add(path, "", "the file names no node: the set is empty")
-        return None
+        if not wrong and not members.any():
+            wrong.add(path, "", "the file names no node: the set is empty")
     return None if wrong else members
 
 
@@ -167,24 +164,19 @@ def _fault(word: str, where: Ints) -> str:
 
 def read_closed_surface(path: Path, name: str, frame: Frame, problems: Problems) -> ClosedSurface | None:
     """The closed surface in a file, in metres and RAS, called by a name; None if it is none or is not closed."""
-    surface = read_surface_mesh(path, problems)
-    if surface is None:
-        return None
-    if surface.faces is None:
-        problems.add(path, "", "found points only, expected a surface of triangles")
-        return None
-    edges = open_edges(surface.faces)
-    if len(edges):
-        problems.add(
-            path,
-            "",
-            f"the surface is not closed: {len(edges)} edge(s) do not belong to two triangles, first that of the "
-            f"points {edges[0][0]} and {edges[0][1]}",
-            "contact needs an inside: close the surface",
-        )
-        return None
-    points = Frame(frame.unit, surface.axes or frame.axes).lengths(surface.points)
-    return ClosedSurface(name, points, surface.faces)
+    with collected(path, problems) as wrong:
+        surface = read_surface_mesh(path, wrong)
+        if surface.faces is None:
+            wrong.refuse(path, "", "found points only, expected a surface of triangles")
+        edges = open_edges(surface.faces)
+        if len(edges):
+            message = (
+                f"the surface is not closed: {len(edges)} edge(s) do not belong to two triangles, first that of the "
+                f"points {edges[0][0]} and {edges[0][1]}"
+            )
+            wrong.refuse(path, "", message, "contact needs an inside: close the surface")
+        points = Frame(frame.unit, surface.axes or frame.axes).lengths(surface.points)
+    return None if wrong else ClosedSurface(name, points, surface.faces)
 
 
 def read_directions(path: Path, mesh: TetMesh, frame: Frame, problems: Problems) -> Floats | None:
@@ -194,51 +186,42 @@ def read_directions(path: Path, mesh: TetMesh, frame: Frame, problems: Problems)
     three columns.
     """
     readers = {".csv": _directions_in_table, ".npy": _directions_in_array}
-    vectors = readers.get(path.suffix.lower(), _directions_in_mesh)(path, mesh, problems)
-    if vectors is None:
-        return None
-    if vectors.shape != (len(mesh.tetrahedra), 3):
-        found = " x ".join(map(str, vectors.shape))
-        problems.add(path, "", f"found {found} numbers, expected {len(mesh.tetrahedra)} x 3: a row for each element")
-        return None
-    return frame.directions(vectors)
+    with collected(path, problems) as wrong:
+        vectors = readers.get(path.suffix.lower(), _directions_in_mesh)(path, mesh, wrong)
+        if not wrong and vectors.shape != (len(mesh.tetrahedra), 3):
+            shape = " x ".join(map(str, vectors.shape))
+            wrong.add(path, "", f"found {shape} numbers, expected {len(mesh.tetrahedra)} x 3: a row for each element")
+    return None if wrong else frame.directions(vectors)
 
 
-def _directions_in_table(path: Path, _mesh: TetMesh, problems: Problems) -> Floats | None:
+def _directions_in_table(path: Path, _mesh: TetMesh, problems: Problems) -> Floats:
     columns = ("x", "y", "z")
-    with collected(path, problems) as found:
-        table = read_table(path, found, columns)
-        vectors = table.vectors(*columns) if table is not None and table.require(*columns) else None
-    return None if found else vectors
+    table = read_table(path, problems, columns)
+    table.require(*columns)
+    return table.vectors(*columns)
 
 
-def _directions_in_array(path: Path, mesh: TetMesh, problems: Problems) -> Floats | None:
-    if not is_readable(path, problems):
-        return None
+def _directions_in_array(path: Path, mesh: TetMesh, problems: Problems) -> Floats:
+    require_readable(path, problems)
     try:
         # mapped, so that a header with more numbers than the file has is known before any memory is taken
         array = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as error:  # headers are Python text: random ones raise what its tokenizer does
-        problems.add(path, "", f"not an array of NumPy ({' '.join(str(error).split())[:100]})")
-        return None
+        problems.refuse(path, "", f"not an array of NumPy ({' '.join(str(error).split())[:100]})")
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
-        problems.add(path, "", "expected one array of real numbers")
-        return None
+        problems.refuse(path, "", "expected one array of real numbers")
     # checked before it is read
     return array if array.shape != (len(mesh.tetrahedra), 3) else array.astype(np.float64)
 
 
-def _directions_in_mesh(path: Path, mesh: TetMesh, problems: Problems) -> Floats | None:
+def _directions_in_mesh(path: Path, mesh: TetMesh, problems: Problems) -> Floats:
     try:
         other = read_mesh(path)
     except MeshError as error:
-        problems.add(path, "", str(error).removeprefix(f"{path}: "))
-        return None
+        problems.refuse(path, "", str(error).removeprefix(f"{path}: "))
     if not np.array_equal(other.tetrahedra, mesh.tetrahedra):
-        problems.add(path, "", "its tetrahedra are not those of the mesh, in their order")
-        return None
+        problems.refuse(path, "", "its tetrahedra are not those of the mesh, in their order")
     if len(other.element_vectors) != 1:
         names = ", ".join(sorted(other.element_vectors)) or "none"
-        problems.add(path, "", f"expected one real array of three columns, found {names}")
-        return None
+        problems.refuse(path, "", f"expected one real array of three columns, found {names}")
     return next(iter(other.element_vectors.values()))

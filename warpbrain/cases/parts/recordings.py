@@ -13,7 +13,7 @@ from warpbrain.recordings.times import compared_rows
 
 
 def read_recordings(
-    context: Context, named: Named | None, found: MeshInFile | None, boundaries: set[str]
+    context: Context, named: Named | None, in_file: MeshInFile | None, boundaries: set[str]
 ) -> tuple[Recording, ...]:
     """Recordings in the order of the file, as far as they are right; a force names one of the `boundaries`."""
     recordings: list[Recording] = []
@@ -31,7 +31,7 @@ def read_recordings(
             other = "a case with [specimen]" if kind.of_specimen else "a case with [mesh]"
             table.problem("kind", f"'{table.variant}' belongs to {other}")
             continue
-        recording = _read(table, kind, _given(table, kind, named, found, boundaries))
+        recording = _read(table, kind, _given(table, kind, named, in_file, boundaries))
         if recording is not None:
             if not specimen and recording.reference is not None and not len(compared_rows(recording)):
                 at = f"{recording.reference:g} s"
@@ -41,7 +41,7 @@ def read_recordings(
 
 
 def _given(
-    table: Reading, kind: type[Recording], named: Named | None, found: MeshInFile | None, boundaries: set[str]
+    table: Reading, kind: type[Recording], named: Named | None, in_file: MeshInFile | None, boundaries: set[str]
 ) -> dict[str, Any] | None:
     """Path and keys as `Recording.read` takes them; None, and problems noted, if something of them is wrong."""
     given: dict[str, Any] = {"path": table.path("file")}
@@ -50,7 +50,7 @@ def _given(
     for key in kind.keys:
         value = table.si(key.name)
         if key.name == "nodes":
-            value = None if named is None or found is None else named.nodes(table, found)
+            value = None if named is None or in_file is None else named.nodes(table, in_file)
         elif key.name == "boundary" and value is not None and value not in boundaries:
             known = ", ".join(f"'{known}'" for known in sorted(boundaries)) or "none"
             table.problem("boundary", f"no [[boundary]] is called '{value}' (there are: {known})")

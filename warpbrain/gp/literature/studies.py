@@ -37,7 +37,7 @@ from warpbrain.errors import InputError
 from warpbrain.gp.literature.forms import FORMS, Convention, Parameter, Parameters
 from warpbrain.gp.literature.study import GROUPS, STRETCHES, Study
 from warpbrain.keys import finite, short
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, Unreadable
 from warpbrain.recordings.text import read_text
 
 Variant = Literal["as_published", "corrected"]
@@ -112,11 +112,10 @@ def _read(path: Path, variant: Variant, shipped: Iterable[Study] = ()) -> tuple[
 
 def _read_tables(path: Path, problems: Problems) -> tuple[list[dict[str, Any]], float]:
     """Tables `[[study]]` of a file as they are, and the unit of its moduli [Pa]; no tables where there are problems."""
-    text = read_text(path, problems)
-    if text is None:
-        return [], 1.0
     try:
-        content = tomllib.loads(text)
+        content = tomllib.loads(read_text(path, problems))
+    except Unreadable:
+        return [], 1.0
     except (ValueError, RecursionError) as error:  # numbers of thousands of digits, thousands of brackets
         problems.add(path, "", f"found text that is not valid TOML: {error}", "is the file cut off?")
         return [], 1.0

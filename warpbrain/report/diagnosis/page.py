@@ -6,13 +6,14 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
+from warpbrain.atomic import write_text
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.report.body_sections import known_displacement
 from warpbrain.report.diagnosis import pictures, text
 from warpbrain.report.diagnosis.files import Recorded
-from warpbrain.report.page import Top, document, sections_of, write_document
+from warpbrain.report.page import Top, document, sections_of
 from warpbrain.report.page.scene import viewer
 from warpbrain.report.state_files import SavedState
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY, VIEWS
@@ -40,7 +41,7 @@ def write_page(
     path: Path, diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None
 ) -> None:
     """Write the page of a diagnosis; arguments as of `page_of`."""
-    write_document(path, page_of(diagnosis, summary, state))
+    write_text(path, page_of(diagnosis, summary, state))
 
 
 def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None) -> str:

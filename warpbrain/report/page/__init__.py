@@ -14,13 +14,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup, escape
 
-from warpbrain.atomic import whole_file
 from warpbrain.inference.calibration import percent
 from warpbrain.physics.words import tabled
 
@@ -101,12 +99,6 @@ def sections_of(template: str, **values: Any) -> list[Section]:
 def document(title: str, top: Top, sections: Sequence[Section]) -> str:
     """A page as one HTML file; `title` is of the window, sections without a body are left out."""
     return str(part("frame", title, top, [section for section in sections if section.body])) + "\n"
-
-
-def write_document(path: Path, page: str) -> None:
-    """Write a page, whole."""
-    with whole_file(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]], numbers: Sequence[int] = (), caption: str = "") -> Markup:
