@@ -404,7 +404,7 @@ class CoresGradient(ConjugateGradient):
     def _renew(self) -> None:
         """Renew the coarse space after the values of the matrix changed; without one where it is not definite."""
         A = self._matrix
-        inputs = [A.offsets, A.columns, A.values, self._aggregate, 4, self._free, self._places]
+        inputs = [A.offsets, A.columns, A.values, self._aggregate, self._free, self._places]
         launch(self._coarse_matrix, self._count, [*inputs, self._coarse], self._device, least=1)
         k = self._count
         blocks = self._coarse.numpy().astype(np.float64).reshape(k, k, 4, 4, 3, 3)

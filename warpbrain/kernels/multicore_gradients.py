@@ -292,6 +292,19 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
                 _begin_pass(threads, sync, go_on)
             taken = _take(thread, threads, sync, give_way)
 
+    @wp.func
+    def add_row(
+        g: int, of: int, s: mat33, sx: mat33, sy: mat33, sz: mat33, free: vec3, place: vec3, coarse: wp.array2d[mat33]
+    ):
+        # columns of constrained components are zero, but in their own rows
+        for d in range(4):
+            row = wp.diag(weight(place, d) * free)
+            m = 16 * of + 4 * d
+            coarse[g, m] = coarse[g, m] + row * s
+            coarse[g, m + 1] = coarse[g, m + 1] + row * sx
+            coarse[g, m + 2] = coarse[g, m + 2] + row * sy
+            coarse[g, m + 3] = coarse[g, m + 3] + row * sz
+
     @wp.kernel(module=module)
     def coarse_matrix(
         start: int,
@@ -299,7 +312,6 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
         columns: wp.array[int],
         values: wp.array[mat33],
         aggregate: int,
-        modes: int,
         free: wp.array[vec3],
         places: wp.array[vec3],
         coarse: wp.array2d[mat33],
@@ -309,14 +321,26 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
         for m in range(coarse.shape[1]):
             coarse[g, m] = mat33()
         for i in range(g * size, wp.min((g + 1) * size, free.shape[0])):
+            # what motions of an aggregate do to the row, summed as long as the next column is of the same
+            of = g
+            s = mat33()
+            sx = mat33()
+            sy = mat33()
+            sz = mat33()
             for k in range(offsets[i], offsets[i + 1]):
                 j = columns[k]
-                A = wp.cw_mul(values[k], wp.outer(free[i], free[j]))
-                m = 16 * (j // size)
-                for d in range(modes):
-                    for e in range(modes):
-                        w = weight(places[i], d) * weight(places[j], e)
-                        coarse[g, m] = coarse[g, m] + w * A
-                        m += 1
+                if j // size != of:
+                    add_row(g, of, s, sx, sy, sz, free[i], places[i], coarse)
+                    of = j // size
+                    s = mat33()
+                    sx = mat33()
+                    sy = mat33()
+                    sz = mat33()
+                A = values[k]
+                s += A
+                sx += places[j][0] * A
+                sy += places[j][1] * A
+                sz += places[j][2] * A
+            add_row(g, of, s, sx, sy, sz, free[i], places[i], coarse)
 
     return conjugate_gradients, coarse_matrix

@@ -22,6 +22,7 @@ from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.model import require_held
 from warpbrain.simulation.multisecant import Multisecant
 from warpbrain.simulation.system import System
+from warpbrain.threads import one_thread_of_blas
 
 #: Out-of-balance force, relative, from which on steps say something of the steps to come.
 _NEAR = 0.1
@@ -217,7 +218,8 @@ class EquilibriumSolver:
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
         self.system.set_time_step(math.inf)
         self.system.forget()
-        return self._follow(u, full, model.prescribed if prescribed is None else prescribed)
+        with one_thread_of_blas():
+            return self._follow(u, full, model.prescribed if prescribed is None else prescribed)
 
     def linear_estimate(self) -> Floats:
         """Displacement (n, 3) [m] at full load if the body kept the stiffness that it has at rest.
@@ -281,10 +283,14 @@ class EquilibriumSolver:
         require_held(model)
         self.system.set_time_step(time_step)
         prescribed = model.prescribed_at(time, 1.0) if prescribed is None else prescribed
-        return self._follow(np.array(start, dtype=np.float64), model.external_forces(time), prescribed, time)
+        with one_thread_of_blas():
+            return self._follow(np.array(start, dtype=np.float64), model.external_forces(time), prescribed, time)
 
     def _follow(self, u: Floats, full: Floats, prescribed: Floats, time: float | None = None) -> Equilibrium:
-        """Go from a state to full load; at a time, what acts is all there and only what is prescribed moves."""
+        """Go from a state to full load; at a time, what acts is all there and only what is prescribed moves.
+
+        With one thread of BLAS: a sum over nodes takes less than to wake others, and bits would depend on their number.
+        """
         model = self.system.model
         origin = np.where(model.constrained, u, 0.0)
         self._history = []
