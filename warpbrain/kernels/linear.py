@@ -166,7 +166,7 @@ def linear_kernels(precision: Precision) -> KernelSet:
 
 def solver_kernels(precision: Precision, device: wp.Device) -> list[Any]:
     """Of each module that `ConjugateGradient` needs on a device, with its default preconditioner, a kernel."""
-    on_cores = [gradients_kernels(precision)[0], team_kernels()[0]] if device.is_cpu else []
+    on_cores = [gradients_kernels(precision).multiply, team_kernels()[0]] if device.is_cpu else []
     return [linear_kernels(precision).multiply, *on_cores]
 
 
@@ -398,7 +398,7 @@ class CoresGradient(ConjugateGradient):
 
     def _begin(self) -> None:
         size, vec3 = self._size, self._precision.vec3
-        self._kernel, self._coarse_matrix, self._copy_blocks = gradients_kernels(self._precision)
+        self._on_cores = gradients_kernels(self._precision)
         self._scratch = [self._zeros(size, vec3) for _ in range(3)]
         chunks = -(-size // CHUNK)
         self._partial = self._zeros((chunks, 4))
@@ -458,11 +458,13 @@ class CoresGradient(ConjugateGradient):
 
     def _renew(self) -> None:
         """Renew copy and coarse space after the values of the matrix changed; without one where it is not definite."""
-        launch(self._copy_blocks, len(self._copied), [self._copied, self._matrix.values, self._copy], self._device)
+        launch(
+            self._on_cores.copy_blocks, len(self._copied), [self._copied, self._matrix.values, self._copy], self._device
+        )
         inputs = [self._copied_diagonal, self._matrix.values, self._copied_inverse]
         launch(self._kernels.invert_diagonal, self._size, inputs, self._device)
         inputs = [self._offsets, self._columns, self._copy, self._aggregate, self._free, self._places, self._coarse]
-        launch(self._coarse_matrix, self._count, inputs, self._device, least=1)
+        launch(self._on_cores.coarse_matrix, self._count, inputs, self._device, least=1)
         k = self._count
         blocks = self._coarse.numpy().astype(np.float64).reshape(k, k, 12, 4, 4)[..., :3]
         galerkin = blocks.transpose(0, 2, 1, 3, 4).reshape(12 * k, 12 * k)
@@ -473,6 +475,10 @@ class CoresGradient(ConjugateGradient):
         inverse = np.zeros_like(galerkin) if failed else lapack.dpotri(factor, lower=1)[0]
         np.copyto(inverse, inverse.T, where=np.tri(12 * k, k=-1, dtype=bool).T)
         self._coarse_inverse.assign(inverse)
+
+    def multiply(self, x: wp.array, z: wp.array) -> None:
+        A = self._matrix
+        launch(self._on_cores.multiply, self._size, [A.offsets, A.columns, A.values, x, z], self._device)
 
     def prepare(self) -> None:
         super().prepare()
@@ -497,7 +503,7 @@ class CoresGradient(ConjugateGradient):
             self._precision.scalar(tolerance), self._max_iterations, int(self._watch), self._outcome,
             self._aggregate, *space,
         ]  # fmt: skip
-        launch_together(self._kernel, self._size, inputs, self._device)
+        launch_together(self._on_cores.conjugate_gradients, self._size, inputs, self._device)
         return tuple(self._outcome.numpy()[:4].tolist())
 
     def _refine(self, tolerance: float, points: Floats, free: wp.array) -> tuple[float, float, float, float] | None:

@@ -17,7 +17,7 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.multicore import PAUSE
 from warpbrain.kernels.precision import SINGLE, Precision
 
@@ -134,8 +134,7 @@ def _row_product(precision: Precision, stored: Precision) -> Any:
     )
     def row_product(
         offsets: wp.array[int], columns: wp.array[int], values: wp.array[mat33], x: wp.array[vec3], i: int
-    ) -> vec3:  # type: ignore[empty-body, valid-type]
-        ...
+    ) -> vec3: ...
 
     return row_product
 
@@ -162,8 +161,7 @@ def _coarse_functions(precision: Precision) -> tuple[Any, Any]:
         return even[0] + even[1] + even[2] + even[3];
         """
     )
-    def full_row_product(A: wp.array2d[scalar], x: wp.array[scalar], i: int) -> scalar:  # type: ignore[empty-body, valid-type]
-        ...
+    def full_row_product(A: wp.array2d[scalar], x: wp.array[scalar], i: int) -> scalar: ...
 
     @wp.func_native(
         _rows(precision, SINGLE)
@@ -208,9 +206,9 @@ def _coarse_functions(precision: Precision) -> tuple[Any, Any]:
 
 
 @cache
-def gradients_kernels(precision: Precision) -> tuple[Any, Any, Any]:
-    """Make (once) the kernels of a precision: conjugate gradients, the matrix of the coarse space, and a copy of blocks
-    at `places` in single precision.
+def gradients_kernels(precision: Precision) -> KernelSet:
+    """Make (once) the kernels of a precision: `conjugate_gradients`, `coarse_matrix` of the coarse space, `copy_blocks`
+    at places in single precision, and `multiply`.
 
     `warpbrain.kernels.multicore.launch_together` runs the first. Its arguments after those of the threads: the
     addresses of `sync` and of what gives way; the matrix by `offsets`, `columns` and `values`, or a `copy` of these in
@@ -224,7 +222,7 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any, Any]:
     scratch.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"multicore_gradients_{precision.name}")
+    kernels = KernelSet(f"multicore_gradients_{precision.name}")
     chunk, shares = wp.constant(CHUNK), wp.constant(_SHARES)
     start, coarse, direction = wp.constant(_START), wp.constant(_COARSE), wp.constant(_DIRECTION)
     product = wp.constant(_PRODUCT)
@@ -255,7 +253,7 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any, Any]:
         restricted[t, 2] = sy
         restricted[t, 3] = sz
 
-    @wp.kernel(module=module)
+    @kernels.add
     def conjugate_gradients(
         thread: int,
         threads: int,
@@ -412,7 +410,7 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any, Any]:
                 _begin_pass(threads, sync, go_on)
             taken = _take(thread, threads, sync, give_way)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def coarse_matrix(
         start: int,
         offsets: wp.array[int],
@@ -430,7 +428,7 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any, Any]:
         for i in range(g * size, wp.min((g + 1) * size, free.shape[0])):
             add_to_coarse(offsets, columns, values, size, free, places, coarse, i)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def copy_blocks(start: int, places: wp.array[int], values: wp.array[mat33], copies: wp.array[wp.mat33f]):
         k = start + wp.tid()
         A = values[places[k]]
@@ -440,4 +438,16 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any, Any]:
                 copy[i, j] = wp.float32(A[i, j])
         copies[k] = copy
 
-    return conjugate_gradients, coarse_matrix, copy_blocks
+    @kernels.add
+    def multiply(
+        start: int,
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[mat33],
+        x: wp.array[vec3],
+        z: wp.array[vec3],
+    ):
+        i = start + wp.tid()
+        z[i] = row_product(offsets, columns, values, x, i)
+
+    return kernels

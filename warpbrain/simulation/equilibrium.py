@@ -355,12 +355,17 @@ class EquilibriumSolver:
         previous = np.inf
         forcing = options.cg_tolerance
         shift = 0.0
+        # whether the last step should have led to balance: then there is no need of a tangent
+        closes = False
         # of forces without a potential the linear solver has a part of the tangent
         secants = None if all(term.conservative for term in system.terms) else Multisecant()
         for iteration in range(1, options.max_newton + 1):
             with self.clock.phase("internal forces"):
                 system.u.assign(u)
-                system.evaluate_tangents()
+                if closes:
+                    system.evaluate_forces()
+                else:
+                    system.evaluate_tangents()
                 system.gather_forces()
             internal = system.internal.numpy().astype(np.float64)
             r = self._free * (external - internal)
@@ -375,6 +380,9 @@ class EquilibriumSolver:
                 raise _StepFailed("the out-of-balance force is not finite")
             if not moving and relative <= self.tolerance:
                 return u, potential + float(np.vdot(external, u)), relative
+            if closes:
+                with self.clock.phase("internal forces"):
+                    system.evaluate_tangents()
             # Eisenstat-Walker: as exact as Newton's own error deserves, and no more exact than the goal needs
             if moving:
                 eta = min(options.cg_tolerance, 1e-3)
@@ -383,6 +391,7 @@ class EquilibriumSolver:
                 eta = min(options.cg_tolerance, max(0.9 * ratio**2, 0.9 * forcing**2 if forcing**2 > 0.1 else 0.0))
                 eta = max(eta, 0.3 * self.tolerance / relative, 20.0 * system.precision.epsilon)
             forcing, previous = eta, np.inf if moving else norm
+            closes = not moving and eta * relative <= self.tolerance
             if len(self._history) >= options.max_total_newton:
                 raise _StepFailed(
                     f"not in balance yet (relative residual {relative:.1e}, goal {self.tolerance:.1e})"
