@@ -103,6 +103,51 @@ def test_the_coarse_space_halves_the_iterations_and_changes_no_answer(model, mon
     assert iterations[1] < 0.6 * iterations[0]
 
 
+def at_rest(model: Model, precision: str = "double") -> System:
+    """With a load that bends, and its matrix."""
+    system = System(model, "cpu", precision)
+    system.evaluate_tangents()
+    system.assemble(1.0, 0.0)
+    points = model.mesh.points
+    system.load.assign(np.stack([points[:, 2], 0.0 * points[:, 0], -points[:, 0]], axis=1) * ~model.constrained)
+    return system
+
+
+def test_what_single_precision_cannot_hold_is_solved_in_double(model):
+    system = at_rest(model)
+    expected = sparse_linalg.spsolve(matrix_of(system).tocsc(), system.load.numpy().ravel()).reshape(-1, 3)
+    for array in (system.matrix.values, system.load):
+        array.assign(1e45 * array.numpy())
+    solver = system.linear_solver(tolerance=1e-10, max_iterations=1000, watch_curvature=True, at_rest=True)
+    solver.prepare()
+    solver.solve()
+    assert solver.result().converged
+    assert np.linalg.norm(system.solution.numpy() - expected) <= 1e-7 * np.linalg.norm(expected)
+
+
+def test_an_indefinite_matrix_is_told_with_a_coarse_space_too(model):
+    system = at_rest(model)
+    values = system.matrix.values.numpy()
+    values[system.diagonal.numpy()] -= 0.01 * np.abs(values).max() * np.eye(3)
+    system.matrix.values.assign(values)
+    solver = system.linear_solver(tolerance=1e-8, max_iterations=5000, watch_curvature=True, at_rest=True)
+    solver.prepare()
+    solver.solve()
+    assert solver.result().indefinite
+
+
+def test_a_system_in_single_precision_has_a_coarse_space_too(model):
+    solutions = []
+    for precision in ("double", "single"):
+        system = at_rest(model, precision)
+        solver = system.linear_solver(tolerance=1e-5, max_iterations=1000, watch_curvature=True, at_rest=True)
+        solver.prepare()
+        solver.solve()
+        assert solver.result().converged
+        solutions.append(system.solution.numpy())
+    assert np.linalg.norm(solutions[1] - solutions[0]) <= 1e-3 * np.linalg.norm(solutions[0])
+
+
 def test_bits_are_the_same_in_a_captured_graph(model, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     simulator = Simulator(System(model, "cpu"))

@@ -18,7 +18,7 @@ of Python. Facts about Warp 1.19 that are dealt with here and nowhere else:
 
 import abc
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
@@ -166,7 +166,7 @@ def linear_kernels(precision: Precision) -> KernelSet:
 
 def solver_kernels(precision: Precision, device: wp.Device) -> list[Any]:
     """Of each module that `ConjugateGradient` needs on a device, with its default preconditioner, a kernel."""
-    on_cores = [gradients_kernels(precision)[0], team_kernels()[0]] if device.is_cpu else []
+    on_cores = [gradients_kernels(precision).multiply, team_kernels()[0]] if device.is_cpu else []
     return [linear_kernels(precision).multiply, *on_cores]
 
 
@@ -368,75 +368,191 @@ class OneLaunchGradient(ConjugateGradient):
 _AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
 
 
+def _bisected(points: Floats, rows: NDArray[np.intp], size: int) -> NDArray[np.intp]:
+    """Rows in an order in which each run of so many, but for the last, is close together; ascending within it.
+
+    `points` are where they are, (3, n).
+    """
+    runs = -(-len(rows) // size)
+    if runs < 2:
+        return np.sort(rows)
+    of = points[:, rows]
+    along = np.argsort(of[np.argmax(np.ptp(of, axis=1))], kind="stable")
+    first, second = np.split(rows[along], [runs // 2 * size])
+    return np.concatenate([_bisected(points, first, size), _bisected(points, second, size)])
+
+
+#: What a solve with a copy in single precision may leave of a residual: rounding of the matrix leaves less of most. A
+#: round that leaves more than the second was of no use.
+_LEAST_OF_COPY, _NO_USE = 1e-4, 0.1
+
+
 class CoresGradient(ConjugateGradient):
-    """On the cores of a CPU; see `warpbrain.kernels.multicore_gradients`."""
+    """On the cores of a CPU; see `warpbrain.kernels.multicore_gradients`.
+
+    With a coarse space it solves with a copy of the matrix in single precision, half as many bytes, and solves again
+    for what that leaves of the residual (iterative refinement, Wilkinson 1963, Rounding Errors in Algebraic Processes,
+    section 3.5). Rows of the copy are in the order of `_bisected`: compact aggregates take some 40 % less iterations
+    than runs of rows of a band. Where the copy is of no use, or not positive definite, it is done without.
+    """
 
     def _begin(self) -> None:
         size, vec3 = self._size, self._precision.vec3
-        self._kernel, self._coarse_matrix = gradients_kernels(self._precision)
+        self._on_cores = gradients_kernels(self._precision)
         self._scratch = [self._zeros(size, vec3) for _ in range(3)]
         chunks = -(-size // CHUNK)
         self._partial = self._zeros((chunks, 4))
         self._sync = self._zeros(sync_words(MOST), wp.uint64)
         self._outcome = self._zeros(8)
-        # values of the matrix changed since the coarse space was made
+        # chunks of an aggregate
+        self._aggregate = -(-chunks // _AGGREGATES)
+        self._no_copy = self._zeros(0, wp.mat33f)
+        self._no_space = [
+            *(self._zeros(0, vec3) for _ in range(2)), self._zeros((0, 0)),
+            *(self._zeros(0) for _ in range(2)), self._zeros((0, 0), vec3),
+        ]  # fmt: skip
+        self._order: NDArray[np.intp] | None = None
+        # values of the matrix changed since they were copied
         self._is_stale = True
-        # chunks of an aggregate, and aggregates
-        self._aggregate, self._count = -(-chunks // _AGGREGATES), 0
-        self._free = self._places = self._zeros(0, vec3)
-        if self._nodes is not None and self._kind == "block-jacobi" and size >= _WORTH_A_COARSE_SPACE:
-            self._count = -(-chunks // self._aggregate)
-            points, self._free = self._nodes
-            self._places = wp.array(self._affine(points), dtype=vec3, device=self._device)
-        self._coarse = self._zeros((self._count, 16 * self._count), self._precision.mat33)
-        self._coarse_inverse = self._zeros((12 * self._count, 12 * self._count))
-        self._coarse_residual, self._coarse_solution = (self._zeros(12 * self._count) for _ in range(2))
-        self._restricted = self._zeros((chunks, 4), vec3)
+        #: How a solve ended that did with the copy.
+        self._refined: tuple[float, float, float, float] | None = None
 
-    def _affine(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _make_copy(self, points: Floats, free: wp.array) -> NDArray[np.intp]:
+        """Make room for copy and coarse space; returns the order of rows."""
+        A, size, vec3 = self._matrix, self._size, self._precision.vec3
+        order = _bisected(np.ascontiguousarray(points.T), np.arange(size), CHUNK * self._aggregate)
+        number = np.empty_like(order)
+        number[order] = np.arange(size)
+        offsets = A.offsets.numpy()
+        lengths = np.diff(offsets)[order]
+        first = np.concatenate([[0], np.cumsum(lengths)])
+        away = offsets[order] - first[:-1]
+        copied = np.repeat(away, lengths) + np.arange(first[-1])
+
+        def integers(values: NDArray[np.integer]) -> wp.array:
+            return wp.array(values, dtype=int, device=self._device)
+
+        self._copied, self._columns, self._offsets = map(integers, (copied, number[A.columns.numpy()[copied]], first))
+        self._copied_diagonal = integers(self._diagonal.numpy()[order])
+        self._copy = self._zeros(len(copied), wp.mat33f)
+        self._copied_inverse = wp.empty_like(self._inverse)
+        self._left, self._correction, self._product_of = (self._zeros(size, vec3) for _ in range(3))
+        chunks = self._partial.shape[0]
+        k = self._count = -(-chunks // self._aggregate)
+        self._free = wp.array(free.numpy()[order], dtype=vec3, device=self._device)
+        self._places = wp.array(self._affine(points[order]), dtype=vec3, device=self._device)
+        # of two aggregates, a mode and a component of the first, a mode and a component of the other, and an empty one
+        self._coarse = self._zeros((k, 192 * k))
+        self._coarse_inverse = self._zeros((12 * k, 12 * k))
+        self._coarse_residual, self._coarse_solution = (self._zeros(12 * k) for _ in range(2))
+        self._restricted = self._zeros((chunks, 4), vec3)
+        return order
+
+    def _affine(self, points: Floats) -> Floats:
         """Coordinates of each row from the middle of its aggregate, 1 at most."""
         of = np.arange(len(points)) // (CHUNK * self._aggregate)
         middles = np.stack([np.bincount(of, along) for along in points.T], axis=1) / np.bincount(of)[:, None]
         places = points - middles[of]
-        result: NDArray[np.float64] = places / np.abs(places).max()
+        result: Floats = places / np.abs(places).max()
         return result
 
     def _renew(self) -> None:
-        """Renew the coarse space after the values of the matrix changed; without one where it is not definite."""
-        A = self._matrix
-        inputs = [A.offsets, A.columns, A.values, self._aggregate, 4, self._free, self._places]
-        launch(self._coarse_matrix, self._count, [*inputs, self._coarse], self._device, least=1)
+        """Renew copy and coarse space after the values of the matrix changed; without one where it is not definite."""
+        launch(
+            self._on_cores.copy_blocks, len(self._copied), [self._copied, self._matrix.values, self._copy], self._device
+        )
+        inputs = [self._copied_diagonal, self._matrix.values, self._copied_inverse]
+        launch(self._kernels.invert_diagonal, self._size, inputs, self._device)
+        inputs = [self._offsets, self._columns, self._copy, self._aggregate, self._free, self._places, self._coarse]
+        launch(self._on_cores.coarse_matrix, self._count, inputs, self._device, least=1)
         k = self._count
-        blocks = self._coarse.numpy().astype(np.float64).reshape(k, k, 4, 4, 3, 3)
-        galerkin = blocks.transpose(0, 2, 4, 1, 3, 5).reshape(12 * k, 12 * k)
+        blocks = self._coarse.numpy().astype(np.float64).reshape(k, k, 12, 4, 4)[..., :3]
+        galerkin = blocks.transpose(0, 2, 1, 3, 4).reshape(12 * k, 12 * k)
         diagonal = np.diagonal(galerkin)
         # an aggregate that is held, or flat, has modes without stiffness: they are left alone
         galerkin = galerkin + np.diag(np.where(diagonal > 0.0, 1e-10 * diagonal, 1.0))
-        with one_thread_of_blas():
-            factor, failed = lapack.dpotrf(galerkin, lower=1)
-            inverse = np.zeros_like(galerkin) if failed else lapack.dpotri(factor, lower=1)[0]
-        self._coarse_inverse.assign(np.tril(inverse) + np.tril(inverse, -1).T)
+        factor, failed = lapack.dpotrf(galerkin, lower=1)
+        inverse = np.zeros_like(galerkin) if failed else lapack.dpotri(factor, lower=1)[0]
+        np.copyto(inverse, inverse.T, where=np.tri(12 * k, k=-1, dtype=bool).T)
+        self._coarse_inverse.assign(inverse)
+
+    def multiply(self, x: wp.array, z: wp.array) -> None:
+        A = self._matrix
+        launch(self._on_cores.multiply, self._size, [A.offsets, A.columns, A.values, x, z], self._device)
 
     def prepare(self) -> None:
         super().prepare()
-        # who solves in another way, and only prepares, does without a coarse space
+        # who solves in another way, and only prepares, does without a copy
         self._is_stale = True
 
     def _run(self, tolerance: float) -> None:
-        if self._is_stale and self._count:
-            self._renew()
-        self._is_stale = False
+        self._refined = None
+        if self._nodes is not None and self._kind == "block-jacobi" and self._size >= _WORTH_A_COARSE_SPACE:
+            with one_thread_of_blas():
+                self._refined = self._refine(tolerance, *self._nodes)
+        if self._refined is None:
+            A = self._matrix
+            rows = [A.offsets, A.columns, A.values, self._no_copy, self._inverse, self._b, self._x]
+            self._iterate(rows, tolerance, self._no_space)
+
+    def _iterate(self, rows: Sequence[wp.array], tolerance: float, space: Sequence[wp.array]) -> tuple[float, ...]:
+        """Run the kernel; iterations, squares of residual and goal, and the least curvature."""
         self._sync.zero_()
-        A = self._matrix
         inputs = [
-            self._sync.ptr, give_way(), A.offsets, A.columns, A.values, int(self._kind != "none"), self._inverse,
-            self._b, self._x, *self._scratch, self._partial, self._precision.scalar(tolerance), self._max_iterations,
-            int(self._watch), self._outcome, self._aggregate, self._free, self._places, self._coarse_inverse,
-            self._coarse_residual, self._coarse_solution, self._restricted,
+            self._sync.ptr, give_way(), *rows, int(self._kind != "none"), *self._scratch, self._partial,
+            self._precision.scalar(tolerance), self._max_iterations, int(self._watch), self._outcome,
+            self._aggregate, *space,
         ]  # fmt: skip
-        launch_together(self._kernel, self._size, inputs, self._device)
+        launch_together(self._on_cores.conjugate_gradients, self._size, inputs, self._device)
+        return tuple(self._outcome.numpy()[:4].tolist())
+
+    def _refine(self, tolerance: float, points: Floats, free: wp.array) -> tuple[float, float, float, float] | None:
+        """Solve with the copy, in rounds; how that ended as `_ended` says it, None if it was of no use."""
+        order = self._order = self._make_copy(points, free) if self._order is None else self._order
+        if self._is_stale:
+            self._renew()
+            self._is_stale = False
+        rows = [
+            self._offsets, self._columns, self._matrix.values, self._copy, self._copied_inverse, self._left,
+            self._correction,
+        ]  # fmt: skip
+        space = [
+            self._free, self._places, self._coarse_inverse, self._coarse_residual, self._coarse_solution,
+            self._restricted,
+        ]  # fmt: skip
+        # arrays of the CPU are seen by NumPy without a copy
+        b, x, left, correction = (array.numpy() for array in (self._b, self._x, self._left, self._correction))
+
+        def residual() -> Floats:
+            self.multiply(self._x, self._product_of)
+            difference: Floats = b - self._product_of.numpy()
+            return difference
+
+        r = residual() if x.any() else b
+        goal, length = tolerance * float(np.linalg.norm(b)), float(np.linalg.norm(r))
+        iterations, least = 0.0, math.inf
+        is_double = self._precision.name == "double"
+        while length > goal:
+            left[:] = r[order]
+            self._correction.zero_()
+            wanted = max(_LEAST_OF_COPY, 0.9 * goal / length) if is_double else goal / length
+            taken, squared, goal_squared, curvature = self._iterate(rows, wanted, space)
+            iterations, least = iterations + taken, min(least, curvature)
+            if not (squared <= goal_squared and least > 0.0):
+                return None
+            x[order] += correction
+            if not is_double:
+                # a residual of its own would be rounding
+                return iterations, squared**0.5, goal, least
+            r = residual()
+            before, length = length, float(np.linalg.norm(r))
+            if not length <= max(_NO_USE * before, goal):
+                return None
+        return iterations, length, goal, least
 
     def _ended(self) -> tuple[float, float, float, float]:
+        if self._refined is not None:
+            return self._refined
         iterations, residual, goal, curvature = self._outcome.numpy()[:4].tolist()
         return iterations, residual**0.5, goal**0.5, curvature
 

@@ -17,9 +17,9 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.multicore import PAUSE
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.precision import SINGLE, Precision
 
 #: Rows that are summed before anything is added to them.
 CHUNK = 64
@@ -95,13 +95,125 @@ def _begin_pass(threads: int, sync: wp.uint64, go_on: bool):
     """Let the next pass begin, or end."""
 
 
+_NAMES = {4: "float", 8: "double"}
+
+
+def _rows(precision: Precision, stored: Precision) -> str:
+    """Native code: `row(k, c)` is row `c` of block `k` of `values`, in lanes of a vector, one of which is not used."""
+    return f"""
+        typedef {_NAMES[precision.numpy.itemsize]} number;
+        typedef number lanes __attribute__((vector_size(4 * sizeof(number)), aligned(sizeof(number)), may_alias));
+        typedef {_NAMES[stored.numpy.itemsize]} stored;
+        typedef stored blocks __attribute__((vector_size(4 * sizeof(stored)), aligned(sizeof(stored)), may_alias));
+        auto row = [&](int k, int c) {{
+            const stored* A = &values.data[k].data[c][0];
+            // beyond the last row there may be nothing
+            const blocks loaded = c < 2 ? *(const blocks*)A : blocks{{A[0], A[1], A[2], 0}};
+            return __builtin_convertvector(loaded, lanes);
+        }};
+    """
+
+
+def _row_product(precision: Precision, stored: Precision) -> Any:
+    """``(offsets, columns, values, x, i) -> A_i x`` in lanes of vectors, since Warp multiplies number by number."""
+    vec3, mat33 = precision.vec3, stored.mat33
+
+    @wp.func_native(
+        _rows(precision, stored)
+        + """
+        lanes sx = {0, 0, 0, 0}, sy = sx, sz = sx;
+        for (int k = offsets.data[i]; k < offsets.data[i + 1]; ++k) {
+            const number* v = &x.data[columns.data[k]].c[0];
+            const lanes along = {v[0], v[1], v[2], 0};
+            sx += row(k, 0) * along;
+            sy += row(k, 1) * along;
+            sz += row(k, 2) * along;
+        }
+        return {sx[0] + sx[1] + sx[2], sy[0] + sy[1] + sy[2], sz[0] + sz[1] + sz[2]};
+        """
+    )
+    def row_product(
+        offsets: wp.array[int], columns: wp.array[int], values: wp.array[mat33], x: wp.array[vec3], i: int
+    ) -> vec3: ...
+
+    return row_product
+
+
+def _coarse_functions(precision: Precision) -> tuple[Any, Any]:
+    """Of the coarse space, of aggregates of `size` rows, likewise.
+
+    ``(A, x, i) -> A_i x`` of a full matrix, columns a multiple of four; and ``(offsets, columns, values, size, free,
+    places, coarse, i)``, which adds a row to the matrix. Columns of constrained components are zero, but in their own
+    rows.
+    """
+    scalar, vec3 = precision.scalar, precision.vec3
+
+    @wp.func_native(
+        f"""
+        typedef {_NAMES[precision.numpy.itemsize]} number;
+        typedef number lanes __attribute__((vector_size(4 * sizeof(number)), aligned(sizeof(number)), may_alias));
+        const int columns = x.shape[0];
+        const lanes *row = (const lanes*)(A.data + (size_t)i * columns), *v = (const lanes*)x.data;
+        // two sums, which do not wait for each other
+        lanes even = {{0, 0, 0, 0}}, odd = even;
+        for (int q = 0; q < columns / 4; ++q) (q % 2 ? odd : even) += row[q] * v[q];
+        even += odd;
+        return even[0] + even[1] + even[2] + even[3];
+        """
+    )
+    def full_row_product(A: wp.array2d[scalar], x: wp.array[scalar], i: int) -> scalar: ...
+
+    @wp.func_native(
+        _rows(precision, SINGLE)
+        + """
+        lanes* to = (lanes*)(coarse.data + (size_t)(i / size) * coarse.shape[1]);
+        auto weight = [&](int node, int mode) { return mode ? places.data[node].c[mode - 1] : number(1); };
+        // what motions of an aggregate do to the row, summed as long as the next column is of the same
+        int of = i / size;
+        lanes s[4][3] = {};
+        auto add = [&]() {
+            for (int mode = 0; mode < 4; ++mode)
+                for (int c = 0; c < 3; ++c)
+                    for (int other = 0; other < 4; ++other)
+                        to[48 * of + 12 * mode + 4 * c + other] += weight(i, mode) * free.data[i].c[c] * s[other][c];
+        };
+        for (int k = offsets.data[i]; k < offsets.data[i + 1]; ++k) {
+            const int j = columns.data[k];
+            if (j / size != of) {
+                add();
+                of = j / size;
+                for (auto& block : s)
+                    for (lanes& summed : block) summed = lanes{0, 0, 0, 0};
+            }
+            for (int other = 0; other < 4; ++other)
+                for (int c = 0; c < 3; ++c) s[other][c] += weight(j, other) * row(k, c);
+        }
+        add();
+        """
+    )
+    def add_to_coarse(
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[wp.mat33f],
+        size: int,
+        free: wp.array[vec3],
+        places: wp.array[vec3],
+        coarse: wp.array2d[scalar],
+        i: int,
+    ): ...
+
+    return full_row_product, add_to_coarse
+
+
 @cache
-def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
-    """Make (once) the kernels of a precision: conjugate gradients, and the matrix of the coarse space.
+def gradients_kernels(precision: Precision) -> KernelSet:
+    """Make (once) the kernels of a precision: `conjugate_gradients`, `coarse_matrix` of the coarse space, `copy_blocks`
+    at places in single precision, and `multiply`.
 
     `warpbrain.kernels.multicore.launch_together` runs the first. Its arguments after those of the threads: the
-    addresses of `sync` and of what gives way; the matrix by `offsets`, `columns` and `values`; the `inverse` diagonal
-    blocks if it is `preconditioned`; `b`; `x`, the first guess and the result; `r`, `p` and `Ap`, scratch like `x`;
+    addresses of `sync` and of what gives way; the matrix by `offsets`, `columns` and `values`, or a `copy` of these in
+    single precision if there is one; the `inverse` diagonal blocks; `b`; `x`, the first guess and the result; whether
+    the inverse blocks are to be used (`preconditioned`); `r`, `p` and `Ap`, scratch like `x`;
     `partial` (chunks, 4), scratch; the relative `tolerance`; the most iterations; whether to end where the matrix is
     seen not to be positive definite; `outcome` (8,): iterations, squares of the norm of the residual and of its goal,
     the least `p . A p / p . p`, and four numbers of the recurrences. Then of the coarse space: how many chunks of rows
@@ -110,10 +222,12 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
     scratch.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"multicore_gradients_{precision.name}")
+    kernels = KernelSet(f"multicore_gradients_{precision.name}")
     chunk, shares = wp.constant(CHUNK), wp.constant(_SHARES)
     start, coarse, direction = wp.constant(_START), wp.constant(_COARSE), wp.constant(_DIRECTION)
     product = wp.constant(_PRODUCT)
+    row_product, copied_row_product = _row_product(precision, precision), _row_product(precision, SINGLE)
+    full_row_product, add_to_coarse = _coarse_functions(precision)
 
     @wp.func
     def total(partial: wp.array2d[scalar], column: int):
@@ -123,22 +237,23 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
         return s
 
     @wp.func
-    def weight(place: vec3, mode: int):
-        """Of an affine motion: 1, or a coordinate."""
-        w = scalar(1.0)
-        if mode > 0:
-            w = place[mode - 1]
-        return w
-
-    @wp.func
     def restrict(t: int, r: wp.array[vec3], free: wp.array[vec3], places: wp.array[vec3], restricted: wp.array2d[vec3]):
-        for d in range(4):
-            restricted[t, d] = vec3()
+        s = vec3()
+        sx = vec3()
+        sy = vec3()
+        sz = vec3()
         for i in range(t * chunk, wp.min((t + 1) * chunk, r.shape[0])):
-            for d in range(4):
-                restricted[t, d] = restricted[t, d] + weight(places[i], d) * wp.cw_mul(free[i], r[i])
+            moved = wp.cw_mul(free[i], r[i])
+            s += moved
+            sx += places[i][0] * moved
+            sy += places[i][1] * moved
+            sz += places[i][2] * moved
+        restricted[t, 0] = s
+        restricted[t, 1] = sx
+        restricted[t, 2] = sy
+        restricted[t, 3] = sz
 
-    @wp.kernel(module=module)
+    @kernels.add
     def conjugate_gradients(
         thread: int,
         threads: int,
@@ -147,10 +262,11 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
         offsets: wp.array[int],
         columns: wp.array[int],
         values: wp.array[mat33],
-        preconditioned: int,
+        copy: wp.array[wp.mat33f],
         inverse: wp.array[mat33],
         b: wp.array[vec3],
         x: wp.array[vec3],
+        preconditioned: int,
         r: wp.array[vec3],
         p: wp.array[vec3],
         Ap: wp.array[vec3],
@@ -183,10 +299,12 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
                     rr = scalar(0.0)
                     rz = scalar(0.0)
                     for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
+                        bb += wp.dot(b[i], b[i])
                         s = b[i]
-                        bb += wp.dot(s, s)
-                        for k in range(offsets[i], offsets[i + 1]):
-                            s -= values[k] * x[columns[k]]
+                        if copy.shape[0] > 0:
+                            s -= copied_row_product(offsets, columns, copy, x, i)
+                        else:
+                            s -= row_product(offsets, columns, values, x, i)
                         r[i] = s
                         z = s
                         if preconditioned != 0:
@@ -202,32 +320,32 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
                         restrict(t, r, free, places, restricted)
             elif kind == coarse:
                 for m in range((modes * share) // all_shares, (modes * (share + 1)) // all_shares):
-                    total_of_row = scalar(0.0)
-                    for q in range(modes):
-                        total_of_row += coarse_inverse[m, q] * coarse_residual[q]
-                    coarse_solution[m] = total_of_row
+                    coarse_solution[m] = full_row_product(coarse_inverse, coarse_residual, m)
             elif kind == direction:
                 beta = outcome[6]
-                for i in range(first * chunk, wp.min(last * chunk, rows)):
-                    z = Ap[i]
+                for t in range(first, last):
                     if modes > 0:
-                        m = 12 * (i // (chunk * aggregate))
-                        motion = vec3()
-                        for d in range(4):
-                            motion += weight(places[i], d) * vec3(
-                                coarse_solution[m], coarse_solution[m + 1], coarse_solution[m + 2]
-                            )
-                            m += 3
-                        z += wp.cw_mul(free[i], motion)
-                    p[i] = z + beta * p[i]
+                        m = 12 * (t // aggregate)
+                        shift = vec3(coarse_solution[m], coarse_solution[m + 1], coarse_solution[m + 2])
+                        by_x = vec3(coarse_solution[m + 3], coarse_solution[m + 4], coarse_solution[m + 5])
+                        by_y = vec3(coarse_solution[m + 6], coarse_solution[m + 7], coarse_solution[m + 8])
+                        by_z = vec3(coarse_solution[m + 9], coarse_solution[m + 10], coarse_solution[m + 11])
+                        for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
+                            motion = shift + places[i][0] * by_x + places[i][1] * by_y + places[i][2] * by_z
+                            p[i] = Ap[i] + wp.cw_mul(free[i], motion) + beta * p[i]
+                    else:
+                        for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
+                            p[i] = Ap[i] + beta * p[i]
             elif kind == product:
                 for t in range(first, last):
                     pAp = scalar(0.0)
                     pp = scalar(0.0)
                     for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
                         s = vec3()
-                        for k in range(offsets[i], offsets[i + 1]):
-                            s += values[k] * p[columns[k]]
+                        if copy.shape[0] > 0:
+                            s = copied_row_product(offsets, columns, copy, p, i)
+                        else:
+                            s = row_product(offsets, columns, values, p, i)
                         Ap[i] = s
                         pAp += wp.dot(p[i], s)
                         pp += wp.dot(p[i], p[i])
@@ -292,31 +410,44 @@ def gradients_kernels(precision: Precision) -> tuple[Any, Any]:
                 _begin_pass(threads, sync, go_on)
             taken = _take(thread, threads, sync, give_way)
 
-    @wp.kernel(module=module)
+    @kernels.add
     def coarse_matrix(
         start: int,
         offsets: wp.array[int],
         columns: wp.array[int],
-        values: wp.array[mat33],
+        values: wp.array[wp.mat33f],
         aggregate: int,
-        modes: int,
         free: wp.array[vec3],
         places: wp.array[vec3],
-        coarse: wp.array2d[mat33],
+        coarse: wp.array2d[scalar],
     ):
         g = start + wp.tid()
         size = chunk * aggregate
         for m in range(coarse.shape[1]):
-            coarse[g, m] = mat33()
+            coarse[g, m] = scalar(0.0)
         for i in range(g * size, wp.min((g + 1) * size, free.shape[0])):
-            for k in range(offsets[i], offsets[i + 1]):
-                j = columns[k]
-                A = wp.cw_mul(values[k], wp.outer(free[i], free[j]))
-                m = 16 * (j // size)
-                for d in range(modes):
-                    for e in range(modes):
-                        w = weight(places[i], d) * weight(places[j], e)
-                        coarse[g, m] = coarse[g, m] + w * A
-                        m += 1
+            add_to_coarse(offsets, columns, values, size, free, places, coarse, i)
 
-    return conjugate_gradients, coarse_matrix
+    @kernels.add
+    def copy_blocks(start: int, places: wp.array[int], values: wp.array[mat33], copies: wp.array[wp.mat33f]):
+        k = start + wp.tid()
+        A = values[places[k]]
+        copy = wp.mat33f()
+        for i in range(3):
+            for j in range(3):
+                copy[i, j] = wp.float32(A[i, j])
+        copies[k] = copy
+
+    @kernels.add
+    def multiply(
+        start: int,
+        offsets: wp.array[int],
+        columns: wp.array[int],
+        values: wp.array[mat33],
+        x: wp.array[vec3],
+        z: wp.array[vec3],
+    ):
+        i = start + wp.tid()
+        z[i] = row_product(offsets, columns, values, x, i)
+
+    return kernels

@@ -22,6 +22,7 @@ from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.model import require_held
 from warpbrain.simulation.multisecant import Multisecant
 from warpbrain.simulation.system import System
+from warpbrain.threads import one_thread_of_blas
 
 #: Out-of-balance force, relative, from which on steps say something of the steps to come.
 _NEAR = 0.1
@@ -217,7 +218,8 @@ class EquilibriumSolver:
         u = np.zeros_like(full) if start is None else np.array(start, dtype=np.float64)
         self.system.set_time_step(math.inf)
         self.system.forget()
-        return self._follow(u, full, model.prescribed if prescribed is None else prescribed)
+        with one_thread_of_blas():
+            return self._follow(u, full, model.prescribed if prescribed is None else prescribed)
 
     def linear_estimate(self) -> Floats:
         """Displacement (n, 3) [m] at full load if the body kept the stiffness that it has at rest.
@@ -281,10 +283,14 @@ class EquilibriumSolver:
         require_held(model)
         self.system.set_time_step(time_step)
         prescribed = model.prescribed_at(time, 1.0) if prescribed is None else prescribed
-        return self._follow(np.array(start, dtype=np.float64), model.external_forces(time), prescribed, time)
+        with one_thread_of_blas():
+            return self._follow(np.array(start, dtype=np.float64), model.external_forces(time), prescribed, time)
 
     def _follow(self, u: Floats, full: Floats, prescribed: Floats, time: float | None = None) -> Equilibrium:
-        """Go from a state to full load; at a time, what acts is all there and only what is prescribed moves."""
+        """Go from a state to full load; at a time, what acts is all there and only what is prescribed moves.
+
+        With one thread of BLAS: a sum over nodes takes less than to wake others, and bits would depend on their number.
+        """
         model = self.system.model
         origin = np.where(model.constrained, u, 0.0)
         self._history = []
@@ -349,12 +355,17 @@ class EquilibriumSolver:
         previous = np.inf
         forcing = options.cg_tolerance
         shift = 0.0
+        # whether the last step should have led to balance: then there is no need of a tangent
+        closes = False
         # of forces without a potential the linear solver has a part of the tangent
         secants = None if all(term.conservative for term in system.terms) else Multisecant()
         for iteration in range(1, options.max_newton + 1):
             with self.clock.phase("internal forces"):
                 system.u.assign(u)
-                system.evaluate_tangents()
+                if closes:
+                    system.evaluate_forces()
+                else:
+                    system.evaluate_tangents()
                 system.gather_forces()
             internal = system.internal.numpy().astype(np.float64)
             r = self._free * (external - internal)
@@ -369,6 +380,9 @@ class EquilibriumSolver:
                 raise _StepFailed("the out-of-balance force is not finite")
             if not moving and relative <= self.tolerance:
                 return u, potential + float(np.vdot(external, u)), relative
+            if closes:
+                with self.clock.phase("internal forces"):
+                    system.evaluate_tangents()
             # Eisenstat-Walker: as exact as Newton's own error deserves, and no more exact than the goal needs
             if moving:
                 eta = min(options.cg_tolerance, 1e-3)
@@ -377,6 +391,7 @@ class EquilibriumSolver:
                 eta = min(options.cg_tolerance, max(0.9 * ratio**2, 0.9 * forcing**2 if forcing**2 > 0.1 else 0.0))
                 eta = max(eta, 0.3 * self.tolerance / relative, 20.0 * system.precision.epsilon)
             forcing, previous = eta, np.inf if moving else norm
+            closes = not moving and eta * relative <= self.tolerance
             if len(self._history) >= options.max_total_newton:
                 raise _StepFailed(
                     f"not in balance yet (relative residual {relative:.1e}, goal {self.tolerance:.1e})"

@@ -47,8 +47,9 @@ _CHANGES = 20
 _FARTHEST = 0.2
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
-#: Columns that one thread computes at a time: of dense forces, and of sparse ones.
-_TOGETHER, _TOGETHER_SPARSE = 64, 8
+#: Columns that one thread computes at a time: of dense forces, and of sparse ones at most; few of these are in so many
+#: parts.
+_TOGETHER, _TOGETHER_SPARSE, _PARTS = 64, 128, 16
 
 
 class HeldSurface:
@@ -330,7 +331,7 @@ class Linearisation:
         if "_rows" in self.__dict__ or self._equilibria >= len(self.sensors):
             rows, which = self._rows
             answers = np.empty((len(rows), count))
-            together = _TOGETHER_SPARSE if issparse(forces) else _TOGETHER
+            together = min(_TOGETHER_SPARSE, 1 + count // _PARTS) if issparse(forces) else _TOGETHER
             fill_columns(answers, lambda columns: rows @ forces[:, columns], together)
             return answers[which]
         forces = forces.toarray() if issparse(forces) else forces
