@@ -48,7 +48,7 @@ def test_a_defect_is_seen(killing_builds, monkeypatch):
     def in_place(path):
         yield path
 
-    monkeypatch.setattr("warpbrain.cases.building.pipeline.whole_file", in_place)
+    monkeypatch.setattr("warpbrain.atomic.whole_file", in_place)
     monkeypatch.setattr("warpbrain.mesh.files.whole_file", in_place)
     found = [killing_builds(seed) for seed in range(12)]
     assert any("is neither old nor new" in killed.defect for killed in found)

@@ -10,6 +10,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from warpbrain.diagnosis.result import Fit, Ranked, effect_sentence, sentence_of
+from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import Smallest, Value
@@ -113,7 +114,9 @@ def test_every_verdict_is_said(verdict, data):
         assert said[1:].rstrip(".") in text
 
 
-@pytest.mark.parametrize(("nothing", "chance"), [(0.02, "below 3 %"), (0.4, "40 %")])
+@pytest.mark.parametrize(
+    ("nothing", "chance"), [(0.001, f"below {1.0 - calibration().most_said:.0%}".replace("%", " %")), (0.4, "40 %")]
+)
 def test_a_p_value_that_sees_nothing_is_no_reason_for_something_missing(nothing, chance):
     words = Words("these data", "", "", [], "", [], ["tissue drains"], nothing)
     unseen = verdict_in_words(Decision("cannot say", ("drainage",)), 1.0, 0.05, {}, words)

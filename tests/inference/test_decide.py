@@ -94,7 +94,7 @@ def test_a_name_needs_the_probability_that_its_losses_say():
     least = 1.0 - LOSSES["cannot say"] / LOSSES["false name"]
     others = tuple(((f"cause {k}",), 0.0) for k in range(3))
     # a little more than that: a group of two costs less than a name that is as good as any
-    for chance, named in ((0.5 * (1.0 + least), True), (least - 0.05, False)):
+    for chance, named in ((0.75 + 0.25 * least, True), (least - 0.05, False)):
         rest = (1.0 - chance) / len(others)
         spread = tuple((causes, rest) for causes, _ in others)
         assert (verdict((("traction",), chance), *spread).verdict == NAMED) == named

@@ -7,7 +7,7 @@ weighed in the linear model about its fit, where what acts already is as large a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import partial
@@ -30,7 +30,7 @@ from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads, one_thread_of_blas
 from warpbrain.worlds.body.base import Base, BaseFinder
-from warpbrain.worlds.body.causes import causes_of, not_physics_at, visible
+from warpbrain.worlds.body.causes import BodyCauses, causes_of, not_physics_at, visible
 from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit, candidates_at, dictionary_of
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
@@ -298,22 +298,42 @@ class HypothesisSearch:
     def _weigh_supersets(self, fitted: WeightedSet, refit: Refit) -> None:
         """Weigh every set of one cause more than a fitted one in the linear model about its fit."""
         self._listener.stage(f"what acts beside {' and '.join(sorted(fitted.names))}")
-        noise_factor = fitted.marginal.noise.noise_factor
-        model = GaussianModel(noise_factor, fitted.columns)
-        places = likely_places(model, fitted.residual, self.causes.causes, _PLACES_ABOUT_FIT)
+        marginal, noise_factors = fitted.marginal, [fitted.marginal.noise.noise_factor / fitted.marginal.scale]
+        if marginal.gross.any():
+            # what acts beside may be what moved them
+            noise_factors.append(marginal.model.noise_factor)
+        models = [GaussianModel(marginal.scale * factor, fitted.columns) for factor in noise_factors]
+        likely = [likely_places(m, fitted.residual, self.causes.causes, _PLACES_ABOUT_FIT) for m in models]
+        places = {name: np.unique([each[name] for each in likely]) for name in likely[0]}
         candidates = candidates_about_fit(refit.state, fitted.effects, self.candidates, places)
         self._expanded[fitted.names] = candidates.source
         causes = causes_of(self.base, candidates)
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
-        causes = visible(causes, fitted.marginal.model)
-        unscaled = GaussianModel(noise_factor / fitted.marginal.scale, fitted.columns)
+        causes = visible(causes, marginal.model)
+        best: dict[frozenset[str], WeightedSet] = {}
+        for factor in noise_factors:
+            for superset in self._supersets(fitted, causes, candidates.source, GaussianModel(factor, fitted.columns)):
+                other = best.get(superset.names)
+                if other is None or superset.hypothesis.log_evidence > other.hypothesis.log_evidence:
+                    best[superset.names] = superset
+        for names, superset in best.items():
+            known = self._sets.get(names)
+            if known is None or known.refit is None:
+                self._sets[names] = superset
+
+    def _supersets(
+        self, fitted: WeightedSet, causes: BodyCauses, source: Effects, unscaled: GaussianModel
+    ) -> Iterator[WeightedSet]:
+        """The most probable sets of one cause more than a fitted one, with that at the best place under a noise.
+
+        `unscaled`: model of the rows with the fitted causes, at a scale of one.
+        """
         screened = posterior(unscaled, fitted.residual, causes.causes, _search(most=1))
         hypotheses = [hypothesis for hypothesis in _most_probable(screened, singles=False) if hypothesis.causes]
-        source, placed = candidates.source, len(fitted.effects)
 
         def work(hypothesis: Hypothesis) -> WeightedSet:
             candidate = weigh(self.base, hypothesis, causes, unscaled, fitted)
-            return with_refined_places(self.base, candidate, self.spacing, source, placed)
+            return with_refined_places(self.base, candidate, self.spacing, source, len(fitted.effects))
 
         for hypothesis, candidate in zip(hypotheses, in_threads(work, hypotheses), strict=True):
             # both with gross errors of their own
@@ -326,10 +346,7 @@ class HypothesisSearch:
                 log_prior=hypothesis.log_prior + fitted.hypothesis.log_prior,
                 log_evidence=fitted.hypothesis.log_evidence + gain,
             )
-            superset = replace(candidate, hypothesis=joint, inherited_gain=None)
-            known = self._sets.get(superset.names)
-            if known is None or known.refit is None:
-                self._sets[superset.names] = superset
+            yield replace(candidate, hypothesis=joint, inherited_gain=None)
 
 
 def _of_all_places(gain: float, log_share: float) -> float:
