@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom, multivariate_normal
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.predict import log_factors_of_fields, predict, predictive_p
+from warpbrain.inference.predict import FieldFactors, predict, predictive_p
 
 N = 24
 
@@ -42,7 +42,7 @@ def test_fields_are_weighed_as_their_densities(model):
         for size in sizes
     ]
     expected = np.logaddexp.reduce(logs, axis=0) - np.log(len(logs))
-    np.testing.assert_allclose(log_factors_of_fields(model, fields, sizes, residuals), expected, atol=1e-9)
+    np.testing.assert_allclose(FieldFactors(model, fields, sizes).of(residuals), expected, atol=1e-9)
 
 
 def test_the_null_rate_is_what_it_says(model, verify):

@@ -14,7 +14,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.gaussian import GaussianModel
 
-#: Standard errors that a p-value is to be away from a level, and how many times the draws are made for that at most.
+#: Standard errors between a p-value and a level it is compared with, and by how much draws may be multiplied for that.
 _DEVIATIONS, _MOST_DRAWS = 3.0, 16
 
 
@@ -84,28 +84,37 @@ def predict_with(
     return tuple(predictions)
 
 
-def log_factors_of_fields(
-    model: GaussianModel, fields: Sequence[Floats], sizes: Floats, residuals: Floats, weights: Floats | None = None
-) -> Floats:
-    """Log Bayes factor (d,) of a mixture of fields and sizes over none.
+class FieldFactors:
+    """Log Bayes factor of a mixture of fields and sizes over none; what depends on the fields alone is computed once.
 
-    `fields` (n, k). `sizes` (s,): factors on the columns of a field, all equally probable. `residuals` (n, d).
-    `weights` (f,): log probability of each field; equal unless given.
+    `fields` (n, k). `sizes` (s,): factors on the columns of a field, all equally probable. `weights` (f,): log
+    probability of each field; equal unless given.
     """
-    white = model.standardised(residuals)
-    weights = np.full(len(fields), -np.log(len(fields))) if weights is None else weights
-    logs = []
-    # all fields at once: one by one, thousands of small products take several times as long
-    ends = np.cumsum([field.shape[1] for field in fields])[:-1]
-    standardised = np.split(model.standardised(np.concatenate(fields, axis=1)), ends, axis=1)
-    for Z, weight in zip(standardised, weights.tolist(), strict=True):
-        values, vectors = np.linalg.eigh(Z.T @ Z)
-        values = np.maximum(values, 0.0)
-        squares = ((Z @ vectors).T @ white) ** 2
-        for size in sizes.tolist():
-            ratio = size**2 / (1.0 + size**2 * values)
-            logs.append(weight + 0.5 * (ratio @ squares) - 0.5 * float(np.log1p(size**2 * values).sum()))
-    return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(sizes)))
+
+    def __init__(
+        self, model: GaussianModel, fields: Sequence[Floats], sizes: Floats, weights: Floats | None = None
+    ) -> None:
+        self._model, self._sizes = model, sizes
+        self._weights = np.full(len(fields), -np.log(len(fields))) if weights is None else weights
+        # all fields at once: one by one, thousands of small products take several times as long
+        ends = np.cumsum([field.shape[1] for field in fields])[:-1]
+        standardised = np.split(model.standardised(np.concatenate(fields, axis=1)), ends, axis=1)
+        #: Of each field the eigenvalues (k,) of its Gram matrix, and its principal directions (n, k).
+        self._principal = []
+        for Z in standardised:
+            values, vectors = np.linalg.eigh(Z.T @ Z)
+            self._principal.append((np.maximum(values, 0.0), Z @ vectors))
+
+    def of(self, residuals: Floats) -> Floats:
+        """Log Bayes factor (d,) of residuals (n, d)."""
+        white = self._model.standardised(residuals)
+        logs = []
+        for (values, directions), weight in zip(self._principal, self._weights.tolist(), strict=True):
+            squares = (directions.T @ white) ** 2
+            for size in self._sizes.tolist():
+                ratio = size**2 / (1.0 + size**2 * values)
+                logs.append(weight + 0.5 * (ratio @ squares) - 0.5 * float(np.log1p(size**2 * values).sum()))
+        return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(self._sizes)))
 
 
 def predictive_p(
@@ -118,16 +127,16 @@ def predictive_p(
     weights: Floats | None = None,
     levels: Sequence[float] = (),
 ) -> float:
-    """Probability that the Bayes factor of `log_factors_of_fields` is as large in rows drawn from the model.
+    """Probability that the Bayes factor of the fields (`FieldFactors`) is as large in rows drawn from the model.
 
-    `draws`: of rows, at first; as many again as there are until each of the `levels` that it is compared with is
-    farther off than what draws leave uncertain, or there are `_MOST_DRAWS` times as many.
+    `draws` rows are drawn, and then as many again as there are, until the p-value is `_DEVIATIONS` standard errors away
+    from each of the `levels` that it will be compared with; `_MOST_DRAWS` times `draws` at most.
     """
-    observed = log_factors_of_fields(model, fields, sizes, residual[:, None], weights)[0]
-    drawn = np.zeros(0)
+    factors = FieldFactors(model, fields, sizes, weights)
+    observed, drawn = factors.of(residual[:, None])[0], np.zeros(0)
     while True:
         rows = model.draws(max(draws, len(drawn)), random)
-        drawn = np.concatenate([drawn, log_factors_of_fields(model, fields, sizes, rows, weights)])
+        drawn = np.concatenate([drawn, factors.of(rows)])
         p = p_value(observed, drawn)
         uncertain = _DEVIATIONS * np.sqrt(p * (1.0 - p) / len(drawn))
         if all(abs(p - level) > uncertain for level in levels) or len(drawn) >= _MOST_DRAWS * draws:

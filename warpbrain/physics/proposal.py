@@ -115,6 +115,11 @@ class Tests:
     compression: bool
 
 
+def modes_between(times: Floats, modes: Floats, at: float | Floats) -> Floats:
+    """Modes (m, r) at times (m,) [s], increasing, linear between these: at times (...) [s], (..., r)."""
+    return np.stack([np.interp(at, times, mode) for mode in modes.T], axis=-1)
+
+
 @dataclass(frozen=True, eq=False)
 class Varying:
     """Coefficients of a proposal that are smooth functions of time.
@@ -133,7 +138,7 @@ class Varying:
 
     def modes_at(self, time: float | Floats) -> Floats:
         """Modes at times (...) [s], linear between the known ones: (..., r)."""
-        return np.stack([np.interp(time, self.times, mode) for mode in self.modes.T], axis=-1)
+        return modes_between(self.times, self.modes, time)
 
     def at(self, c: Floats, time: float) -> Floats:
         """Coefficients (k,) of what acts at a time."""

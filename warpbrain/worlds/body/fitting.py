@@ -33,7 +33,7 @@ from warpbrain.worlds.body.weighted_set import MeshShare, Refit, evidence_of, ex
 _ITERATIONS, _HALVINGS = 20, 6
 #: How far [standard deviations] coordinates go until columns are made anew.
 _RELINEARISE = 0.3
-#: The same where the search ends: which step is the last one, rounding may decide, and it must not matter.
+#: The same at the end of a search: rounding decides which step is the last one, and the result must not depend on it.
 _NEAR = 0.1
 #: Step [standard deviations] of a difference between states.
 _DIFFERENCE = 0.05
@@ -42,7 +42,7 @@ _KEPT = 9
 #: Steps that are expected to gain less of the log posterior density than this end the search (half the square of
 #: Newton's decrement, Boyd and Vandenberghe 2004, section 9.5.1).
 _ENOUGH = 0.02
-#: Part of what a step was expected to gain below which columns that were made elsewhere are made anew.
+#: Part of the expected gain of a step; where less is gained, columns that were made about another point are made anew.
 _AGREES = 0.5
 #: By how much an error of the mesh changes that is worth going on [standard deviations: of the noise, all sensors
 #: together, and of what is not known of that error].
@@ -95,7 +95,7 @@ class FitSearch:
         self._course: tuple[Floats, ...] = ()
         self.columns = columns
         # columns of the shape of laws about the state that was linearised last
-        self._laws_there = columns[:, self._layout.law]
+        self._law_columns = columns[:, self._layout.law]
         self.state, self.converged = base.state, False
         self.z, self.residual, self._best = np.zeros(self.columns.shape[1]), np.zeros(len(self._U)), np.inf
 
@@ -156,13 +156,13 @@ class FitSearch:
                 return
 
     def minimise(self) -> None:
-        """Go to the best point nearby, where what the shape of laws does is that of the point."""
+        """Go to the nearest optimum, with columns of the shape of laws about that optimum."""
         for _ in range(_ROUNDS):
-            self._minimise_with_these_laws()
+            self._minimise_at_fixed_laws()
             if not self._update_laws():
                 return
 
-    def _minimise_with_these_laws(self) -> None:
+    def _minimise_at_fixed_laws(self) -> None:
         """Go to the best point nearby by Gauss-Newton's method, with columns made anew on the way.
 
         Where something relaxes, columns of a state that does not help are replaced by differences of states: tissue
@@ -276,12 +276,11 @@ class FitSearch:
         )
 
     def _update_laws(self) -> bool:
-        """Take what the shape of laws does where it was linearised last; whether it was taken elsewhere before.
+        """Replace the columns of the shape of laws by those of the last linearisation; whether they differ.
 
-        It acts linearly, and stays as it is while a best point is looked for: otherwise the objective would be another
-        one at each point.
+        While an optimum is looked for they are fixed: renewed on the way, they would change the objective.
         """
-        law, columns = self._layout.law, self._laws_there
+        law, columns = self._layout.law, self._law_columns
         before = self._U[:, law]
         if np.array_equal(before, columns):
             return False
@@ -389,7 +388,7 @@ class FitSearch:
         return state
 
     def _relinearise(self) -> None:
-        """Make the columns of tissue, field and mechanisms anew at the best point; not where these are not linear."""
+        """Make the columns of tissue, field and mechanisms anew at the best point, unless nothing is linear there."""
         self._linearised_at, self._outdated = self.z, False
         base, share = self._base, self._mesh_share
         try:
@@ -399,7 +398,7 @@ class FitSearch:
         except SolveError:
             return
         law = self._layout.law
-        self._nearby, self._laws_there = at, columns[:, law].copy()
+        self._nearby, self._law_columns = at, columns[:, law].copy()
         columns[:, law] = self._U[:, law]
         self.columns = columns
 

@@ -121,9 +121,7 @@ class HypothesisSearch:
             screened = posterior(model, base.residual, self._visible.causes, _search(most=2))
             work = partial(weigh, base, causes=self._visible, screened=model)
             for candidate in in_threads(work, _most_probable(screened)):
-                known = self._sets.get(candidate.names)
-                if known is None or candidate.hypothesis.log_evidence > known.hypothesis.log_evidence:
-                    self._sets[candidate.names] = candidate
+                _keep_better(self._sets, candidate)
         # a local cause that has been missed by half a cell seems to do nothing
         singles = [
             candidate for candidate in self._sets.values() if len(candidate.mechanisms) == len(candidate.names) == 1
@@ -313,9 +311,7 @@ class HypothesisSearch:
         best: dict[frozenset[str], WeightedSet] = {}
         for factor in noise_factors:
             for superset in self._supersets(fitted, causes, candidates.source, GaussianModel(factor, fitted.columns)):
-                other = best.get(superset.names)
-                if other is None or superset.hypothesis.log_evidence > other.hypothesis.log_evidence:
-                    best[superset.names] = superset
+                _keep_better(best, superset)
         for names, superset in best.items():
             known = self._sets.get(names)
             if known is None or known.refit is None:
@@ -347,6 +343,13 @@ class HypothesisSearch:
                 log_evidence=fitted.hypothesis.log_evidence + gain,
             )
             yield replace(candidate, hypothesis=joint, inherited_gain=None)
+
+
+def _keep_better(sets: dict[frozenset[str], WeightedSet], candidate: WeightedSet) -> None:
+    """Put a set among others by its names, unless the same is there with as much evidence."""
+    known = sets.get(candidate.names)
+    if known is None or candidate.hypothesis.log_evidence > known.hypothesis.log_evidence:
+        sets[candidate.names] = candidate
 
 
 def _of_all_places(gain: float, log_share: float) -> float:

@@ -21,7 +21,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
-from warpbrain.physics.proposal import Proposal, Varying
+from warpbrain.physics.proposal import Proposal, Varying, modes_between
 from warpbrain.worlds.body.sensors import Sensors
 
 AT_ONCE, EVENLY, SLOWER = "all at once", "growing evenly", "growing ever more slowly"
@@ -79,7 +79,7 @@ def modes_of_rows(times: Sequence[float], sensors: Sensors) -> Floats:
     """Modes (n, r) on rows of a cause that changes from one of several times [s] to the next."""
     ends, modes = finite_times(np.array(times)), modes_of(len(times))
     seconds = finite_times(np.concatenate([sensors.times, sensors.references]))
-    return _since_reference(np.stack([np.interp(seconds, ends, mode) for mode in modes.T], axis=1), sensors)
+    return _since_reference(modes_between(ends, modes, seconds), sensors)
 
 
 def _since_reference(factors: Floats, sensors: Sensors) -> Floats:
