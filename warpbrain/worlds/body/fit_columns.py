@@ -16,7 +16,7 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.nuisances import LAW, Nuisances, field_columns, law_columns, mesh_by_tissue, tissue_columns
 from warpbrain.worlds.body.sensors import Sensors
-from warpbrain.worlds.body.states import SolvedState
+from warpbrain.worlds.body.states import SolvedState, States
 from warpbrain.worlds.body.weighted_set import MeshShare, Refit
 
 
@@ -54,10 +54,7 @@ def columns_about(
     mesh_errors: MeshErrors | None,
     mesh_share: MeshShare | None,
 ) -> tuple[Floats, Linearisation]:
-    """Columns of tissue, field, law and mechanisms about a state; the others as they are.
-
-    What the shape of a law does is next to nothing where strains are small: about the base, which nothing but declared
-    loads deforms. It is not where a mechanism strains tissue by half, and would be taken for a cause.
+    """Columns of tissue, field and mechanisms about a state; the others as they are.
 
     `z` (q,): its coordinates. `columns` (n, q): about another state. `mesh_share`: that is taken off the residuals.
     Returns columns (n, q), and the linear model. `SolveError` if the state is unstable or a mechanism not linear there.
@@ -68,7 +65,6 @@ def columns_about(
     columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)
     columns[:, layout.field] = relaxed * field_columns(at, base.states)
     made = Effects(at, mesh_errors=mesh_errors)
-    columns[:, layout.law] = relaxed * law_columns(made, base.states)
     first = layout.coefficients.start
     for effect, part in zip(effects, layout.effects, strict=True):
         c = effect.coefficients(z[part])
@@ -96,9 +92,26 @@ def with_laws_about(fit: Refit, nuisances: Nuisances, sensors: Sensors, base: Ba
         at = fit.state.linearised(sensors)
     except SolveError:
         return columns
-    relaxed = _relaxation_factor(fit.effects, fit.coefficients, sensors)
-    columns[:, nuisances.part(LAW)] = relaxed * law_columns(Effects(at, mesh_errors=base.mesh_errors), base.states)
+    columns[:, nuisances.part(LAW)] = law_columns_about(
+        at, fit.effects, fit.coefficients, base.states, base.mesh_errors
+    )
     return columns
+
+
+def law_columns_about(
+    at: Linearisation,
+    effects: Sequence[Effect],
+    coefficients: Sequence[Floats],
+    states: States,
+    mesh_errors: MeshErrors | None,
+) -> Floats:
+    """Columns (n, k) of the shape of laws about a state with effects that have these coefficients.
+
+    What that does is next to nothing where strains are small: about the base, which nothing but declared loads deforms.
+    It is not where a mechanism strains tissue by half, and would be taken for a cause.
+    """
+    relaxed = _relaxation_factor(effects, coefficients, at.sensors)
+    return relaxed * law_columns(Effects(at, mesh_errors=mesh_errors), states)
 
 
 def _relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats], sensors: Sensors) -> Floats:

@@ -3,7 +3,8 @@
 Gauss-Newton's method on standard normal coordinates: those of tissue, field and mechanisms act through an equilibrium,
 those of other nuisances linearly. Columns are made anew where the coordinates have moved away from. The evidence is
 Laplace's: that of the linear model about the best point, summed over the scale of the noise and over gross errors as in
-screening. A fit is repeated with the noise and the error of the mesh that it arrives at.
+screening. What the shape of laws does, the error of the mesh, noise and gross errors stay as they are while a best
+point is looked for, and are then taken from there, until that changes nothing; as long as it does, searches are rough.
 """
 
 from __future__ import annotations
@@ -23,14 +24,18 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
-from warpbrain.worlds.body.fit_columns import Layout, columns_about
+from warpbrain.worlds.body.fit_columns import Layout, columns_about, law_columns_about
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 from warpbrain.worlds.body.weighted_set import MeshShare, Refit, evidence_of, excess_error, mesh_share_of
 
-_ITERATIONS, _HALVINGS = 20, 6
+_ITERATIONS = 20
+#: Trials along a step; along one from columns that were made elsewhere, which may point uphill.
+_TRIALS, _TRIALS_ELSEWHERE = 6, 2
+#: Part of a step that is tried next, at least and at most.
+_SHORTER, _SHORT = 0.1, 0.5
 #: How far [standard deviations] coordinates go until columns are made anew.
 _RELINEARISE = 0.3
 #: The same at the end of a search: rounding decides which step is the last one, and the result must not depend on it.
@@ -40,17 +45,20 @@ _DIFFERENCE = 0.05
 #: Earlier states from which the next one is extrapolated at most.
 _KEPT = 9
 #: Steps that are expected to gain less of the log posterior density than this end the search (half the square of
-#: Newton's decrement, Boyd and Vandenberghe 2004, section 9.5.1).
-_ENOUGH = 0.02
+#: Newton's decrement, Boyd and Vandenberghe 2004, section 9.5.1); the same as long as laws, error of the mesh and noise
+#: are those of another point.
+_ENOUGH, _ROUGHLY = 0.02, 1.0
 #: Part of the expected gain of a step; where less is gained, columns that were made about another point are made anew.
 _AGREES = 0.5
 #: By how much an error of the mesh changes that is worth going on [standard deviations: of the noise, all sensors
 #: together, and of what is not known of that error].
 _MATTERS = 0.3
-#: How often at most a fit is repeated with laws, error of the mesh, gross errors and noise of its result.
-_ROUNDS = 3
-#: Change of the log evidence below which the fit is not repeated again.
-_SAME = 0.1
+#: How often at most a search goes on with laws, error of the mesh, gross errors and noise of its result.
+_ROUNDS = 8
+#: Gain that is expected of a step of which none comes, where that may be rounding.
+_ROUNDING = 0.1
+#: Part of what these have changed of the log posterior density to which the next search is exact.
+_PART = 0.1
 #: What is raised of a set that cannot be fitted.
 CANNOT_BE_FITTED = (SolveError, InputError, np.linalg.LinAlgError, FloatingPointError)
 
@@ -94,8 +102,12 @@ class FitSearch:
         # of the last state of this fit that was followed over time
         self._course: tuple[Floats, ...] = ()
         self.columns = columns
-        # columns of the shape of laws about the state that was linearised last
-        self._law_columns = columns[:, self._layout.law]
+        # the linear model about the last state that had one, the coefficients of effects there, and whether the
+        # columns of the shape of laws are of that
+        self._about: tuple[Linearisation, tuple[Floats, ...]] | None = None
+        self._laws_are_about = True
+        # where the error of the mesh was computed last
+        self._mesh_error_at: Floats | None = None
         self.state, self.converged = base.state, False
         self.z, self.residual, self._best = np.zeros(self.columns.shape[1]), np.zeros(len(self._U)), np.inf
 
@@ -155,18 +167,13 @@ class FitSearch:
             if not self._accept_if_better(between, *self._evaluate(between, self.state)):
                 return
 
-    def minimise(self) -> None:
-        """Go to the nearest optimum, with columns of the shape of laws about that optimum."""
-        for _ in range(_ROUNDS):
-            self._minimise_at_fixed_laws()
-            if not self._update_laws():
-                return
-
-    def _minimise_at_fixed_laws(self) -> None:
+    def minimise(self, enough: float = _ENOUGH) -> None:
         """Go to the best point nearby by Gauss-Newton's method, with columns made anew on the way.
 
         Where something relaxes, columns of a state that does not help are replaced by differences of states: tissue
         that is several times as stiff at first is no small change of what it is in the end.
+
+        `enough`: what a step has to gain to be taken.
         """
         self.converged, by_differences, elsewhere = False, False, np.full(len(self.z), np.inf)
         for iteration in range(_ITERATIONS):
@@ -176,20 +183,19 @@ class FitSearch:
                     self.columns = self._difference_columns()
             self.columns = self._rigid.renewed(self.columns, self.state.sensors, self.z)
             (step, gain), current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
-            if gain < _ENOUGH:
+            if gain < enough:
                 self.converged = not _NEAR < self._moved() < np.inf
-                if self.converged:
+                if self.converged or enough > _ENOUGH:
                     return
                 self._linearised_at = elsewhere
                 continue
-            before = self._best
-            gained = before - self._best if self._line_search(step) else 0.0
+            gained = self._line_search(step, gain, _TRIALS if current else _TRIALS_ELSEWHERE)
             if not current and gained < _AGREES * gain:
                 # columns that were made elsewhere may point uphill
                 self._linearised_at = elsewhere
             elif gained < _ENOUGH:
                 # what is left is rounding, or no better point lies this way: the last good one stands
-                self.converged = gain < _SAME
+                self.converged = gain < _ROUNDING
                 relaxing = any(effect.proposed.history for effect in self.effects)
                 if self.converged or by_differences or not relaxing:
                     return
@@ -199,8 +205,12 @@ class FitSearch:
         """How far the best point is from where its columns were made [standard deviations]; infinite if not known."""
         return float(np.abs(self.z - self._linearised_at)[self._layout.nonlinear].max(initial=0.0))
 
-    def update_noise(self, fit: Refit) -> bool:
-        """Take noise, gross errors and the mesh's unknown error of a result; whether it was fitted with others."""
+    def expected_gain(self) -> float:
+        """Of the log posterior density by another step, in the linear model."""
+        return self._gauss_newton_step(False)[1]
+
+    def update_noise(self, fit: Refit) -> None:
+        """Take noise, gross errors and the mesh's unknown error of a result."""
         marginal, nuisances = fit.marginal, self._base.nuisances
         same = marginal.scale == self._marginal.scale and np.array_equal(marginal.gross, self._marginal.gross)
         same &= marginal.model.noise_factor is self._marginal.model.noise_factor
@@ -217,13 +227,11 @@ class FitSearch:
         if not same:
             self._best = np.inf
             self._accept_if_better(self.z, self.state, self.residual)
-        return not same
 
-    def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> bool:
-        """Compute the mechanisms' share of the mesh's error at the best point; whether it is another than was known.
+    def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> None:
+        """Compute the mechanisms' share of the mesh's error at the best point, where a finer mesh tells it.
 
-        None is known to be another where a finer mesh does not tell. It is in proportion to the mechanisms: where
-        these have hardly changed it is not computed again.
+        It is in proportion to the mechanisms: where these have hardly changed it is not computed again.
         """
         coefficients, prior = [self.z[part] for part in self._layout.effects], self._base.prior
         least = _MATTERS * belief("mesh.share")
@@ -231,12 +239,12 @@ class FitSearch:
             offsets = [effect.offset(z) for effect, z in zip(self.effects, coefficients, strict=True)]
             moved = float(np.linalg.norm(self.z[self._layout.coefficients] - self._share_computed_at))
             if moved <= least * float(np.linalg.norm(np.concatenate(offsets))):
-                return False
+                return
         before, z = self._mesh_share, self.z[self._layout.coefficients]
         share = mesh_share_of(self.effects, coefficients, self.state, known, finer, prior)
         self._share_computed_at = z
         if share is None:
-            return False
+            return
         before_U = self._U
         self._take_mesh_share(share, z)
         change, by_coefficients = share.at(z), share.columns()
@@ -246,8 +254,22 @@ class FitSearch:
         self._best = np.inf
         residual = self.residual - change + (before_U - self._U) @ self.z[: self._U.shape[1]]
         self._accept_if_better(self.z, self.state, residual)
-        size, changed = (float(np.linalg.norm(self._noise.whitened(each))) for each in (share.at(z), change))
-        return changed > max(_MATTERS, least * size)
+
+    def update_mesh_errors(self, known: MeshErrors, finer: FinerStates) -> MeshErrors:
+        """Take the error of the mesh of tissue alone at the best point, unless that is where it was computed last."""
+        at, before = self.z[self._layout.nonlinear], self._mesh_error_at
+        if before is not None and np.abs(at - before).max(initial=0.0) <= _NEAR:
+            return known
+        self._mesh_error_at = at
+        try:
+            error = finer.error(self.state.hypothesis, self.state)
+        except SolveError:
+            return known
+        change = excess_error(known, error, self.state, self._base.prior)
+        if float(np.linalg.norm(self._noise.whitened(change))) > _MATTERS:
+            self.mesh_errors = replace(known, error=error)
+            self.start([self.z], self.state)
+        return replace(known, error=error)
 
     def result(self) -> Refit:
         """The fit at its best point."""
@@ -275,21 +297,22 @@ class FitSearch:
             self._mesh_share,
         )
 
-    def _update_laws(self) -> bool:
-        """Replace the columns of the shape of laws by those of the last linearisation; whether they differ.
+    def update_laws(self) -> None:
+        """Replace the columns of the shape of laws by those of the last linearisation.
 
         While an optimum is looked for they are fixed: renewed on the way, they would change the objective.
         """
-        law, columns = self._layout.law, self._law_columns
+        if self._about is None or self._laws_are_about:
+            return
+        law, (at, coefficients) = self._layout.law, self._about
         before = self._U[:, law]
-        if np.array_equal(before, columns):
-            return False
+        columns = law_columns_about(at, self.effects, coefficients, self._base.states, self.mesh_errors)
+        self._laws_are_about = True
         residual = self.residual + (before - columns) @ self.z[law]
         self._U, self.columns = self._U.copy(), self.columns.copy()
         self._U[:, law] = self.columns[:, law] = columns
         self._best = np.inf
         self._accept_if_better(self.z, self.state, residual)
-        return True
 
     def _gauss_newton_step(self, field_stays: bool) -> tuple[Floats, float]:
         """The step and what it gains in the linear model.
@@ -314,22 +337,33 @@ class FitSearch:
                 return step, 0.5 * float(gradient @ step)
             free &= ~leaving
 
-    def _line_search(self, step: Floats) -> bool:
-        """Go along a step, halved until it is downhill; whether any of it was."""
-        for _ in range(_HALVINGS):
-            trial = self._clipped(self.z + step)
+    def _line_search(self, step: Floats, gain: float, trials: int) -> float:
+        """Go along a step, shortened until it is downhill; by how much the best point is better.
+
+        The next length is that at which a parabola is least, by its slope, twice the `gain` that is expected of the
+        whole step, and by what was found (Nocedal and Wright 2006, section 3.5).
+        """
+        length, before = 1.0, self._best
+        for _ in range(trials):
+            trial, shorter = self._clipped(self.z + length * step), _SHORT
             try:
-                better = self._accept_if_better(trial, *self._evaluate(trial, self.state))
+                state, residual = self._evaluate(trial, self.state)
             except (SolveError, InputError):
-                better = False
-            if better:
-                return True
-            step = 0.5 * step
-        return False
+                pass
+            else:
+                if self._accept_if_better(trial, state, residual):
+                    return before - self._best
+                slope = 2.0 * gain * length
+                shorter *= slope / (self._objective(trial, residual) - before + slope)
+            length *= max(shorter, _SHORTER)
+        return 0.0
+
+    def _objective(self, z: Floats, residual: Floats) -> float:
+        white = self._noise.whitened(residual)
+        return 0.5 * float(white @ white + z @ z)
 
     def _accept_if_better(self, z: Floats, state: SolvedState, residual: Floats) -> bool:
-        white = self._noise.whitened(residual)
-        objective = 0.5 * float(white @ white + z @ z)
+        objective = self._objective(z, residual)
         if not objective <= self._best + 1e-9:
             return False
         self.z, self.state, self.residual, self._best = z, state, residual, objective
@@ -397,10 +431,8 @@ class FitSearch:
             )
         except SolveError:
             return
-        law = self._layout.law
-        self._nearby, self._law_columns = at, columns[:, law].copy()
-        columns[:, law] = self._U[:, law]
-        self.columns = columns
+        self.columns, self._nearby, self._laws_are_about = columns, at, False
+        self._about = at, tuple(self.z[part] for part in self._layout.effects)
 
     def _difference_columns(self) -> Floats:
         """Columns with those of tissue and mechanisms as differences between states."""
@@ -467,19 +499,15 @@ class Fitter:
         search.start(starts, nearby or self.base.state)
         if subset is None:
             search.backtrack_to_base()
-        search.minimise()
-        for _ in range(_ROUNDS):
-            if self.mesh_errors is None or not self._mesh_error_changed(search, screened, self.mesh_errors):
+        enough = _ROUGHLY
+        for number in range(_ROUNDS):
+            search.minimise(_ENOUGH if number == _ROUNDS - 1 else enough)
+            self._update(search)
+            gain = search.expected_gain()
+            if enough == _ENOUGH and gain < _ENOUGH:
                 break
-            search.minimise()
+            enough = min(max(_ENOUGH, _PART * gain), _ROUGHLY)
         fit = search.result()
-        for _ in range(_ROUNDS):
-            if not search.update_noise(fit):
-                break
-            search.minimise()
-            before, fit = fit, search.result()
-            if abs(fit.log_evidence - before.log_evidence) < _SAME:
-                break
         if not np.isfinite(fit.log_evidence):
             raise FloatingPointError("its evidence is not a number")
         return fit
@@ -495,25 +523,15 @@ class Fitter:
         search.start([search.begin_at(refit, about)], refit.state)
         return search.result()
 
-    def _mesh_error_changed(self, search: FitSearch, screened: Marginal, known: MeshErrors) -> bool:
-        """Compute the error of the mesh at the best point; whether the search has to go on with it."""
-        if search.effects:
-            return search.update_mesh_share(known, self.finer) or not search.converged
-        if not self._update_mesh_errors(search.state, known, screened):
-            return False
-        search.mesh_errors = self.mesh_errors
-        search.start([search.z], search.state)
-        return True
+    def _update(self, search: FitSearch) -> None:
+        """Take laws, the error of the mesh, noise and gross errors of the best point of a search.
 
-    def _update_mesh_errors(self, state: SolvedState, known: MeshErrors, screened: Marginal) -> bool:
-        """Take the error of the mesh from a fit without any cause, for all fits to come; whether it matters.
-
-        It depends on the tissue, not only in proportion, and would otherwise be taken for a mechanism's share.
+        The error of the mesh without any cause is that of all fits to come. It depends on the tissue, not only in
+        proportion, and would otherwise be taken for a mechanism's share.
         """
-        try:
-            error = self.finer.error(state.hypothesis, state)
-        except SolveError:
-            return False
-        change = excess_error(known, error, state, self.base.prior)
-        self.mesh_errors = replace(known, error=error)
-        return float(np.linalg.norm(screened.noise.whitened(change))) > _MATTERS
+        search.update_laws()
+        if self.mesh_errors is not None and search.effects:
+            search.update_mesh_share(self.mesh_errors, self.finer)
+        elif self.mesh_errors is not None:
+            self.mesh_errors = search.update_mesh_errors(self.mesh_errors, self.finer)
+        search.update_noise(search.result())

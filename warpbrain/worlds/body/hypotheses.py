@@ -235,7 +235,7 @@ class HypothesisSearch:
             if refitted is None or refitted.refit is None:
                 continue
             gain = refitted.refit.log_evidence - subset.refit.log_evidence
-            if gain > 0.0:
+            if gain > _BETTER:
                 better = replace(refitted, hypothesis=subset.hypothesis)
                 self._sets[subset.names] = better.with_evidence(subset.hypothesis.log_evidence + gain)
                 self._forget_supersets(subset.names)
