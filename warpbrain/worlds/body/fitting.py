@@ -202,8 +202,11 @@ class FitSearch:
                 by_differences, self._linearised_at = True, elsewhere
 
     def _moved(self) -> float:
-        """How far the best point is from where its columns were made [standard deviations]; infinite if not known."""
-        return float(np.abs(self.z - self._linearised_at)[self._layout.nonlinear].max(initial=0.0))
+        """How far the best point is from where its columns were made [standard deviations]; infinite if not known.
+
+        All coordinates together: those of a vector are others in other axes, which must not matter.
+        """
+        return float(np.linalg.norm((self.z - self._linearised_at)[self._layout.nonlinear]))
 
     def expected_gain(self) -> float:
         """Of the log posterior density by another step, in the linear model."""
@@ -258,7 +261,7 @@ class FitSearch:
     def update_mesh_errors(self, known: MeshErrors, finer: FinerStates) -> MeshErrors:
         """Take the error of the mesh of tissue alone at the best point, unless that is where it was computed last."""
         at, before = self.z[self._layout.nonlinear], self._mesh_error_at
-        if before is not None and np.abs(at - before).max(initial=0.0) <= _NEAR:
+        if before is not None and np.linalg.norm(at - before) <= _NEAR:
             return known
         self._mesh_error_at = at
         try:
