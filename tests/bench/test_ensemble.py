@@ -11,8 +11,7 @@ from shapes import cube
 
 from warpbrain.bench.batches import STEPS, count_bytes
 from warpbrain.ensemble.workers import bytes_per_slot
-from warpbrain.kernels.batched.persistent import kept_bytes
-from warpbrain.kernels.persistent import blocks_stay
+from warpbrain.kernels.batched.cluster import forms_clusters
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
@@ -49,16 +48,10 @@ def test_counts_of_bytes(device: str) -> None:
         for cells, precision in ((2, "double"), (2, "single"), (4, "double"))
     )
     assert count_bytes(small, 0) == 2 * count_bytes(single, 0)
-    # what a solve keeps on a GPU between launches is in double whatever the precision
-    kept = kept_bytes(small.size) if blocks_stay(small.device) else 0
-    assert bytes_per_slot(small) - kept == 2 * (bytes_per_slot(single) - kept)
+    assert bytes_per_slot(small) == 2 * bytes_per_slot(single)
     iteration = count_bytes(small, 11) - count_bytes(small, 10)
-    if blocks_stay(small.device):
-        # the matrix is on the chip: four numbers a node are written and read, in double whatever the precision
-        assert iteration == count_bytes(single, 11) - count_bytes(single, 10) == 32 * small.size
-    else:
-        # an iteration reads at least the matrix
-        assert iteration > 72 * len(small.pairs)
+    # an iteration stays on the chip, or reads at least the matrix
+    assert iteration == 0 if forms_clusters(small.device) else iteration > 72 * len(small.pairs)
     # eight times the elements
     assert 5 * count_bytes(small, 10) < count_bytes(large, 10) < 9 * count_bytes(small, 10)
 

@@ -19,8 +19,8 @@ from warpbrain.ensemble.course import step_batch
 from warpbrain.ensemble.run import chosen_samples
 from warpbrain.ensemble.workers import Here, Job, Processes, bytes_per_slot
 from warpbrain.errors import InputError
-from warpbrain.kernels.persistent import blocks_stay
-from warpbrain.kernels.tetrahedron import PAIRS
+from warpbrain.kernels.batched.cluster import forms_clusters
+from warpbrain.kernels.batched.layout import TANGENT
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System, find_device
@@ -191,16 +191,17 @@ def count_bytes(system: System, cg_iterations: float) -> int:
     """
     n, m, pairs = system.size, system.elements, len(system.pairs)
     vector, inverse = 3 * n, 6 * n
-    blocks, forces, matrix = len(PAIRS) * 9 * m, 12 * m, 9 * pairs
+    blocks, forces, matrix = TANGENT * m, 12 * m, 9 * pairs
     elements = vector + blocks + forces + m
     evaluation = elements + forces + vector + m
     real = system.precision.numpy.itemsize
-    if blocks_stay(system.device):
-        # right-hand side; the matrix is read once a solve, and an iteration writes four numbers a node, in double
-        beginning = blocks + matrix + (matrix + 7 * vector) + (matrix + 3 * vector)
-        return int(real * (evaluation + beginning + 6 * vector) + cg_iterations * 32 * n)
-    # right-hand side, preconditioner, start
-    beginning = blocks + matrix + (matrix + 7 * vector) + (3 * vector + inverse) + (matrix + 5 * vector + inverse)
+    # right-hand side
+    beginning = blocks + matrix + 7 * vector
+    if forms_clusters(system.device):
+        # a solve reads the matrix once, and its iterations stay on the chip
+        return int(real * (evaluation + beginning + (matrix + 4 * vector) + 6 * vector))
+    # preconditioner, start
+    beginning += (3 * vector + inverse) + (2 * matrix + 6 * vector + inverse)
     product = matrix + 2 * vector
     iteration = product + (7 * vector + inverse) + 3 * vector
     return int(real * (evaluation + beginning + cg_iterations * iteration + 6 * vector))

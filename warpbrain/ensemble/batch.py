@@ -24,12 +24,12 @@ from warpbrain.ensemble.sample import Sample
 from warpbrain.errors import InputError
 from warpbrain.kernels.batched.assembly import batched_assembly_kernels
 from warpbrain.kernels.batched.elements import batched_element_kernels
-from warpbrain.kernels.batched.layout import stages
+from warpbrain.kernels.batched.layout import TANGENT, stages
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
 from warpbrain.kernels.batched.motion import batched_motion_kernels
+from warpbrain.kernels.batched.parts import Pattern
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
 from warpbrain.kernels.module import KernelSet
-from warpbrain.kernels.tetrahedron import PAIRS
 from warpbrain.physics.laws import Law
 from warpbrain.simulation.dynamics import finest_tolerance
 from warpbrain.simulation.model import Material
@@ -107,10 +107,22 @@ class BatchMaterials:
             group.parameters.assign(group.rows.reshape(-1, group.rows.shape[2]))
 
 
+def pattern_of(system: System) -> Pattern:
+    """The pattern of the matrix of a system, of which one block of a pair of nodes is stored."""
+    positions, matrix = system.pair_positions.numpy(), system.matrix
+    pairs = np.empty(matrix.nnz, dtype=np.int32)
+    pairs[positions[:, 0]] = pairs[positions[:, 1]] = np.arange(len(positions))
+    columns, active = matrix.columns.numpy()[: matrix.nnz], np.any(system.free.numpy() != 0.0, axis=1)
+    return Pattern(matrix.offsets.numpy(), columns, pairs, system.model.mesh.points, active)
+
+
 Ints = NDArray[np.int32]
 
 #: Iterations of a linear solve.
 _MAX_CG = 2000
+
+#: Bytes of results that leave a device at a time.
+_STAGED = 1 << 25
 
 
 @dataclass(frozen=True)
@@ -157,44 +169,50 @@ class Batch:
         self._u_start, self._v_start = self._zeros(n, 3, b), self._zeros(n, 3, b)
         self._prescribed, self._internal = self._zeros(n, 3, b), self._zeros(n, 3, b)
         self._element_forces, self._element_J = self._zeros(4 * m, 3, b), self._zeros(m, b)
-        self._element_blocks = self._zeros(len(PAIRS) * m, 9, b)
-        self._values = self._zeros(len(system.pairs), 9, b)
+        self._tangents = self._zeros(m, TANGENT, b)
         # slots, and how many of them are in the list
         self._all = self._array(np.arange(b), int), self._array([b], int)
-        lists = ((self._zeros(b, dtype=int), self._zeros(1, dtype=int)) for _ in range(3))
-        self._start, self._solve, self._fresh = lists
-        self._marked, self._stepping, self._ready = (self._zeros(b, dtype=int) for _ in range(3))
-        self._linger_count = self._zeros(1, dtype=int)
+        self._fresh = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
+        self._ready = self._zeros(b, dtype=int)
+        # what a pass is told of lists and flags, in one copy: two lists, two rows of flags, three counts
+        self._lists = lists = self._zeros(4 * b + 3, dtype=int)
+        self._start = lists[:b], lists[4 * b : 4 * b + 1]
+        self._solve = lists[b : 2 * b], lists[4 * b + 1 : 4 * b + 2]
+        self._marked, self._stepping = lists[2 * b : 3 * b], lists[3 * b : 4 * b]
+        self._linger_count = lists[4 * b + 2 :]
         self._unsolved = np.zeros(b, dtype=bool)
         # of the step that each slot begins next: `h` [s]; factors of loads and amounts of shapes at its end
         self.time_step = np.ones(b)
         self.load_factors = np.zeros((len(model.loads), b))
         self.amounts = np.zeros((len(self.shapes), b))
-        self._h, self._k, self._m = self._zeros(b), self._zeros(b), self._zeros(b)
         # no load is one load of nothing: a launch takes no array without rows
         forces = [load.nodal_forces(model.mesh) for load in model.loads] or [np.zeros((n, 3))]
-        self._loads, self._factors = self._array(np.array(forces), p.vec3), self._zeros(len(forces), b)
+        self._loads = self._array(np.array(forces), p.vec3)
+        # and of numbers, in another
+        self._numbers = numbers = self._zeros(3 + len(forces) + max(1, len(self.shapes)), b)
+        self._h, self._k, self._m = numbers[0], numbers[1], numbers[2]
+        self._factors, self._amounts = numbers[3 : 3 + len(forces)], numbers[3 + len(forces) :]
         self._final = self._array(model.external_forces(), p.vec3)
         self._shapes = self._array(self.shapes, p.vec3) if len(self.shapes) else None
-        self._amounts = self._zeros(max(1, len(self.shapes)), b)
         self._chunks, self._groups = stages(n)
         self._shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._groups, b)
         self._totals, self._min_J = self._zeros(2, b), self._zeros(1, b)
         self._J_share = int(np.ceil(np.sqrt(m)))
         self._least_J = self._zeros(-(-m // self._J_share), b)
-        positions = system.pair_positions.numpy()
-        blocks = np.empty(system.matrix.nnz, dtype=np.int32)
-        blocks[positions[:, 0]] = blocks[positions[:, 1]] = np.arange(len(positions))
-        self._pattern = (system.matrix.offsets, system.matrix.columns, self._array(blocks, int))
         self._cg = BatchedConjugateGradient(
-            *self._pattern,
-            self._array(blocks[system.diagonal.numpy()], int),
-            self._values,
+            pattern_of(system),
+            system.free,
+            self._v,
             self._dv,
             system.precision,
             tolerance=finest_tolerance(tolerance, system.precision),
             max_iterations=_MAX_CG,
         )
+        self._every = self._array(np.arange(n), int)
+        self._held = self._array(np.flatnonzero(np.any(model.constrained, axis=1)), int)
+        staged = n * min(b, max(1, _STAGED // (n * 3 * p.numpy.itemsize)))
+        self._collected = self._zeros(staged, dtype=p.vec3)
+        self._staging = wp.zeros(staged, dtype=p.vec3, device="cpu", pinned=self._device.is_cuda)
         self._graph: Any = None
 
     def _array(self, values: Any, dtype: Any) -> wp.array:
@@ -222,19 +240,32 @@ class Batch:
             self._v_start, self._u, self._v, self._dv,
         )  # fmt: skip
 
-    def displacements(self, slots: Sequence[int]) -> Floats:
-        """`u` of some slots [m], shape (slots, n, 3)."""
-        return self._collect(self._u, slots)
+    def displacements(self, slots: Sequence[int]) -> list[Floats]:
+        """`u` of some slots [m], each of shape (n, 3)."""
+        return self._collect(self._u, slots, self._every)
 
-    def internal_forces(self, slots: Sequence[int]) -> Floats:
-        """Internal forces of some slots [N], shape (slots, n, 3)."""
-        return self._collect(self._internal, slots)
+    def held_forces(self, slots: Sequence[int]) -> list[Floats]:
+        """Internal forces of some slots [N], each of shape (n, 3), on nodes that are held; zero on others."""
+        held, forces = self._held.numpy(), []
+        for collected in self._collect(self._internal, slots, self._held) if len(held) else ():
+            forces.append(np.zeros((self.system.size, 3)))
+            forces[-1][held] = collected
+        return forces or [np.zeros((self.system.size, 3)) for _ in slots]
 
-    def _collect(self, values: wp.array, slots: Sequence[int]) -> Floats:
-        n = self.system.size
-        collected = wp.empty((len(slots), n), dtype=self._precision.vec3, device=self._device)
-        self._launch(self._motion.collect, (len(slots), n), self._array(slots, int), values, collected)
-        return collected.numpy().astype(np.float64)
+    def _collect(self, values: wp.array, slots: Sequence[int], nodes: wp.array) -> list[Floats]:
+        """Vectors of some slots at some nodes, each of shape (nodes, 3)."""
+        collected: list[Floats] = []
+        # through memory of the host that the device can write to by itself, which is many times as fast
+        some = self._staging.size // len(nodes)
+        for first in range(0, len(slots), some):
+            listed = self._array(slots[first : first + some], int)
+            count = len(listed) * len(nodes)
+            self._launch(self._motion.collect, (len(listed), len(nodes)), listed, nodes, values, self._collected)
+            wp.copy(self._staging, self._collected, count=count)
+            wp.synchronize_device(self._device)
+            staged = self._staging.numpy()[:count].reshape(len(listed), -1, 3)
+            collected += [np.array(vectors, dtype=np.float64) for vectors in staged]
+        return collected
 
     def element_J(self, slot: int) -> Floats:
         """Volume ratio of each element of a slot, shape (m,)."""
@@ -246,20 +277,18 @@ class Batch:
         """One pass: slots `start` begin a step from an evaluated state, the states of `marked` are to be evaluated."""
         self._unsolved[start] = True
         stepping = np.flatnonzero(self._unsolved)
-        for (slots, size), members in ((self._start, start), (self._solve, stepping)):
-            slots.assign(np.pad(members.astype(np.int32), (0, self.slots - len(members))))
-            size.assign(np.array([len(members)], dtype=np.int32))
-        for flags, members in ((self._marked, marked), (self._stepping, stepping)):
-            flags.assign(np.isin(np.arange(self.slots), members).astype(np.int32))
-        self._linger_count.assign(np.array([int(self._linger * len(stepping))], dtype=np.int32))
+        lists, counts = np.zeros((4, self.slots), dtype=np.int32), (len(start), len(stepping))
+        lists[0, : len(start)], lists[1, : len(stepping)] = start, stepping
+        lists[2, marked] = lists[3, stepping] = 1
+        self._lists.assign(
+            np.concatenate([lists.ravel(), [*counts, int(self._linger * len(stepping))]], dtype=np.int32)
+        )
         h, damping = self.time_step, self.system.model.damping
-        self._h.assign(h)
-        self._k.assign(h * damping.stiffness + h * h)
-        self._m.assign(1.0 + h * damping.mass)
-        if len(self.load_factors):
-            self._factors.assign(self.load_factors)
-        if len(self.amounts):
-            self._amounts.assign(self.amounts)
+        numbers = np.zeros(self._numbers.shape)
+        numbers[:3] = h, h * damping.stiffness + h * h, 1.0 + h * damping.mass
+        numbers[3 : 3 + len(self.load_factors)] = self.load_factors
+        numbers[3 + self._factors.shape[0] :][: len(self.amounts)] = self.amounts
+        self._numbers.assign(numbers)
         if self._graph is None:
             self._capture()
         wp.capture_launch(self._graph)
@@ -276,14 +305,11 @@ class Batch:
 
     def _capture(self) -> None:
         """Capture a pass in a graph: one launch from the host instead of hundreds."""
-        lists = (self._start[1], self._solve[1], self._marked, self._stepping)
-        contents = [wp.clone(values) for values in lists]
-        for values in lists:
-            values.zero_()
+        lists = wp.clone(self._lists)
+        self._lists.zero_()
         # a pass over empty lists loads every module
         self._record()
-        for values, content in zip(lists, contents, strict=True):
-            wp.copy(values, content)
+        wp.copy(self._lists, lists)
         with wp.ScopedCapture(device=self._device) as capture:
             self._record()
         self._graph = capture.graph
@@ -308,17 +334,16 @@ class Batch:
             )  # fmt: skip
         self._launch(
             self._kernels.gather_matrix, (len(s.pairs), lanes), *begun, s.pairs, s.pair_first, s.contributions,
-            self._element_blocks, s.mass, s.free, self._k, self._m, self._values,
+            self._tangents, s.mass, s.free, self._k, self._m, self._cg.values,
         )  # fmt: skip
         self._launch(
-            self._motion.begin, (s.size, lanes), *begun, *self._pattern, self._values, self._loads, self._factors,
-            self._internal, s.mass, s.free, self._h, self._u, self._v, self._u_start, self._v_start,
-            self._cg.right_hand_side,
+            self._motion.begin, (s.size, lanes), *begun, self._loads, self._factors, self._internal, s.mass, s.free,
+            self._h, self._u, self._v, self._u_start, self._v_start, self._cg.right_hand_side,
         )  # fmt: skip
         if self._shapes is not None:
             self._launch(
                 self._kernels.constrained_load, (s.size, lanes), *begun, s.corner_first, s.corners, s.nodes,
-                self._element_blocks, self._prescribed, s.free, self._k, self._cg.right_hand_side,
+                self._tangents, self._prescribed, s.free, self._k, self._cg.right_hand_side,
             )  # fmt: skip
         self._cg.start(*begun)
 
@@ -329,7 +354,7 @@ class Batch:
             self._launch(
                 group.kernels.forces_and_tangents, (len(group.elements), lanes), *fresh, group.elements, group.tissue,
                 s.nodes, s.inverse_edges, s.volume, group.parameters, self._u, self._element_forces,
-                self._element_blocks, self._element_J,
+                self._tangents, self._element_J,
             )  # fmt: skip
         self._launch(
             self._kernels.gather_forces, (self._chunks, lanes), *fresh, s.corner_first, s.corners,

@@ -246,7 +246,7 @@ def step_batch(batch: Batch, course: Course, numbers: Sequence[int]) -> Iterator
         batch.restore(verdict.back.tolist())
         ended, done = [], verdict.done.tolist()
         # of samples that have their answer
-        fields = (batch.displacements(done), batch.internal_forces(done)) if done else ((), ())
+        fields = (batch.displacements(done), batch.held_forces(done)) if done else ((), ())
         for slot, u, internal in zip(done, *fields, strict=True):
             number, steps, iterations = (int(of[slot]) for of in (number_in, course.steps, course.cg_iterations))
             time, residual, least = (float(of[slot]) for of in (course.time, course.residual, states.min_J))

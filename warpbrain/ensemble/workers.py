@@ -27,9 +27,7 @@ from warpbrain import __version__
 from warpbrain.ensemble.course import Course, Moving, Resting, step_samples
 from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.errors import InputError, SolveError
-from warpbrain.kernels.batched.persistent import kept_bytes
-from warpbrain.kernels.persistent import blocks_stay
-from warpbrain.kernels.tetrahedron import PAIRS
+from warpbrain.kernels.batched.layout import TANGENT
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
@@ -121,13 +119,11 @@ SHARE = 0.8
 def bytes_per_slot(system: System) -> int:
     """Memory that a sample takes in a batch: element results, matrix, vectors and sums."""
     n, m = system.size, system.elements
-    elements = m * (len(PAIRS) * 9 + 4 * 3 + 1)
+    elements = m * (TANGENT + 4 * 3 + 1)
     matrix = len(system.pairs) * 9
     # u, v, dv, both at the start of the step, prescribed velocity, internal forces, b
     vectors = 8 * 3 * n
-    if blocks_stay(system.device):
-        return system.precision.numpy.itemsize * (elements + matrix + vectors + n) + kept_bytes(n)
-    # z, p, q; the preconditioner
+    # z, p, q and the preconditioner, where they are not on the chip
     vectors += 3 * 3 * n + 6 * n
     sums = 2 * n
     return system.precision.numpy.itemsize * (elements + matrix + vectors + sums)

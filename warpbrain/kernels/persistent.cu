@@ -1,9 +1,5 @@
-// Preconditioned conjugate gradients in one launch: the body of `solve` in persistent.py and batched/persistent.py,
-// which say what it does and what its arguments are. BATCHED, THREADS, LANES, MESSAGES, SHARED_BYTES, REAL and ROUNDING
-// are put before it.
-//
-// Blocks are in groups; a group solves one system after the other. With BATCHED these are samples, of which one in a
-// slot has the numbers `slot + stride * k`; without, there is one group and one system.
+// Preconditioned conjugate gradients in one launch: the body of `solve` in persistent.py, which says what it does and what
+// its arguments are. THREADS, LANES, MESSAGES, SHARED_BYTES, REAL and ROUNDING are put before it.
 //
 // All warps of a block but the last have rows. The last adds up the sums of all blocks and decides what is next, while
 // the others already multiply what their neighbours have given them.
@@ -17,9 +13,6 @@ constexpr int ROWS_OF_WARP = 32 / LANES;
 constexpr int ROWS_AT_ONCE = WORKERS / LANES;
 constexpr unsigned ALL = 0xffffffffu;
 constexpr int SUMS = 4;
-#if BATCHED
-constexpr int SCALARS = 8;
-#endif
 // iterations after which the recurrences start again from the residual itself
 constexpr int RENEWED_EVERY = 50;
 // and after which rounding begins to cost more iterations than meetings cost time
@@ -35,36 +28,19 @@ extern __shared__ char dynamic_smem_base[];
 
 const int tid = threadIdx.x, lane = tid % 32, warp = tid / 32, sub = lane % LANES;
 const bool adds_up = warp == WARPS;
-const int grid = starts.shape[0] - 1, group = blockIdx.x / grid, groups = gridDim.x / grid, me = blockIdx.x % grid;
+const int grid = gridDim.x, me = blockIdx.x;
 const int row0 = starts.data[me], rows = starts.data[me + 1] - row0;
 const int block0 = offsets.data[row0], blocks = offsets.data[row0 + rows] - block0;
 const int nodes = x.shape[0];
 const REAL *const all_values = (const REAL *)values.data;
 const REAL *const b_of = (const REAL *)b.data;
 REAL *const x_of = (REAL *)x.data;
-int *const state = control.data + 2 * group;
-word *const mailbox = (word *)messages.data + size_t(group) * grid * 4 * SUMS;
+int *const state = control.data;
+word *const mailbox = (word *)messages.data;
 // two places that take turns, by the number of the phase, and one for the solution
-word *const places = (word *)exchange.data + size_t(group) * 12 * nodes, *const solution = places + 8 * size_t(nodes);
-#if BATCHED
-const int systems = count.data[0];
-const size_t stride = x.shape[2];
-constexpr int watch = 0, jacobi = 1;
-#else
-const int systems = 1;
-constexpr size_t stride = 1;
-#endif
-size_t slot = 0;
+word *const places = (word *)exchange.data, *const solution = places + 8 * size_t(nodes);
 // number k of the block in a place of these rows
-auto entry = [&](int place, int k) -> REAL {
-#if BATCHED
-    // what is left of the diagonal is kept right of it
-    const int pair = pairs.data[block0 + place];
-    return all_values[(pair < 0 ? 9 * size_t(-1 - pair) + k % 3 * 3 + k / 3 : 9 * size_t(pair) + k) * stride + slot];
-#else
-    return all_values[9 * (size_t(block0) + place) + k];
-#endif
-};
+auto entry = [&](int place, int k) -> REAL { return all_values[9 * (size_t(block0) + place) + k]; };
 
 // -- what is kept on the chip: vectors and inverse diagonal blocks, then as much of the matrix as there is room for
 enum { X, R, U, W, P, S, Q, Z, M, PRODUCT, INVERSE, VECTORS = INVERSE + 2 };
@@ -81,7 +57,7 @@ if (VECTORS * length * 8 <= left) {
     room += VECTORS * length * 8;
     left -= VECTORS * length * 8;
 } else {
-    vectors = scratch.data + size_t(VECTORS) * 3 * (size_t(group) * nodes + row0);
+    vectors = scratch.data + size_t(VECTORS) * 3 * row0;
 }
 int *first = (int *)room;
 const int offset_bytes = (4 * (rows + 1) + 7) / 8 * 8;
@@ -101,7 +77,7 @@ if (keeps_offsets)
         first[i] = offsets.data[row0 + i] - block0;
 for (int i = tid; i < kept; i += THREADS)
     kept_columns[i] = columns.data[block0 + i];
-// the same for all blocks of a group: each reads it before the first meeting, and it is written after the last
+// the same for all blocks: each reads it before the first meeting, and it is written after the last
 unsigned epoch = (unsigned)state[0];
 __syncthreads();
 if (*quit)
@@ -141,7 +117,7 @@ auto warp_sums = [&](const double s[SUMS]) -> double {
 double sums[SUMS] = {0.0, 0.0, 0.0, 0.0};
 // Of the last warp: adds up what the warps of all blocks have left in `partial`, in an order that is always the same. A
 // place is written again only two meetings later, when all have read it.
-auto meet = [&](bool few) {
+auto meet = [&]() {
     // thread t has sum t % 4, of every eighth warp and block
     const int k = lane % SUMS;
     auto over_warp = [&](double sum) -> double {
@@ -154,8 +130,6 @@ auto meet = [&](bool few) {
     for (int w = lane / SUMS; w < (WARPS + 7) / 8 * 8; w += 32 / SUMS)
         sum += w < WARPS ? partial[w][k] : 0.0;
     sum = over_warp(sum);
-    if (few && k == 3)
-        sum = 1.0;
     word *const mail = mailbox + size_t(epoch % 2) * grid * 2 * SUMS;
     if (lane < SUMS)
         store(mail + 2 * (SUMS * me + k), __double_as_longlong(sum), epoch);
@@ -199,7 +173,7 @@ auto product = [&](int row, const word *given, unsigned when, bool measured) -> 
     auto ask = [&](int node, word v[4]) {
         if (measured && of_guess) {
             for (int c = 0; c < 3; ++c)
-                v[c] = __double_as_longlong(double(x_of[(3 * size_t(node) + c) * stride + slot]));
+                v[c] = __double_as_longlong(double(x_of[3 * size_t(node) + c]));
         } else {
             load(given + 4 * size_t(node), v[0], v[1]);
             load(given + 4 * size_t(node) + 2, v[2], v[3]);
@@ -281,296 +255,235 @@ auto precondition = [&](int row, double v) -> double {
 // the search direction: u = M r, w = A u, s = A p, q = M s, z = A q. Long solves, and those whose end was none, go on
 // with textbook conjugate gradients, of three meetings an iteration: p = u + beta p; s = A p; x, r and u. These keep the
 // direction only if the residual hardly has a part along it: where rounding has ruled, they would go astray for good.
-enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESUME, RESTART, ITERATE, DIRECTION, CURVATURE, UPDATE, END, LEAVE };
+enum Phase { RESIDUAL, GET_W, GET_S, GET_Z, BEGIN, RESTART, ITERATE, DIRECTION, CURVATURE, UPDATE, END };
 const double infinity = __longlong_as_double(0x7ff0000000000000ll);
-for (int system = group; system < systems; system += groups) {
-    int iteration = 0, since = 0;
-    double gamma_before = 1.0, alpha = 1.0, beta = 0.0, least = infinity, before = infinity;
-    double rr = 0.0, goal = 0.0, updated = infinity;
-    bool ended = false, textbook = false, afresh = false;
-    int phase = RESIDUAL;
-    of_guess = true;
-#if BATCHED
-    slot = slots.data[system];
-    double *const saved = memory.data + slot * (27 * size_t(nodes) + SCALARS);
-    double *const saved_vectors = saved + SCALARS + 27 * size_t(row0);
-    if (saved[0] >= 0.0) {
-        // it was left off
-        phase = RESUME;
-        of_guess = false;
-        iteration = (int)saved[0], since = (int)saved[1];
-        gamma_before = saved[2], alpha = saved[3], before = saved[4], goal = saved[5];
-        textbook = saved[6] > 0.0, rr = saved[7];
-    }
-    // the last system's numbers are no longer needed
-    __syncthreads();
-#endif
-#if BATCHED
-#pragma unroll 2
-    for (int place = tid; place < kept; place += THREADS)
-#pragma unroll
-        for (int k = 0; k < 9; ++k)
-            kept_values[9 * place + k] = entry(place, k);
-#else
+int iteration = 0, since = 0;
+double gamma_before = 1.0, alpha = 1.0, beta = 0.0, least = infinity, before = infinity;
+double rr = 0.0, goal = 0.0, updated = infinity;
+bool ended = false, textbook = false, afresh = false;
+int phase = RESIDUAL;
+of_guess = true;
 #pragma unroll 4
-    for (int i = tid; i < 9 * kept; i += THREADS)
-        kept_values[i] = entry(i / 9, i % 9);
-#endif
-    for (int i = tid; i < length; i += THREADS) {
-#if BATCHED
-        if (phase == RESUME) {
-            for (int k = 0; k < 9; ++k)
-                vectors[k * length + i] = saved_vectors[k * length + i];
-            continue;
-        }
-#endif
-        vectors[X * length + i] = double(x_of[(3 * size_t(row0) + i) * stride + slot]);
-        vectors[P * length + i] = vectors[S * length + i] = 0.0;
-        vectors[Q * length + i] = vectors[Z * length + i] = 0.0;
+for (int i = tid; i < 9 * kept; i += THREADS)
+    kept_values[i] = entry(i / 9, i % 9);
+for (int i = tid; i < length; i += THREADS) {
+    vectors[X * length + i] = double(x_of[3 * size_t(row0) + i]);
+    vectors[P * length + i] = vectors[S * length + i] = 0.0;
+    vectors[Q * length + i] = vectors[Z * length + i] = 0.0;
+}
+for (int i = tid; i < rows; i += THREADS) {
+    double a[9];
+    for (int k = 0; k < 9; ++k)
+        a[k] = double(all_values[9 * size_t(diagonal.data[row0 + i]) + k]);
+    double inverse[6] = {1.0, 0.0, 0.0, 1.0, 0.0, 1.0};
+    if (jacobi) {
+        const double c0 = a[4] * a[8] - a[5] * a[7];
+        const double c1 = a[5] * a[6] - a[3] * a[8];
+        const double c2 = a[3] * a[7] - a[4] * a[6];
+        const double d = 1.0 / (a[0] * c0 + a[1] * c1 + a[2] * c2);
+        inverse[0] = d * c0;
+        inverse[1] = d * (a[2] * a[7] - a[1] * a[8]);
+        inverse[2] = d * (a[1] * a[5] - a[2] * a[4]);
+        inverse[3] = d * (a[0] * a[8] - a[2] * a[6]);
+        inverse[4] = d * (a[2] * a[3] - a[0] * a[5]);
+        inverse[5] = d * (a[0] * a[4] - a[1] * a[3]);
     }
-    for (int i = tid; i < rows; i += THREADS) {
-        double a[9];
-        for (int k = 0; k < 9; ++k)
-            a[k] = double(all_values[(9 * size_t(diagonal.data[row0 + i]) + k) * stride + slot]);
-        double inverse[6] = {1.0, 0.0, 0.0, 1.0, 0.0, 1.0};
-        if (jacobi) {
-            const double c0 = a[4] * a[8] - a[5] * a[7];
-            const double c1 = a[5] * a[6] - a[3] * a[8];
-            const double c2 = a[3] * a[7] - a[4] * a[6];
-            const double d = 1.0 / (a[0] * c0 + a[1] * c1 + a[2] * c2);
-            inverse[0] = d * c0;
-            inverse[1] = d * (a[2] * a[7] - a[1] * a[8]);
-            inverse[2] = d * (a[1] * a[5] - a[2] * a[4]);
-            inverse[3] = d * (a[0] * a[8] - a[2] * a[6]);
-            inverse[4] = d * (a[2] * a[3] - a[0] * a[5]);
-            inverse[5] = d * (a[0] * a[4] - a[1] * a[3]);
+    for (int k = 0; k < 6; ++k)
+        vectors[INVERSE * length + 6 * i + k] = inverse[k];
+}
+__syncthreads();
+
+// Of the last warp, after a meeting: the next phase and its factors.
+auto decide = [&](double per_gamma, double per_alpha) {
+    if (phase == RESIDUAL) {
+        rr = sums[0];
+        goal = tolerance * tolerance * sums[1];
+        phase = END;
+        if (!(rr > goal) || ended || iteration >= max_iterations)
+            return;
+        if (!(updated > goal)) {
+            // what is carried along says that this is the end, and is wrong, or as right as rounding allows
+            if (rr <= 256.0 * ROUNDING * ROUNDING * sums[2])
+                rr = updated;
+            if (rr > 0.25 * before || rr == updated)
+                return;
+            before = rr;
+            textbook = true;
         }
-        for (int k = 0; k < 6; ++k)
-            vectors[INVERSE * length + 6 * i + k] = inverse[k];
+        textbook = textbook || iteration >= PIPELINED;
+        phase = textbook ? RESTART : of_guess ? BEGIN : GET_W;
+        of_guess = false;
+        since = 0;
+    } else if (phase == GET_W) {
+        phase = GET_S;
+    } else if (phase == GET_S) {
+        phase = GET_Z;
+    } else if (phase == DIRECTION) {
+        phase = CURVATURE;
+    } else if (phase == CURVATURE) {
+        if (sums[1] > 0.0)
+            least = fmin(least, sums[0] / sums[1]);
+        alpha = gamma_before / sums[0];
+        ++iteration;
+        phase = UPDATE;
+    } else {
+        updated = sums[0];
+        const double gamma = sums[1];
+        // p . A p is gamma / alpha
+        if (watch && phase == ITERATE && sums[3] > 0.0)
+            least = fmin(least, gamma_before * per_alpha / sums[3]);
+        ended = iteration >= max_iterations || (watch && least <= 0.0);
+        since += phase == ITERATE;
+        const bool rounded = !textbook && updated > goal && updated < CARRIED * rr;
+        textbook = textbook || rounded;
+        afresh = afresh || rounded;
+        if (ended || !(updated > goal) || rounded || (since == RENEWED_EVERY && !textbook)) {
+            phase = RESIDUAL;
+            return;
+        }
+        if (phase == RESTART)
+            afresh = afresh || fabs(sums[2]) > ALONG * gamma_before;
+        beta = iteration > 0 && !afresh ? gamma * per_gamma : 0.0;
+        afresh = false;
+        if (textbook) {
+            phase = DIRECTION;
+        } else {
+            phase = ITERATE;
+            alpha = gamma / (sums[2] - beta * gamma * per_alpha);
+            ++iteration;
+        }
+        gamma_before = gamma;
+    }
+};
+while (phase < END) {
+    ++epoch;
+    word *const outgoing = places + size_t(epoch % 2) * 4 * nodes;
+    const bool tells_solution = phase >= GET_Z && phase <= ITERATE || phase == UPDATE;
+    for (int k = 0; k < SUMS; ++k)
+        sums[k] = 0.0;
+#pragma unroll 1
+    for (int base = warp * ROWS_OF_WARP; !adds_up && base < rows; base += ROWS_AT_ONCE) {
+        // threads without a component go along: they take part in shuffles
+        const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
+        const bool mine = base + lane / LANES < rows && sub < 3;
+        auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
+        const double y = phase == RESIDUAL ? product(row, solution, epoch - 1, true) : vector(PRODUCT);
+        double x = vector(X), r = vector(R), u = vector(U), p = vector(P), v = y, bi = 0.0;
+        if (phase == ITERATE) {
+            const double w = vector(W), z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
+            const double s = w + beta * vector(S);
+            v = w - alpha * z;
+            p = u + beta * p;
+            x += alpha * p;
+            r -= alpha * s;
+            u -= alpha * q;
+            if (mine) {
+                vector(Z) = z;
+                vector(Q) = q;
+                vector(S) = s;
+                vector(P) = p;
+                vector(X) = x;
+                vector(R) = r;
+                vector(U) = u;
+                vector(W) = v;
+            }
+        } else if (phase == RESIDUAL) {
+            bi = double(b_of[3 * size_t(row0) + i]);
+            r = v = bi - y;
+            x = double(REAL(x));
+            if (mine) {
+                vector(X) = x;
+                vector(R) = r;
+            }
+        } else if (phase == UPDATE) {
+            x += alpha * p;
+            r = v = r - alpha * vector(S);
+            if (mine) {
+                vector(X) = x;
+                vector(R) = r;
+            }
+        } else if (phase == GET_Z || phase == RESTART) {
+            v = vector(W);
+            if (mine && phase == GET_Z)
+                vector(Z) = y;
+        } else if (phase == DIRECTION) {
+            p = u + beta * p;
+            if (mine)
+                vector(P) = p;
+        } else if (mine && phase != GET_S && phase != CURVATURE) {
+            vector(W) = y;
+        }
+        double give = p;
+        if (phase != GET_W && phase != DIRECTION && phase != CURVATURE)
+            give = precondition(row, v);
+        publish(outgoing, row, give, mine);
+        // as it will be stored, should this be the end
+        if (tells_solution)
+            publish(solution, row, double(REAL(x)), mine);
+        if (!mine)
+            continue;
+        if (phase == RESIDUAL) {
+            vector(U) = give;
+            const double magnitude = size + fabs(bi);
+            sums[0] += r * r;
+            sums[1] += bi * bi;
+            sums[2] += magnitude * magnitude;
+        } else if (phase == GET_S) {
+            vector(S) = y;
+            vector(Q) = give;
+        } else if (phase == CURVATURE) {
+            vector(S) = y;
+            sums[0] += p * y;
+            sums[1] += p * p;
+        } else if (phase == UPDATE) {
+            vector(U) = give;
+            sums[0] += r * r;
+            sums[1] += r * give;
+        } else if (tells_solution) {
+            vector(M) = give;
+            sums[0] += r * r;
+            sums[1] += r * u;
+            sums[2] += phase == RESTART ? r * p : v * u;
+            sums[3] += p * p;
+        }
+    }
+    if (!adds_up) {
+        of_guess = false;
+        const double sum = warp_sums(sums);
+        if (lane % 8 == 0)
+            partial[warp][lane / 8] = sum;
     }
     __syncthreads();
-
-    // Of the last warp, after a meeting: the next phase and its factors.
-    auto decide = [&](double per_gamma, double per_alpha) {
-        if (phase == RESIDUAL) {
-            rr = sums[0];
-            goal = tolerance * tolerance * sums[1];
-            phase = END;
-            if (!(rr > goal) || ended || iteration >= max_iterations)
-                return;
-            if (!(updated > goal)) {
-                // what is carried along says that this is the end, and is wrong, or as right as rounding allows
-                if (rr <= 256.0 * ROUNDING * ROUNDING * sums[2])
-                    rr = updated;
-                if (rr > 0.25 * before || rr == updated)
-                    return;
-                before = rr;
-                textbook = true;
-            }
-            textbook = textbook || iteration >= PIPELINED;
-            phase = textbook ? RESTART : of_guess ? BEGIN : GET_W;
-            of_guess = false;
-            since = 0;
-        } else if (phase == GET_W) {
-            phase = GET_S;
-        } else if (phase == GET_S) {
-            phase = GET_Z;
-        } else if (phase == DIRECTION) {
-            phase = CURVATURE;
-        } else if (phase == CURVATURE) {
-            if (sums[1] > 0.0)
-                least = fmin(least, sums[0] / sums[1]);
-            alpha = gamma_before / sums[0];
-            ++iteration;
-            phase = UPDATE;
-        } else {
-            updated = sums[0];
-            const double gamma = sums[1];
-            // p . A p is gamma / alpha
-            if (watch && phase == ITERATE && sums[3] > 0.0)
-                least = fmin(least, gamma_before * per_alpha / sums[3]);
-            ended = iteration >= max_iterations || (watch && least <= 0.0);
-            since += phase == ITERATE;
-            // not where it begins again, which is not written down
-            if (BATCHED && phase != RESTART && sums[3] > 0.0 && !ended && updated > goal) {
-                phase = LEAVE;
-                return;
-            }
-            const bool rounded = !textbook && updated > goal && updated < CARRIED * rr;
-            textbook = textbook || rounded;
-            afresh = afresh || rounded;
-            if (ended || !(updated > goal) || rounded || (since == RENEWED_EVERY && !textbook)) {
-                phase = RESIDUAL;
-                return;
-            }
-            if (phase == RESTART)
-                afresh = afresh || fabs(sums[2]) > ALONG * gamma_before;
-            beta = iteration > 0 && !afresh ? gamma * per_gamma : 0.0;
-            afresh = false;
-            if (textbook) {
-                phase = DIRECTION;
-            } else {
-                phase = ITERATE;
-                alpha = gamma / (sums[2] - beta * gamma * per_alpha);
-                ++iteration;
-            }
-            gamma_before = gamma;
-        }
-    };
-    while (phase < END) {
-        ++epoch;
-        word *const outgoing = places + size_t(epoch % 2) * 4 * nodes;
-        const bool tells_solution = phase >= GET_Z && phase <= ITERATE || phase == UPDATE;
-        bool few = false;
-#if BATCHED
-        // so few go on that the rest may wait for the next launch
-        few = adds_up && me == 0 && *(volatile int *)remaining.data <= linger.data[0];
-#endif
-        for (int k = 0; k < SUMS; ++k)
-            sums[k] = 0.0;
+    if (adds_up) {
+        // what the next factors need is on its way while others are waited for
+        const double per_gamma = 1.0 / gamma_before, per_alpha = 1.0 / alpha;
+        asm volatile("" ::"d"(per_gamma), "d"(per_alpha));
+        meet();
+        decide(per_gamma, per_alpha);
+        if (lane == 0)
+            factors[0] = alpha, factors[1] = beta, *next = phase;
+    } else if (phase != CURVATURE && phase != UPDATE) {
 #pragma unroll 1
-        for (int base = warp * ROWS_OF_WARP; !adds_up && base < rows; base += ROWS_AT_ONCE) {
-            // threads without a component go along: they take part in shuffles
-            const int row = min(base + lane / LANES, rows - 1), i = 3 * row + component;
-            const bool mine = base + lane / LANES < rows && sub < 3;
-            auto vector = [&](int which) -> double & { return vectors[which * length + i]; };
-            const double y = phase == RESIDUAL ? product(row, solution, epoch - 1, true) : vector(PRODUCT);
-            double x = vector(X), r = vector(R), u = vector(U), p = vector(P), v = y, bi = 0.0;
-            if (phase == ITERATE) {
-                const double w = vector(W), z = y + beta * vector(Z), q = vector(M) + beta * vector(Q);
-                const double s = w + beta * vector(S);
-                v = w - alpha * z;
-                p = u + beta * p;
-                x += alpha * p;
-                r -= alpha * s;
-                u -= alpha * q;
-                if (mine) {
-                    vector(Z) = z;
-                    vector(Q) = q;
-                    vector(S) = s;
-                    vector(P) = p;
-                    vector(X) = x;
-                    vector(R) = r;
-                    vector(U) = u;
-                    vector(W) = v;
-                }
-            } else if (phase == RESIDUAL) {
-                bi = double(b_of[(3 * size_t(row0) + i) * stride + slot]);
-                r = v = bi - y;
-                x = double(REAL(x));
-                if (mine) {
-                    vector(X) = x;
-                    vector(R) = r;
-                }
-            } else if (phase == UPDATE) {
-                x += alpha * p;
-                r = v = r - alpha * vector(S);
-                if (mine) {
-                    vector(X) = x;
-                    vector(R) = r;
-                }
-            } else if (phase == GET_Z || phase == RESUME || phase == RESTART) {
-                v = vector(W);
-                if (mine && phase == GET_Z)
-                    vector(Z) = y;
-            } else if (phase == DIRECTION) {
-                p = u + beta * p;
-                if (mine)
-                    vector(P) = p;
-            } else if (mine && phase != GET_S && phase != CURVATURE) {
-                vector(W) = y;
-            }
-            double give = p;
-            if (phase != GET_W && phase != DIRECTION && phase != CURVATURE)
-                give = precondition(row, v);
-            publish(outgoing, row, give, mine);
-            // as it will be stored, should this be the end
-            if (tells_solution)
-                publish(solution, row, double(REAL(x)), mine);
-            if (!mine)
-                continue;
-            if (phase == RESIDUAL) {
-                vector(U) = give;
-                const double magnitude = size + fabs(bi);
-                sums[0] += r * r;
-                sums[1] += bi * bi;
-                sums[2] += magnitude * magnitude;
-            } else if (phase == GET_S) {
-                vector(S) = y;
-                vector(Q) = give;
-            } else if (phase == CURVATURE) {
-                vector(S) = y;
-                sums[0] += p * y;
-                sums[1] += p * p;
-            } else if (phase == UPDATE) {
-                vector(U) = give;
-                sums[0] += r * r;
-                sums[1] += r * give;
-            } else if (tells_solution) {
-                vector(M) = give;
-                sums[0] += r * r;
-                sums[1] += r * u;
-                sums[2] += phase == RESTART ? r * p : v * u;
-                // of many systems nobody asks for the curvature
-                if (!BATCHED)
-                    sums[3] += p * p;
-            }
+        for (int base = warp * ROWS_OF_WARP; base < rows; base += ROWS_AT_ONCE) {
+            const int row = min(base + lane / LANES, rows - 1);
+            const double y = product(row, outgoing, epoch, false);
+            if (base + lane / LANES < rows && sub < 3)
+                vectors[PRODUCT * length + 3 * row + sub] = y;
         }
-        if (!adds_up) {
-            of_guess = false;
-            const double sum = warp_sums(sums);
-            if (lane % 8 == 0)
-                partial[warp][lane / 8] = sum;
-        }
-        __syncthreads();
-        if (adds_up) {
-            // what the next factors need is on its way while others are waited for
-            const double per_gamma = 1.0 / gamma_before, per_alpha = 1.0 / alpha;
-            asm volatile("" ::"d"(per_gamma), "d"(per_alpha));
-            meet(few);
-            decide(per_gamma, per_alpha);
-            if (lane == 0)
-                factors[0] = alpha, factors[1] = beta, *next = phase;
-        } else if (phase != CURVATURE && phase != UPDATE) {
-#pragma unroll 1
-            for (int base = warp * ROWS_OF_WARP; base < rows; base += ROWS_AT_ONCE) {
-                const int row = min(base + lane / LANES, rows - 1);
-                const double y = product(row, outgoing, epoch, false);
-                if (base + lane / LANES < rows && sub < 3)
-                    vectors[PRODUCT * length + 3 * row + sub] = y;
-            }
-        }
-        __syncthreads();
-        if (*quit)
-            return;
-        alpha = factors[0], beta = factors[1], phase = *next;
     }
+    __syncthreads();
+    if (*quit)
+        return;
+    alpha = factors[0], beta = factors[1], phase = *next;
+}
 
-#if BATCHED
-    if (phase == LEAVE) {
-        for (int i = tid; i < length; i += THREADS)
-            for (int k = 0; k < 9; ++k)
-                saved_vectors[k * length + i] = vectors[k * length + i];
-        if (me == 0 && adds_up && lane == 0) {
-            saved[0] = double(iteration), saved[1] = double(since);
-            saved[2] = gamma_before, saved[3] = alpha, saved[4] = before, saved[5] = goal, saved[6] = double(textbook);
-            saved[7] = rr;
-        }
-        continue;
-    }
-    if (me == 0 && adds_up && lane == 0) {
-        solving.data[slot] = 0;
-        atomicSub(remaining.data, 1);
-    }
-#endif
-    for (int i = tid; i < length; i += THREADS)
-        x_of[(3 * size_t(row0) + i) * stride + slot] = REAL(vectors[X * length + i]);
-    if (me == 0 && adds_up && lane == 0) {
-        outcome.data[4 * slot] = double(iteration);
-        outcome.data[4 * slot + 1] = sqrt(rr);
-        outcome.data[4 * slot + 2] = sqrt(goal);
-        outcome.data[4 * slot + 3] = least;
-    }
+for (int i = tid; i < length; i += THREADS)
+    x_of[3 * size_t(row0) + i] = REAL(vectors[X * length + i]);
+if (me == 0 && adds_up && lane == 0) {
+    outcome.data[0] = double(iteration);
+    outcome.data[1] = sqrt(rr);
+    outcome.data[2] = sqrt(goal);
+    outcome.data[3] = least;
 }
 if (me == 0 && tid == 0)
     state[0] = (int)epoch;

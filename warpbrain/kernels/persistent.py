@@ -32,27 +32,26 @@ from warpbrain.kernels.precision import Precision
 
 #: Threads of a block that have rows, and how many of them may share one: the most with which all rows are under way at
 #: once. One more warp adds up the sums of all blocks.
-_WORKERS, LANES = 480, (16, 8, 4)
+_WORKERS, _LANES = 480, (16, 8, 4)
 #: Threads of a block.
 THREADS = _WORKERS + 32
 #: What a kernel has of a multiprocessor's shared memory without asking for it [bytes].
 _RESERVED = 6 * 1024
 #: Numbers of a row beside the matrix: ten vectors of three components and half an inverse diagonal block.
-NUMBERS = 36
+_NUMBERS = 36
 #: Sums of a meeting; a message is one, and the number of the meeting.
 _SUMS = 4
 #: Blocks that may meet.
-MOST_BLOCKS = 256
+_MOST_BLOCKS = 256
 #: Rows that a block has at least, unless there are fewer: what more blocks say to each other takes longer than these.
 _LEAST_ROWS = 32
 
 
-def native_code(precision: Precision, shared_bytes: int, lanes: int, messages: int, batched: bool = False) -> str:
+def native_code(precision: Precision, shared_bytes: int, lanes: int, messages: int) -> str:
     """What the kernels consist of: `lanes` threads have a row, and a thread of the last warp has `messages`."""
     real = {"double": "double", "single": "float"}[precision.name]
     code = files("warpbrain.kernels").joinpath("persistent.cu").read_text(encoding="utf-8")
     return (
-        f"#define BATCHED {int(batched)}\n"
         f"using REAL = {real};\n"
         f"constexpr int THREADS = {THREADS}, LANES = {lanes}, MESSAGES = {messages}, SHARED_BYTES = {shared_bytes};\n"
         f"constexpr double ROUNDING = {precision.epsilon!r};\n"
@@ -134,41 +133,40 @@ def share_rows(offsets: NDArray[np.int32], blocks: int) -> tuple[NDArray[np.int3
     starts = np.searchsorted(offsets, np.linspace(0, offsets[-1], blocks + 1)).astype(np.int32)
     starts[0], starts[-1] = 0, len(offsets) - 1
     rows = int(np.max(np.diff(starts)))
-    lanes = next((lanes for lanes in LANES if rows * lanes <= _WORKERS), LANES[-1])
+    lanes = next((lanes for lanes in _LANES if rows * lanes <= _WORKERS), _LANES[-1])
     return starts, lanes, -(-blocks * _SUMS // 32)
 
 
 class Meetings:
-    """Where the blocks of some groups leave what others read.
+    """Where blocks leave what others read.
 
     Parameters
     ----------
-    rows, blocks, groups : int
-        Of a system, of a group, and of all.
+    rows, blocks : int
     device : Device
 
     Attributes
     ----------
     exchange : wp.array of double
-        Two places a group that take turns, and one for the solution, with four numbers a row.
+        Two places that take turns, and one for the solution, with four numbers a row.
     messages : wp.array of uint64
-        Two places a group that take turns, with a message for each sum of a block.
+        Two places that take turns, with a message for each sum of a block.
     scratch : wp.array of double
         What has no room on the chip.
     control : wp.array of int
-        Of each group the number of the last meeting, and whether one failed.
+        The number of the last meeting, and whether one failed.
     """
 
-    def __init__(self, rows: int, blocks: int, groups: int, device: wp.Device) -> None:
+    def __init__(self, rows: int, blocks: int, device: wp.Device) -> None:
         self._device = device
-        self.exchange = wp.zeros(groups * 12 * rows, dtype=wp.float64, device=device)
-        self.messages = wp.zeros(groups * 4 * _SUMS * blocks, dtype=wp.uint64, device=device)
-        self.scratch = wp.zeros(groups * NUMBERS * rows, dtype=wp.float64, device=device)
-        self.control = wp.zeros(groups * 2, dtype=int, device=device)
+        self.exchange = wp.zeros(12 * rows, dtype=wp.float64, device=device)
+        self.messages = wp.zeros(4 * _SUMS * blocks, dtype=wp.uint64, device=device)
+        self.scratch = wp.zeros(_NUMBERS * rows, dtype=wp.float64, device=device)
+        self.control = wp.zeros(2, dtype=int, device=device)
 
     def check(self) -> None:
         """Raise `SolveError` if a block did not hear from another; the next solve may then try again."""
-        if not np.any(self.control.numpy()[1::2]):
+        if not self.control.numpy()[1]:
             return
         self.control.zero_()
         self.messages.zero_()
@@ -208,10 +206,10 @@ class PersistentSolve:
         watch: bool,
     ) -> None:
         device, n = b.device, b.shape[0]
-        self._blocks = max(1, min(device.sm_count, MOST_BLOCKS, n // _LEAST_ROWS))
+        self._blocks = max(1, min(device.sm_count, _MOST_BLOCKS, n // _LEAST_ROWS))
         starts, lanes, messages = share_rows(matrix.offsets.numpy(), self._blocks)
         self._kernel = persistent_kernel(precision, shared_memory(device), lanes, messages)
-        self._meetings = m = Meetings(n, self._blocks, 1, device)
+        self._meetings = m = Meetings(n, self._blocks, device)
         self._outcome = wp.zeros(4, dtype=wp.float64, device=device)
         self._before = [
             matrix.offsets, matrix.columns, matrix.values, diagonal, wp.array(starts, dtype=int, device=device), b, x,

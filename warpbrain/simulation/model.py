@@ -185,7 +185,7 @@ class Model:
 
     def reactions(self, internal: Floats, external: Floats) -> Floats:
         """What holds the constrained components [N], zero elsewhere, of internal and external nodal forces (n, 3)."""
-        return np.where(self.constrained, internal - external, 0.0)
+        return np.subtract(internal, external, out=np.zeros(internal.shape), where=self.constrained)
 
     def prescribed_at(self, time: float, share: float) -> Floats:
         """Prescribed displacements (n, 3) [m] at a time [s]; a `share` of those that have no history."""

@@ -7,7 +7,7 @@ from functools import cache
 
 import warp as wp
 
-from warpbrain.kernels.batched.layout import ROWS, block_of, store_block, store_vector, vector_of
+from warpbrain.kernels.batched.layout import ROWS, store_block, store_vector, tangent_of, vector_of
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
@@ -26,7 +26,7 @@ def batched_assembly_kernels(precision: Precision) -> KernelSet:
         pairs: wp.array[wp.vec2i],
         first: wp.array[int],
         contributions: wp.array[int],
-        element_blocks: wp.array3d[scalar],
+        tangents: wp.array3d[scalar],
         mass: wp.array[scalar],
         free: wp.array[vec3],
         k: wp.array[scalar],
@@ -41,7 +41,7 @@ def batched_assembly_kernels(precision: Precision) -> KernelSet:
         slot = slots[lane]
         K = mat33()
         for c in range(first[p], first[p + 1]):
-            K += block_of(element_blocks, contributions[c], slot)
+            K += tangent_of(tangents, contributions[c] / 10, contributions[c] % 10, slot)
         i = pairs[p][0]
         j = pairs[p][1]
         A = wp.cw_mul(k[slot] * K, wp.outer(free[i], free[j]))
@@ -50,7 +50,7 @@ def batched_assembly_kernels(precision: Precision) -> KernelSet:
             inertia = m[slot] * mass[i]
             for c in range(3):
                 A[c, c] += free[i][c] * inertia + (one - free[i][c])
-        store_block(values, p, slot, A)
+        store_block(values, p, 0, slot, A)
 
     @kernels.add
     def gather_forces(
@@ -107,7 +107,7 @@ def batched_assembly_kernels(precision: Precision) -> KernelSet:
         first: wp.array[int],
         corners: wp.array[int],
         nodes: wp.array[wp.vec4i],
-        element_blocks: wp.array3d[scalar],
+        tangents: wp.array3d[scalar],
         velocity: wp.array3d[scalar],
         free: wp.array[vec3],
         k: wp.array[scalar],
@@ -125,8 +125,8 @@ def batched_assembly_kernels(precision: Precision) -> KernelSet:
             for b in range(4):
                 low = wp.min(a, b)
                 high = wp.max(a, b)
-                # position of the pair in the ten stored blocks
-                K = block_of(element_blocks, 10 * e + low * 4 - low * (low + 1) / 2 + high, slot)
+                # position of the pair in the ten blocks
+                K = tangent_of(tangents, e, low * 4 - low * (low + 1) / 2 + high, slot)
                 if a > b:
                     K = wp.transpose(K)
                 f += K * vector_of(velocity, nodes[e][b], slot)

@@ -4,7 +4,7 @@ from functools import cache
 
 import warp as wp
 
-from warpbrain.kernels.batched.layout import store_block, store_vector, vector_of
+from warpbrain.kernels.batched.layout import store_tangent, store_vector, vector_of
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import DeviceLaw
@@ -38,12 +38,11 @@ def batched_element_kernels(law: DeviceLaw, precision: Precision) -> KernelSet:
         parameters: wp.array2d[scalar],
         u: wp.array3d[scalar],
         element_forces: wp.array3d[scalar],
-        element_blocks: wp.array3d[scalar],
+        tangents: wp.array3d[scalar],
         element_J: wp.array2d[scalar],
     ):
         """One thread for an element of a group and a lane. Parameters have a row for each tissue and slot, slots
-        fastest. Element results are those of `warpbrain.kernels.tetrahedron`: corner ``4 e + a`` and block ``10 e +
-        k``."""
+        fastest. The force on a corner is in row ``4 e + a``."""
         t, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -60,19 +59,6 @@ def batched_element_kernels(law: DeviceLaw, precision: Precision) -> KernelSet:
         store_vector(element_forces, 4 * e + 1, slot, f1)
         store_vector(element_forces, 4 * e + 2, slot, f2)
         store_vector(element_forces, 4 * e + 3, slot, f3)
-        # each row and column of blocks sums to zero
-        K01 = -(K11 + wp.transpose(K12) + wp.transpose(K13))
-        K02 = -(K12 + K22 + wp.transpose(K23))
-        K03 = -(K13 + K23 + K33)
-        store_block(element_blocks, 10 * e, slot, -(K01 + K02 + K03))
-        store_block(element_blocks, 10 * e + 1, slot, K01)
-        store_block(element_blocks, 10 * e + 2, slot, K02)
-        store_block(element_blocks, 10 * e + 3, slot, K03)
-        store_block(element_blocks, 10 * e + 4, slot, K11)
-        store_block(element_blocks, 10 * e + 5, slot, K12)
-        store_block(element_blocks, 10 * e + 6, slot, K13)
-        store_block(element_blocks, 10 * e + 7, slot, K22)
-        store_block(element_blocks, 10 * e + 8, slot, K23)
-        store_block(element_blocks, 10 * e + 9, slot, K33)
+        store_tangent(tangents, e, slot, K11, K12, K13, K22, K23, K33)
 
     return kernels

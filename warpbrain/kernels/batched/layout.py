@@ -8,6 +8,8 @@ import warp as wp
 ROWS = 4
 #: Shares of a sum that one thread adds up in the stage after that.
 SHARES = 32
+#: Numbers of an element's tangent that are stored: of all blocks but `K_00`, three of which are symmetric.
+TANGENT = 72
 
 
 def stages(rows: int) -> tuple[int, int]:
@@ -31,45 +33,81 @@ def store_vector(x: wp.array3d[Any], i: int, slot: int, value: Any):
 
 
 @wp.func
-def block_of(blocks: wp.array3d[Any], i: int, slot: int):
-    """Block `i` of a sample."""
+def block_of(blocks: wp.array3d[Any], i: int, at: int, slot: int):
+    """Block of a sample whose numbers begin at `at` in row `i`."""
     return wp.matrix_from_rows(
-        wp.vector(blocks[i, 0, slot], blocks[i, 1, slot], blocks[i, 2, slot]),
-        wp.vector(blocks[i, 3, slot], blocks[i, 4, slot], blocks[i, 5, slot]),
-        wp.vector(blocks[i, 6, slot], blocks[i, 7, slot], blocks[i, 8, slot]),
+        wp.vector(blocks[i, at, slot], blocks[i, at + 1, slot], blocks[i, at + 2, slot]),
+        wp.vector(blocks[i, at + 3, slot], blocks[i, at + 4, slot], blocks[i, at + 5, slot]),
+        wp.vector(blocks[i, at + 6, slot], blocks[i, at + 7, slot], blocks[i, at + 8, slot]),
     )
 
 
 @wp.func
-def store_block(blocks: wp.array3d[Any], i: int, slot: int, value: Any):
-    """Set block `i` of a sample."""
+def store_block(blocks: wp.array3d[Any], i: int, at: int, slot: int, value: Any):
+    """Set it."""
     for r in range(3):
         for c in range(3):
-            blocks[i, 3 * r + c, slot] = value[r, c]
+            blocks[i, at + 3 * r + c, slot] = value[r, c]
 
 
 @wp.func
-def symmetric_of(blocks: wp.array3d[Any], i: int, slot: int):
-    """Symmetric block `i` of a sample, of which the six entries on and above the diagonal are kept."""
-    xy = blocks[i, 1, slot]
-    xz = blocks[i, 2, slot]
-    yz = blocks[i, 4, slot]
+def symmetric_of(blocks: wp.array3d[Any], i: int, at: int, slot: int):
+    """Likewise, a symmetric block, of which the six entries on and above the diagonal are kept."""
+    xy = blocks[i, at + 1, slot]
+    xz = blocks[i, at + 2, slot]
+    yz = blocks[i, at + 4, slot]
     return wp.matrix_from_rows(
-        wp.vector(blocks[i, 0, slot], xy, xz),
-        wp.vector(xy, blocks[i, 3, slot], yz),
-        wp.vector(xz, yz, blocks[i, 5, slot]),
+        wp.vector(blocks[i, at, slot], xy, xz),
+        wp.vector(xy, blocks[i, at + 3, slot], yz),
+        wp.vector(xz, yz, blocks[i, at + 5, slot]),
     )
 
 
 @wp.func
-def store_symmetric(blocks: wp.array3d[Any], i: int, slot: int, value: Any):
-    """Set symmetric block `i` of a sample."""
-    blocks[i, 0, slot] = value[0, 0]
-    blocks[i, 1, slot] = value[0, 1]
-    blocks[i, 2, slot] = value[0, 2]
-    blocks[i, 3, slot] = value[1, 1]
-    blocks[i, 4, slot] = value[1, 2]
-    blocks[i, 5, slot] = value[2, 2]
+def store_symmetric(blocks: wp.array3d[Any], i: int, at: int, slot: int, value: Any):
+    """Set it."""
+    blocks[i, at, slot] = value[0, 0]
+    blocks[i, at + 1, slot] = value[0, 1]
+    blocks[i, at + 2, slot] = value[0, 2]
+    blocks[i, at + 3, slot] = value[1, 1]
+    blocks[i, at + 4, slot] = value[1, 2]
+    blocks[i, at + 5, slot] = value[2, 2]
+
+
+@wp.func
+def store_tangent(
+    tangents: wp.array3d[Any], e: int, slot: int, K11: Any, K12: Any, K13: Any, K22: Any, K23: Any, K33: Any
+):
+    """Set the tangent of an element of a sample from its blocks of nodes 1 to 3: each row of blocks sums to zero."""
+    store_block(tangents, e, 0, slot, -(K11 + wp.transpose(K12) + wp.transpose(K13)))
+    store_block(tangents, e, 9, slot, -(K12 + K22 + wp.transpose(K23)))
+    store_block(tangents, e, 18, slot, -(K13 + K23 + K33))
+    store_block(tangents, e, 27, slot, K12)
+    store_block(tangents, e, 36, slot, K13)
+    store_block(tangents, e, 45, slot, K23)
+    store_symmetric(tangents, e, 54, slot, K11)
+    store_symmetric(tangents, e, 60, slot, K22)
+    store_symmetric(tangents, e, 66, slot, K33)
+
+
+@wp.func
+def tangent_of(tangents: wp.array3d[Any], e: int, k: int, slot: int):
+    """Block `k` of the ten of `warpbrain.kernels.tetrahedron.PAIRS`."""
+    if k == 0:
+        K01 = block_of(tangents, e, 0, slot)
+        return -(K01 + block_of(tangents, e, 9, slot) + block_of(tangents, e, 18, slot))
+    if k == 4:
+        return symmetric_of(tangents, e, 54, slot)
+    if k == 7:
+        return symmetric_of(tangents, e, 60, slot)
+    if k == 9:
+        return symmetric_of(tangents, e, 66, slot)
+    at = 9 * k - 9
+    if k > 4:
+        at = 9 * k - 18
+    if k > 7:
+        at = 45
+    return block_of(tangents, e, at, slot)
 
 
 @wp.func
@@ -87,7 +125,7 @@ def row_product(
     y = wp.vector(zero, zero, zero)
     for k in range(offsets[i], offsets[i + 1]):
         j = columns[k]
-        A = block_of(values, blocks[k], slot)
+        A = block_of(values, blocks[k], 0, slot)
         if j < i:
             A = wp.transpose(A)
         y += A * vector_of(x, j, slot)

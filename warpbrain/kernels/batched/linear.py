@@ -10,7 +10,8 @@ A system need not end in the loop that it began in. The loop is left when few go
 and go on in the next one beside whatever has been started until then. So a system that takes a thousand iterations
 holds up nobody.
 
-On a GPU the loop is one launch (`warpbrain.kernels.batched.persistent`).
+Where a GPU has clusters that keep a system on the chip, all of this is one launch, of which none is left over
+(`warpbrain.kernels.batched.cluster`).
 """
 
 from __future__ import annotations
@@ -20,23 +21,25 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from warpbrain.kernels.batched.cluster import ClusterSolve, fitting_parts, forms_clusters
 from warpbrain.kernels.batched.layout import stages
-from warpbrain.kernels.batched.persistent import PersistentBatch
+from warpbrain.kernels.batched.parts import Pattern
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
-from warpbrain.kernels.persistent import blocks_stay
+from warpbrain.kernels.persistent import shared_memory
 from warpbrain.kernels.precision import Precision
 
 
 class BatchedConjugateGradient:
     """Block-Jacobi CG for as many systems as there are slots; nothing is allocated in a solve.
 
-    Rows of the pattern begin at `offsets` in `columns`; `blocks` says where each block, or left of the diagonal its
-    transpose, is in `values` (pairs, 9, slots), of which those on and above the diagonal are kept, and `diagonal` (n,)
-    where diagonal blocks are. `solution` (n, 3, slots) is first guess and result. A system ends when ``|b - A x| <=
-    tolerance |b|``.
+    Solves `A (v + x) = b` for the change `x` of a given `v` (n, 3, slots) on the `free` components (n,): others have a
+    row and a column of the identity in `A`, and no `b`. `x` (n, 3, slots) is first guess and result. A system ends when
+    ``|b - A v - A x| <= tolerance |b - A v|``.
 
     Attributes
     ----------
+    values : wp.array, shape (pairs, 9, slots)
+        The stored blocks of `pattern`, laid out in memory as the solver wants them.
     right_hand_side : wp.array, shape (n, 3, slots)
         `b`; the residual may take its place.
     solving : wp.array of int, shape (slots,)
@@ -45,40 +48,47 @@ class BatchedConjugateGradient:
 
     def __init__(
         self,
-        offsets: wp.array,
-        columns: wp.array,
-        blocks: wp.array,
-        diagonal: wp.array,
-        values: wp.array,
-        solution: wp.array,
+        pattern: Pattern,
+        free: wp.array,
+        v: wp.array,
+        x: wp.array,
         precision: Precision,
         *,
         tolerance: float,
         max_iterations: int,
     ) -> None:
-        n, _, slots = solution.shape
+        n, _, slots = x.shape
         self._kernels = batched_solve_kernels(precision)
-        self._device = solution.device
-        self._pattern = (offsets, columns, blocks)
-        self._diagonal, self._values, self._x = diagonal, values, solution
+        self._device = device = x.device
+        self._free, self._v, self._x = free, v, x
         self._tolerance = precision.scalar(tolerance)
         self._max_iterations = max_iterations
         self._size, self._slots = n, slots
         self._chunks, self._groups = stages(n)
 
         def zeros(*shape: int, dtype: Any = precision.scalar) -> wp.array:
-            return wp.zeros(shape, dtype=dtype, device=self._device)
+            return wp.zeros(shape, dtype=dtype, device=device)
 
+        diagonal = wp.array(pattern.diagonal, dtype=int, device=device)
         self.right_hand_side = zeros(n, 3, slots)
         self.solving = zeros(slots, dtype=int)
-        self._active, self._count = zeros(slots, dtype=int), zeros(1, dtype=int)
-        self._persistent: PersistentBatch | None = None
-        if blocks_stay(self._device):
-            self._persistent = PersistentBatch(
-                offsets, columns, blocks, diagonal, values, self.right_hand_side, solution, self.solving, precision,
-                tolerance=tolerance, max_iterations=max_iterations,
+        self._cluster: ClusterSolve | None = None
+        parts = None
+        if forms_clusters(device):
+            parts = fitting_parts(pattern, precision.numpy.itemsize, shared_memory(device))
+        if parts is not None:
+            self.values = zeros(slots, pattern.stored, 9).transpose((1, 2, 0))
+            self._cluster = ClusterSolve(
+                parts, diagonal, self.values, self.right_hand_side, v, free, x, precision, tolerance=tolerance,
+                max_iterations=max_iterations,
             )  # fmt: skip
             return
+        self.values = zeros(pattern.stored, 9, slots)
+        self._diagonal = diagonal
+        self._pattern = tuple(
+            wp.array(table, dtype=int, device=device) for table in (pattern.offsets, pattern.columns, pattern.pairs)
+        )
+        self._active, self._count = zeros(slots, dtype=int), zeros(1, dtype=int)
         self._z, self._p, self._q = zeros(n, 3, slots), zeros(n, 3, slots), zeros(n, 3, slots)
         self._inverse = zeros(n, 6, slots)
         self._shares, self._sums = zeros(3, self._chunks, slots), zeros(3, self._groups, slots)
@@ -93,14 +103,13 @@ class BatchedConjugateGradient:
 
     def start(self, slots: wp.array, count: wp.array) -> None:
         """Begin the systems of a list of slots, whose matrices, right-hand sides and guesses have been set."""
-        if self._persistent is not None:
-            self._persistent.begin(slots, count)
+        if self._cluster is not None:
             return
         k, lanes = self._kernels, self._slots
-        self._launch(k.invert_diagonal, (self._size, lanes), slots, count, self._diagonal, self._values, self._inverse)
+        self._launch(k.invert_diagonal, (self._size, lanes), slots, count, self._diagonal, self.values, self._inverse)
         self._launch(
-            k.start, (self._chunks, lanes), slots, count, *self._pattern, self._values, self._inverse, self._x,
-            self.right_hand_side, self._z, self._p, self._shares,
+            k.start, (self._chunks, lanes), slots, count, *self._pattern, self.values, self._inverse, self._v,
+            self._free, self._x, self.right_hand_side, self._z, self._p, self._shares,
         )  # fmt: skip
         self._launch(k.add_shares, (3, self._groups, lanes), slots, count, self._shares, self._sums)
         self._launch(
@@ -113,31 +122,27 @@ class BatchedConjugateGradient:
 
         To be called while a graph is being captured, in which it becomes a loop on the device.
         """
+        if self._cluster is not None:
+            self._cluster.solve(slots, count)
+            return
 
-        def gather() -> None:
+        def look() -> None:
             self._launch(
                 self._kernels.gather_active, self._slots, slots, count, self.solving, self._active, self._count
             )
-
-        def look() -> None:
-            gather()
             self._launch(self._kernels.go_on, 1, self._count, linger, self._go_on)
 
         def cycle() -> None:
             self._iteration()
             look()
 
-        if self._persistent is not None:
-            gather()
-            self._persistent.solve(self._active, self._count, linger)
-            return
         look()
         wp.capture_while(self._go_on, cycle)
 
     def _iteration(self) -> None:
         k, lanes, chunks = self._kernels, self._slots, (self._chunks, self._slots)
         active = (self._active, self._count)
-        self._launch(k.product, chunks, *active, *self._pattern, self._values, self._p, self._q, self._shares)
+        self._launch(k.product, chunks, *active, *self._pattern, self.values, self._p, self._q, self._shares)
         self._launch(k.add_shares, (1, self._groups, lanes), *active, self._shares, self._sums)
         self._launch(k.finish_product, lanes, *active, self._sums, self._rz, self._alpha)
         self._launch(
@@ -153,8 +158,8 @@ class BatchedConjugateGradient:
 
     def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Iterations, residual norms and goals of all slots (waits for the device)."""
-        if self._persistent is not None:
-            return self._persistent.results()
+        if self._cluster is not None:
+            return self._cluster.results()
         with np.errstate(invalid="ignore"):
             return (
                 self._iterations.numpy().copy(),

@@ -7,7 +7,7 @@ from functools import cache
 
 import warp as wp
 
-from warpbrain.kernels.batched.layout import row_product, store_vector, vector_of
+from warpbrain.kernels.batched.layout import store_vector, vector_of
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
@@ -69,10 +69,6 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
     def begin(
         slots: wp.array[int],
         count: wp.array[int],
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        blocks: wp.array[int],
-        values: wp.array3d[scalar],
         loads: wp.array2d[vec3],
         factors: wp.array2d[scalar],
         internal: wp.array3d[scalar],
@@ -85,7 +81,7 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         v_start: wp.array3d[scalar],
         b: wp.array3d[scalar],
     ):
-        """Keeps the state and writes the right-hand side `b = M v + h (f_ext - f_int) - A v` on the free components."""
+        """Keeps the state and writes the right-hand side `b = M v + h (f_ext - f_int)` on the free components."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -96,9 +92,8 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         external = vec3()
         for load in range(loads.shape[0]):
             external += factors[load, slot] * loads[load, i]
-        Av = row_product(offsets, columns, blocks, values, v, i, slot)
         step = h[slot] * (external - vector_of(internal, i, slot))
-        store_vector(b, i, slot, wp.cw_mul(free[i], mass[i] * vi + step - Av))
+        store_vector(b, i, slot, wp.cw_mul(free[i], mass[i] * vi + step))
 
     @kernels.add
     def update(
@@ -137,9 +132,10 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
             ready[slot] = 1
 
     @kernels.add
-    def collect(slots: wp.array[int], x: wp.array3d[scalar], collected: wp.array2d[vec3]):
-        """One thread for a slot of a list and a node: a sample's vectors side by side, as they leave the device."""
-        place, i = wp.tid()
-        collected[place, i] = vec3(x[i, 0, slots[place]], x[i, 1, slots[place]], x[i, 2, slots[place]])
+    def collect(slots: wp.array[int], nodes: wp.array[int], x: wp.array3d[scalar], collected: wp.array[vec3]):
+        """One thread for a slot of a list and a node of a list: vectors of a sample side by side, as they leave the
+        device."""
+        place, k = wp.tid()
+        collected[place * nodes.shape[0] + k] = vector_of(x, nodes[k], slots[place])
 
     return kernels

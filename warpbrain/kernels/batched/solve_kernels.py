@@ -21,7 +21,7 @@ from warpbrain.kernels.precision import Precision
 @cache
 def batched_solve_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of batched conjugate gradients in a precision; the last index of each is a lane."""
-    scalar = precision.scalar
+    scalar, vec3 = precision.scalar, precision.vec3
     kernels = KernelSet(f"linear_{precision.name}_batched")
     rows = wp.constant(ROWS)
     shares_each = wp.constant(SHARES)
@@ -39,7 +39,7 @@ def batched_solve_kernels(precision: Precision) -> KernelSet:
         if lane >= count[0]:
             return
         slot = slots[lane]
-        store_symmetric(inverse, i, slot, wp.inverse(block_of(values, diagonal[i], slot)))
+        store_symmetric(inverse, i, 0, slot, wp.inverse(block_of(values, diagonal[i], 0, slot)))
 
     @kernels.add
     def start(
@@ -50,14 +50,16 @@ def batched_solve_kernels(precision: Precision) -> KernelSet:
         blocks: wp.array[int],
         values: wp.array3d[scalar],
         inverse: wp.array3d[scalar],
+        v: wp.array3d[scalar],
+        free: wp.array[vec3],
         x: wp.array3d[scalar],
         r: wp.array3d[scalar],
         z: wp.array3d[scalar],
         p: wp.array3d[scalar],
         shares: wp.array3d[scalar],
     ):
-        """One thread for `ROWS` nodes: residual `r = b - A x` (in the place of `b`), `z = D^-1 r`, `p = z`; shares of
-        `b . b`, `r . r` and `r . z`."""
+        """One thread for `ROWS` nodes: `b - A v` on free components, of `b` in the place of `r`, residual
+        `r = b - A v - A x`, `z = D^-1 r`, `p = z`; shares of `|b - A v|^2`, `r . r` and `r . z`."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
@@ -66,9 +68,10 @@ def batched_solve_kernels(precision: Precision) -> KernelSet:
         rr = scalar(0.0)
         rz = scalar(0.0)
         for i in range(chunk * rows, wp.min((chunk + 1) * rows, x.shape[0])):
-            b = vector_of(r, i, slot)
+            Av = row_product(offsets, columns, blocks, values, v, i, slot)
+            b = vector_of(r, i, slot) - wp.cw_mul(free[i], Av)
             ri = b - row_product(offsets, columns, blocks, values, x, i, slot)
-            zi = symmetric_of(inverse, i, slot) * ri
+            zi = symmetric_of(inverse, i, 0, slot) * ri
             store_vector(r, i, slot, ri)
             store_vector(z, i, slot, zi)
             store_vector(p, i, slot, zi)
@@ -127,7 +130,7 @@ def batched_solve_kernels(precision: Precision) -> KernelSet:
         for i in range(chunk * rows, wp.min((chunk + 1) * rows, x.shape[0])):
             store_vector(x, i, slot, vector_of(x, i, slot) + a * vector_of(p, i, slot))
             ri = vector_of(r, i, slot) - a * vector_of(q, i, slot)
-            zi = symmetric_of(inverse, i, slot) * ri
+            zi = symmetric_of(inverse, i, 0, slot) * ri
             store_vector(r, i, slot, ri)
             store_vector(z, i, slot, zi)
             rr += wp.dot(ri, ri)

@@ -1,0 +1,231 @@
+"""Many systems of one pattern in one launch on a GPU whose multiprocessors can form clusters (compute capability 9).
+
+A system has a cluster of blocks of threads, one on each of a few multiprocessors, as many as it takes to keep its
+matrix and vectors in their shared memory and registers. It runs plain block-Jacobi conjugate gradients there: at two
+barriers an iteration the blocks read each other's sums and neighbouring numbers where they lie (CUDA Programming Guide,
+"Distributed Shared Memory"), so that an iteration does not touch the GPU's memory. Who has what is in
+`warpbrain.kernels.batched.parts`.
+
+There are as many clusters as systems, and the GPU begins one where another has ended. All sums have an order that
+depends on the pattern alone: so a system has the same bits alone and among others.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from warpbrain.kernels.batched.parts import ENDS, Parts, Pattern, parts_of
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.persistent import blocks_stay
+from warpbrain.kernels.precision import Precision
+
+#: Blocks of a cluster, of which the fewest that have room are taken; and threads of a block.
+SIZES, THREADS = (1, 2, 4, 8, 16), 512
+#: 32-bit registers of a thread that hold blocks of the matrix: of 128, with what else it needs.
+_REGISTERS = 72
+#: Bytes of shared memory that are read at a time.
+_BANKS = 128
+#: Sizes of a kernel are whole multiples of this: meshes of about the same size share it.
+_ROUNDED = 32
+
+
+def forms_clusters(device: wp.Device) -> bool:
+    """Whether blocks of a device can read each other's shared memory; see also `blocks_stay`."""
+    return blocks_stay(device) and device.arch >= 90
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Constants of the kernel; see `warpbrain.kernels.batched.parts`.
+
+    `in_registers` and `in_shared` of the places of a thread are kept there.
+    """
+
+    cluster: int
+    places: int
+    in_registers: int
+    rows: int
+    outers: int
+    segments: int
+
+    @property
+    def in_shared(self) -> int:
+        """Places of a thread in shared memory: at least one, through which those in registers are loaded."""
+        return self.places - self.in_registers
+
+    def shared_bytes(self, real: int) -> int:
+        """Shared memory of a block, with numbers of so many bytes; as `cluster.cu` lays it out."""
+        warps = min(THREADS // 32, -(-self.rows // 32))
+        numbers = 9 * self.in_shared * (THREADS + 1) + 15 * self.rows + 3 * self.outers + 3 * self.segments
+        return 32 * self.cluster * warps + real * numbers + 2 * (self.places * THREADS + self.rows + 1)
+
+
+def sizes_of(parts: Parts, real: int) -> Sizes:
+    """Constants for a pattern's parts and numbers of so many bytes."""
+    rows, outers, segments = (max(1, -(-n // _ROUNDED)) * _ROUNDED for n in (parts.rows, parts.outer, parts.segments))
+    in_registers = min(parts.places - 1, 4 * _REGISTERS // (9 * real))
+    return Sizes(parts.blocks, parts.places, in_registers, rows, outers, segments)
+
+
+def fitting_parts(pattern: Pattern, real: int, shared_bytes: int) -> Parts | None:
+    """Parts for the smallest cluster that keeps a matrix of numbers of `real` bytes, or None."""
+    for blocks in SIZES:
+        # without more ado where not even the matrix has room
+        if 9 * real * len(pattern.columns) > blocks * (shared_bytes + 4 * _REGISTERS * THREADS):
+            continue
+        if np.count_nonzero(pattern.active) < blocks:
+            break
+        parts = parts_of(pattern, blocks, THREADS, _BANKS // real)
+        sizes = sizes_of(parts, real)
+        if sizes.rows + sizes.outers < ENDS and sizes.shared_bytes(real) <= shared_bytes:
+            return parts
+    return None
+
+
+def native_code(precision: Precision, sizes: Sizes) -> str:
+    """What the kernel consists of."""
+    real = {"double": "double", "single": "float"}[precision.name]
+    code = files("warpbrain.kernels.batched").joinpath("cluster.cu").read_text(encoding="utf-8")
+    return (
+        f"using REAL = {real};\n"
+        f"constexpr int THREADS = {THREADS}, CLUSTER = {sizes.cluster}, PLACES = {sizes.places}, "
+        f"IN_REGISTERS = {sizes.in_registers}, IN_SHARED = {sizes.in_shared}, ROWS = {sizes.rows}, "
+        f"OUTERS = {sizes.outers}, SEGMENTS = {sizes.segments};\n"
+    ) + code
+
+
+@cache
+def cluster_kernel(precision: Precision, sizes: Sizes) -> Any:
+    """Make (once) the kernel of what `native_code` is for."""
+    scalar, vec3 = precision.scalar, precision.vec3
+    name = "_".join(str(size) for size in vars(sizes).values())
+    module = compiled_module(f"cluster_{precision.name}_{name}")
+    module.options["block_dim"] = THREADS
+    numbers = wp.constant(-(-sizes.shared_bytes(precision.numpy.itemsize) // 8))
+
+    @wp.func_native(native_code(precision, sizes))
+    def solve(
+        slots: wp.array[int],
+        count: wp.array[int],
+        ahead: int,
+        starts: wp.array[int],
+        nodes: wp.array[int],
+        outer_starts: wp.array[int],
+        outer_nodes: wp.array[int],
+        outer_places: wp.array[int],
+        place_pairs: wp.array3d[int],
+        place_columns: wp.array3d[int],
+        segment_starts: wp.array2d[int],
+        row_segments: wp.array[int],
+        diagonal: wp.array[int],
+        pair_count: int,
+        values: wp.array3d[scalar],
+        b: wp.array3d[scalar],
+        v: wp.array3d[scalar],
+        free: wp.array[vec3],
+        x: wp.array3d[scalar],
+        tolerance: wp.float64,
+        max_iterations: int,
+        outcome: wp.array2d[wp.float64],
+    ): ...
+
+    @wp.kernel(module=module, launch_bounds=(THREADS, 1), cluster_dim=sizes.cluster, grid_stride=False)
+    def conjugate_gradients(
+        slots: wp.array[int],
+        count: wp.array[int],
+        ahead: int,
+        starts: wp.array[int],
+        nodes: wp.array[int],
+        outer_starts: wp.array[int],
+        outer_nodes: wp.array[int],
+        outer_places: wp.array[int],
+        place_pairs: wp.array3d[int],
+        place_columns: wp.array3d[int],
+        segment_starts: wp.array2d[int],
+        row_segments: wp.array[int],
+        diagonal: wp.array[int],
+        pair_count: int,
+        values: wp.array3d[scalar],
+        b: wp.array3d[scalar],
+        v: wp.array3d[scalar],
+        free: wp.array[vec3],
+        x: wp.array3d[scalar],
+        tolerance: wp.float64,
+        max_iterations: int,
+        outcome: wp.array2d[wp.float64],
+    ):
+        # all of the shared memory: the native code knows where it begins
+        wp.tile_empty(shape=numbers, dtype=wp.float64, storage="shared")
+        solve(
+            slots, count, ahead, starts, nodes, outer_starts, outer_nodes, outer_places, place_pairs, place_columns,
+            segment_starts, row_segments, diagonal, pair_count, values, b, v, free, x, tolerance, max_iterations,
+            outcome,
+        )  # fmt: skip
+
+    return conjugate_gradients
+
+
+class ClusterSolve:
+    """Solves systems of a list of slots; what it takes is as of `BatchedConjugateGradient`.
+
+    Parameters
+    ----------
+    parts : Parts
+        Of the pattern, for clusters that have room for it.
+    diagonal : wp.array of int, shape (n,)
+    values : wp.array, shape (pairs, 9, slots)
+        Of which the numbers of a slot are side by side in memory.
+    b, v, x : wp.array, shape (n, 3, slots)
+    free : wp.array of vec3, shape (n,)
+    precision : Precision
+    tolerance : float
+    max_iterations : int
+    """
+
+    def __init__(
+        self,
+        parts: Parts,
+        diagonal: wp.array,
+        values: wp.array,
+        b: wp.array,
+        v: wp.array,
+        free: wp.array,
+        x: wp.array,
+        precision: Precision,
+        *,
+        tolerance: float,
+        max_iterations: int,
+    ) -> None:
+        self._device = device = x.device
+        self._clusters = x.shape[2]
+        self._kernel = cluster_kernel(precision, sizes_of(parts, precision.numpy.itemsize))
+        self._block_count = self._clusters * parts.blocks
+        self._outcome = wp.zeros((self._clusters, 3), dtype=wp.float64, device=device)
+        tables = (
+            parts.starts, parts.nodes, parts.outer_starts, parts.outer_nodes, parts.outer_places, parts.pairs,
+            parts.columns, parts.segment_starts, parts.row_segments,
+        )  # fmt: skip
+        self._inputs = [
+            # about as many are under way at a time
+            device.sm_count // parts.blocks, *(wp.array(table, dtype=int, device=device) for table in tables), diagonal,
+            values.shape[0], values, b, v, free, x, wp.float64(tolerance), max_iterations, self._outcome,
+        ]  # fmt: skip
+
+    def solve(self, slots: wp.array, count: wp.array) -> None:
+        """Solve the systems of a list of slots."""
+        wp.launch(
+            self._kernel,
+            dim=self._block_count * THREADS,
+            inputs=[slots, count, *self._inputs],
+            device=self._device,
+            block_dim=THREADS,
+        )
+
+    def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Iterations, residual norms and goals of all slots, of the last system of each (waits for the device)."""
+        iterations, residual, goal = self._outcome.numpy().T
+        return iterations.astype(np.int32), residual.copy(), goal.copy()
