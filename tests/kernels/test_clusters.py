@@ -10,6 +10,8 @@ from shapes import box, distorted
 
 from warpbrain.ensemble.batch import pattern_of
 from warpbrain.kernels.batched import cluster, linear
+from warpbrain.kernels.batched.assembly import batched_assembly_kernels, batched_system_gather, tiles_of
+from warpbrain.kernels.batched.layout import TANGENT
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
 from warpbrain.kernels.persistent import shared_memory
 from warpbrain.kernels.precision import DOUBLE, Precision
@@ -73,7 +75,8 @@ def solved(system: System, slots: list[int], most: int = 500) -> tuple[np.ndarra
 def test_the_same_solutions_as_of_many_launches(
     size: int, clustered: str, precision: Precision, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    system = system_of((6, 6, 10), clustered, precision)
+    # one multiprocessor has room for a small one only
+    system = system_of((6, 6, 10) if size > 1 else (4, 4, 6), clustered, precision)
     monkeypatch.setattr(cluster, "SIZES", (size,))
     x, iterations, on_chip = solved(system, list(range(SLOTS)))
     assert on_chip
@@ -104,3 +107,27 @@ def test_a_limit_and_no_room(clustered: str, precision: Precision) -> None:
     assert cluster.fitting_parts(larger, 8, shared_memory(wp.get_device(clustered))) is None
     held = replace(pattern, active=np.zeros_like(pattern.active))
     assert cluster.fitting_parts(held, 8, shared_memory(wp.get_device(clustered))) is None
+
+
+@pytest.mark.parametrize("count", [0, 1, 45, 70])
+def test_the_same_matrices_with_the_numbers_of_a_system_side_by_side(
+    count: int, clustered: str, precision: Precision
+) -> None:
+    system, slots = system_of((3, 3, 4), clustered, precision), 70
+    random = np.random.default_rng(3)
+    tangents, k, m = (
+        wp.array(random.normal(size=shape), dtype=precision.scalar, device=clustered)
+        for shape in ((system.elements, TANGENT, slots), slots, slots)
+    )
+    order, listed = (wp.array(values, dtype=int, device=clustered) for values in (random.permutation(slots), [count]))
+    inputs = [order, listed, system.pairs, system.pair_first, system.contributions]
+    inputs += [tangents, system.mass, system.free, k, m]
+    pairs = len(system.pairs)
+    apart = wp.zeros((pairs, 9, slots), dtype=precision.scalar, device=clustered)
+    beside = wp.zeros((slots, pairs, 9), dtype=precision.scalar, device=clustered).transpose((1, 2, 0))
+    for kernel, dim, values in (
+        (batched_assembly_kernels(precision).gather_matrix, (pairs, slots), apart),
+        (batched_system_gather(precision), tiles_of(pairs, slots), beside),
+    ):
+        wp.launch(kernel, dim, inputs=[*inputs, values], device=clustered, block_dim=128)
+    assert apart.numpy().tobytes() == np.ascontiguousarray(beside.numpy()).tobytes()

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Bools, Floats
 from warpbrain.ensemble.sample import Sample
 from warpbrain.errors import InputError
-from warpbrain.kernels.batched.assembly import batched_assembly_kernels
+from warpbrain.kernels.batched.assembly import batched_assembly_kernels, batched_system_gather, tiles_of
 from warpbrain.kernels.batched.elements import batched_element_kernels
 from warpbrain.kernels.batched.layout import TANGENT, stages
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
@@ -332,9 +332,12 @@ class Batch:
                 self._motion.prescribe, (s.size, lanes), *begun, self._shapes, self._amounts, s.free, self._h, self._u,
                 self._prescribed,
             )  # fmt: skip
+        gather: tuple[Any, tuple[int, ...]] = self._kernels.gather_matrix, (len(s.pairs), lanes)
+        if self._cg.side_by_side:
+            gather = batched_system_gather(self._precision), tiles_of(len(s.pairs), lanes)
         self._launch(
-            self._kernels.gather_matrix, (len(s.pairs), lanes), *begun, s.pairs, s.pair_first, s.contributions,
-            self._tangents, s.mass, s.free, self._k, self._m, self._cg.values,
+            *gather, *begun, s.pairs, s.pair_first, s.contributions, self._tangents, s.mass, s.free, self._k, self._m,
+            self._cg.values,
         )  # fmt: skip
         self._launch(
             self._motion.begin, (s.size, lanes), *begun, self._loads, self._factors, self._internal, s.mass, s.free,

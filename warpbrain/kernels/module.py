@@ -49,9 +49,9 @@ class KernelSet:
     def __init__(self, name: str, unroll: int | None = None) -> None:
         self.module = compiled_module(name, unroll)
 
-    def add(self, function: Callable[..., None]) -> Any:
-        """Make a kernel of a function."""
-        kernel = wp.kernel(function, module=self.module)
+    def add(self, function: Callable[..., None], together: tuple[int, int] | None = None) -> Any:
+        """Make a kernel of a function; of blocks of so many threads, so many are `together` on a multiprocessor."""
+        kernel = wp.kernel(function, module=self.module, launch_bounds=together)
         setattr(self, function.__name__, kernel)
         return kernel
 

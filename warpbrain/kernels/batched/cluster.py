@@ -24,9 +24,9 @@ from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.kernels.precision import Precision
 
 #: Blocks of a cluster, of which the fewest that have room are taken; and threads of a block.
-SIZES, THREADS = (1, 2, 4, 8, 16), 512
-#: 32-bit registers of a thread that hold blocks of the matrix: of 128, with what else it needs.
-_REGISTERS = 72
+SIZES, THREADS = (1, 2, 4, 8, 16), 384
+#: 32-bit registers of a thread that hold blocks of the matrix: of 168, with what else it needs.
+_REGISTERS = 108
 #: Bytes of shared memory that are read at a time.
 _BANKS = 128
 #: Sizes of a kernel are whole multiples of this: meshes of about the same size share it.

@@ -1,6 +1,6 @@
 """Element kernels of many samples, made of a law's device functions: forces, tangent blocks and `J`."""
 
-from functools import cache
+from functools import cache, partial
 
 import warp as wp
 
@@ -8,6 +8,10 @@ from warpbrain.kernels.batched.layout import store_tangent, store_vector, vector
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import DeviceLaw
+
+#: Blocks of 128 threads that share a multiprocessor: with all the registers that a thread asks for they would be two in
+#: double precision, which keep too little of the memory's traffic under way.
+_TOGETHER = {"double": 3, "single": 5}
 
 
 @cache
@@ -26,7 +30,7 @@ def batched_element_kernels(law: DeviceLaw, precision: Precision) -> KernelSet:
         u3 = vector_of(u, nodes[3], slot) - u0
         return wp.matrix_from_cols(u1, u2, u3) * G
 
-    @kernels.add
+    @partial(kernels.add, together=(128, _TOGETHER[precision.name]))
     def forces_and_tangents(
         slots: wp.array[int],
         count: wp.array[int],

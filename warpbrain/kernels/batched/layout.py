@@ -8,8 +8,8 @@ import warp as wp
 ROWS = 4
 #: Shares of a sum that one thread adds up in the stage after that.
 SHARES = 32
-#: Numbers of an element's tangent that are stored: of all blocks but `K_00`, three of which are symmetric.
-TANGENT = 72
+#: Numbers of an element's tangent that are stored: of ten blocks, of which the four on the diagonal are symmetric.
+TANGENT = 78
 
 
 def stages(rows: int) -> tuple[int, int]:
@@ -79,29 +79,27 @@ def store_tangent(
     tangents: wp.array3d[Any], e: int, slot: int, K11: Any, K12: Any, K13: Any, K22: Any, K23: Any, K33: Any
 ):
     """Set the tangent of an element of a sample from its blocks of nodes 1 to 3: each row of blocks sums to zero."""
-    store_block(tangents, e, 0, slot, -(K11 + wp.transpose(K12) + wp.transpose(K13)))
-    store_block(tangents, e, 9, slot, -(K12 + K22 + wp.transpose(K23)))
-    store_block(tangents, e, 18, slot, -(K13 + K23 + K33))
+    K01 = -(K11 + wp.transpose(K12) + wp.transpose(K13))
+    K02 = -(K12 + K22 + wp.transpose(K23))
+    K03 = -(K13 + K23 + K33)
+    store_block(tangents, e, 0, slot, K01)
+    store_block(tangents, e, 9, slot, K02)
+    store_block(tangents, e, 18, slot, K03)
     store_block(tangents, e, 27, slot, K12)
     store_block(tangents, e, 36, slot, K13)
     store_block(tangents, e, 45, slot, K23)
-    store_symmetric(tangents, e, 54, slot, K11)
-    store_symmetric(tangents, e, 60, slot, K22)
-    store_symmetric(tangents, e, 66, slot, K33)
+    store_symmetric(tangents, e, 54, slot, -(K01 + K02 + K03))
+    store_symmetric(tangents, e, 60, slot, K11)
+    store_symmetric(tangents, e, 66, slot, K22)
+    store_symmetric(tangents, e, 72, slot, K33)
 
 
 @wp.func
 def tangent_of(tangents: wp.array3d[Any], e: int, k: int, slot: int):
     """Block `k` of the ten of `warpbrain.kernels.tetrahedron.PAIRS`."""
-    if k == 0:
-        K01 = block_of(tangents, e, 0, slot)
-        return -(K01 + block_of(tangents, e, 9, slot) + block_of(tangents, e, 18, slot))
-    if k == 4:
-        return symmetric_of(tangents, e, 54, slot)
-    if k == 7:
-        return symmetric_of(tangents, e, 60, slot)
-    if k == 9:
-        return symmetric_of(tangents, e, 66, slot)
+    if k == 0 or k == 4 or k == 7 or k == 9:
+        # of nodes 0 to 3
+        return symmetric_of(tangents, e, 54 + 6 * (k / 3), slot)
     at = 9 * k - 9
     if k > 4:
         at = 9 * k - 18

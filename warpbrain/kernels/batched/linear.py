@@ -42,6 +42,8 @@ class BatchedConjugateGradient:
         The stored blocks of `pattern`, laid out in memory as the solver wants them.
     right_hand_side : wp.array, shape (n, 3, slots)
         `b`; the residual may take its place.
+    side_by_side : bool
+        Whether the numbers of a system are, in which case those of a block of all systems are not.
     solving : wp.array of int, shape (slots,)
         1 while the system of a slot has not ended.
     """
@@ -76,6 +78,7 @@ class BatchedConjugateGradient:
         parts = None
         if forms_clusters(device):
             parts = fitting_parts(pattern, precision.numpy.itemsize, shared_memory(device))
+        self.side_by_side = parts is not None
         if parts is not None:
             self.values = zeros(slots, pattern.stored, 9).transpose((1, 2, 0))
             self._cluster = ClusterSolve(
