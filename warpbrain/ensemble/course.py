@@ -41,8 +41,9 @@ class Course(abc.ABC):
     """A course of time steps, the same for all samples, in which each has a time of its own."""
 
     tolerance: float  # of the linear solves, relative
-    #: Part of the solves of a pass that may go on in the next one. On an H200 none is best where all take steps of one
-    #: length, and a quarter in a run to rest, where some need a hundred times the iterations of others.
+    #: Part of the solves of a pass that may go on in the next one, where a solve is many launches. On an H200 none is
+    #: best where all take steps of one length, and a quarter in a run to rest, where some need a hundred times the
+    #: iterations of others.
     linger: float = 0.0
 
     def __init__(self, model: Model) -> None:
@@ -101,6 +102,15 @@ class Course(abc.ABC):
         for row, load in enumerate(self.model.loads):
             factors = {time: load.factor(time) for time in set(due[slots].tolist())}
             self.batch.load_factors[row, slots] = [factors[time] for time in due[slots].tolist()]
+
+    def reactions(self, slots: Sequence[int]) -> Floats:
+        """What holds the constrained components of some slots [N], shape (slots, n, 3)."""
+        held, times = self.batch.held, [float(self.time[slot]) for slot in slots]
+        at = {time: self.model.external_forces(time)[held] for time in set(times)}
+        external = np.reshape([at[time] for time in times], (len(slots), len(held), 3))
+        reactions = np.zeros((len(slots), *self.model.constrained.shape))
+        reactions[:, held] = self.model.reactions(self.batch.held_forces(slots), external, held)
+        return reactions
 
     def why(self, slot: int, states: States) -> str:
         """What is wrong with the state of a slot."""
@@ -245,12 +255,9 @@ def step_batch(batch: Batch, course: Course, numbers: Sequence[int]) -> Iterator
         verdict = course.judge(states)
         batch.restore(verdict.back.tolist())
         ended, done = [], verdict.done.tolist()
-        # of samples that have their answer
-        fields = (batch.displacements(done), batch.held_forces(done)) if done else ((), ())
-        for slot, u, internal in zip(done, *fields, strict=True):
+        for slot, u, reactions in zip(done, batch.displacements(done), course.reactions(done), strict=True):
             number, steps, iterations = (int(of[slot]) for of in (number_in, course.steps, course.cg_iterations))
             time, residual, least = (float(of[slot]) for of in (course.time, course.residual, states.min_J))
-            reactions = course.model.reactions(internal, course.model.external_forces(time))
             ended.append(Outcome(number, "", steps, iterations, time, residual, least, u, reactions))
         for slot, reason in verdict.failed.items():
             taken = int(course.steps[slot]), int(course.cg_iterations[slot]), float(course.time[slot])

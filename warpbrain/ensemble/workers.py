@@ -121,8 +121,8 @@ def bytes_per_slot(system: System) -> int:
     n, m = system.size, system.elements
     elements = m * (TANGENT + 4 * 3 + 1)
     matrix = len(system.pairs) * 9
-    # u, v, dv, both at the start of the step, prescribed velocity, internal forces, b
-    vectors = 8 * 3 * n
+    # u, v, dv, both at the start of the step, prescribed velocity, internal forces, b, what leaves the device
+    vectors = 9 * 3 * n
     # z, p, q and the preconditioner, where they are not on the chip
     vectors += 3 * 3 * n + 6 * n
     sums = 2 * n

@@ -183,9 +183,12 @@ class Model:
         """Linear tetrahedra with a corner at every node: the mesh, or its elements cut into eight."""
         return self.mesh if self.quadratic is None else self.quadratic.node_mesh
 
-    def reactions(self, internal: Floats, external: Floats) -> Floats:
-        """What holds the constrained components [N], zero elsewhere, of internal and external nodal forces (n, 3)."""
-        return np.subtract(internal, external, out=np.zeros(internal.shape), where=self.constrained)
+    def reactions(self, internal: Floats, external: Floats, nodes: slice | NDArray[np.intp] = slice(None)) -> Floats:
+        """What holds the constrained components [N], zero elsewhere, of internal and external forces (..., n, 3).
+
+        `nodes` says which nodes these forces are of; all if nothing is said.
+        """
+        return np.where(self.constrained[nodes], internal - external, 0.0)
 
     def prescribed_at(self, time: float, share: float) -> Floats:
         """Prescribed displacements (n, 3) [m] at a time [s]; a `share` of those that have no history."""

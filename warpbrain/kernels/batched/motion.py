@@ -123,13 +123,20 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         store_vector(u, i, slot, vector_of(u_start, i, slot) + h[slot] * w)
 
     @kernels.add
-    def find_ready(marked: wp.array[int], stepping: wp.array[int], solving: wp.array[int], ready: wp.array[int]):
+    def find_ready(
+        marked: wp.array[int],
+        stepping: wp.array[int],
+        solving: wp.array[int],
+        ready: wp.array[int],
+        found: wp.array[scalar],
+    ):
         """One thread for a slot: 1 where a state is to be evaluated, one that has just been reached or one that is
-        marked."""
+        marked; as a flag, and as a number to be told."""
         slot = wp.tid()
         ready[slot] = marked[slot]
         if stepping[slot] != 0 and solving[slot] == 0:
             ready[slot] = 1
+        found[slot] = scalar(ready[slot])
 
     @kernels.add
     def collect(slots: wp.array[int], nodes: wp.array[int], x: wp.array3d[scalar], collected: wp.array[vec3]):
