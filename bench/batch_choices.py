@@ -16,7 +16,7 @@ import warp.optim.linear as warp_linear
 from choices import DEVICE, milliseconds
 
 from warpbrain.bench.batches import phantom_job
-from warpbrain.ensemble.batch import Batch
+from warpbrain.ensemble.batch import Batch, pattern_of
 from warpbrain.ensemble.course import step_batch
 from warpbrain.kernels.linear import linear_kernels
 
@@ -38,8 +38,7 @@ class WarpBatch:
         self._kernels, self._real, self._size = linear_kernels(p), p, n * b
         offsets, columns = system.matrix.offsets.numpy()[: n + 1], system.matrix.columns.numpy()[:nnz]
         rows = np.repeat(np.arange(n), np.diff(offsets))
-        where = batch._pattern[2].numpy()
-        kept = batch._values.numpy()[where].reshape(nnz, 3, 3, b)
+        kept = batch._cg.values.numpy()[pattern_of(system).pairs].reshape(nnz, 3, 3, b)
         blocks = np.where((columns < rows)[:, None, None, None], kept.transpose(0, 2, 1, 3), kept)
 
         def array(values: np.ndarray, dtype: object) -> wp.array:
@@ -50,7 +49,9 @@ class WarpBatch:
         self._values = array(blocks.transpose(3, 0, 1, 2).reshape(-1, 3, 3), p.mat33)
         diagonal = array((system.diagonal.numpy() + nnz * np.arange(b)[:, None]).ravel(), int)
         self._inverse = wp.empty(n * b, dtype=p.mat33, device=DEVICE)
-        wp.launch(self._kernels.invert_diagonal, n * b, inputs=[diagonal, self._values, self._inverse], device=DEVICE)
+        wp.launch(
+            self._kernels.invert_diagonal, n * b, inputs=[0, diagonal, self._values, self._inverse], device=DEVICE
+        )
         shape = (3 * n * b, 3 * n * b)
         systems = array(3 * n * np.arange(b + 1), int)
         operator = warp_linear.LinearOperator(shape, p.scalar, wp.get_device(DEVICE), self._product, systems, 3 * n)
@@ -68,12 +69,12 @@ class WarpBatch:
         return wp.array(ptr=x.ptr, shape=(self._size,), dtype=self._real.vec3, device=DEVICE)
 
     def _product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        inputs = [self._offsets, self._columns, self._values, *map(self._vectors, (x, y, z))]
+        inputs = [0, self._offsets, self._columns, self._values, *map(self._vectors, (x, y, z))]
         inputs += [self._real.scalar(alpha), self._real.scalar(beta)]
         wp.launch(self._kernels.multiply, self._size, inputs=inputs, device=DEVICE)
 
     def _precondition(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        inputs = [self._inverse, *map(self._vectors, (x, y, z)), self._real.scalar(alpha), self._real.scalar(beta)]
+        inputs = [0, self._inverse, *map(self._vectors, (x, y, z)), self._real.scalar(alpha), self._real.scalar(beta)]
         wp.launch(self._kernels.apply_diagonal, self._size, inputs=inputs, device=DEVICE)
 
     def solve(self) -> None:
@@ -98,7 +99,9 @@ def solvers() -> None:
     # at rest the right-hand side of the first step is h f_ext
     right = np.where(system.model.constrained, 0.0, 1e-3 * system.model.external_forces())[:, :, None]
     right = np.repeat(right, SAMPLES, axis=2)
-    lists = batch._start, batch._start_count
+    lists = batch._start
+    # the step began at rest
+    batch._v.zero_()
 
     def ours() -> None:
         batch._dv.zero_()
