@@ -13,7 +13,7 @@ from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
 #: Samples and pairs of nodes of a block of threads that puts the numbers of each sample side by side.
-_LANES, _PAIRS = 32, 4
+_LANES, _PAIRS = 64, 2
 
 
 @cache

@@ -9,9 +9,9 @@ from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import DeviceLaw
 
-#: Blocks of 128 threads that share a multiprocessor: with all the registers that a thread asks for they would be two in
-#: double precision, which keep too little of the memory's traffic under way.
-_TOGETHER = {"double": 3, "single": 5}
+#: Blocks of 128 threads that share a multiprocessor at least: of more of them registers spill, and elements of
+#: Mooney-Rivlin's law take twice as long.
+_TOGETHER = {"double": 2, "single": 4}
 
 
 @cache
