@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from warpbrain.diagnosis.result import Diagnosis
 
 wp.config.log_level = wp.LOG_WARNING
-# nothing is differentiated backwards: Warp's own kernels are compiled as ours are, in half the time
-wp.config.enable_backward = False
 # on a busy machine any example may take longer than the 200 ms that Hypothesis allows
 hypothesis.settings.register_profile("no deadline", hypothesis.settings(), deadline=None)
 hypothesis.settings.load_profile("no deadline")
