@@ -340,8 +340,6 @@ def usual_stretches(group: str) -> Floats:
     return np.linspace(*STRETCHES[group], POINTS)
 
 
-# an ensemble asks for the same again and again, and a curve is a mean over all hierarchies
-@lru_cache(maxsize=64)
 def law_of_curve(model: Process, group: str, k: float = 0.0, law: str = "neo-hookean") -> Fit:
     """The law of the curve `k` standard deviations from the mean, as the paper samples.
 
