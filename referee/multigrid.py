@@ -25,7 +25,7 @@ _WIDE = 8
 _Row = wp.types.vector(_WIDE, wp.float32)
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 def _symmetric_times(
     count: int,
     starts: wp.array(dtype=wp.int32),
@@ -51,7 +51,7 @@ def _symmetric_times(
         y[i] = s
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 def _times_several(
     count: int,
     starts: wp.array(dtype=wp.int32),
@@ -77,7 +77,7 @@ def _times_several(
             y[3 * i + 2, c] = third
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 def _diagonal_times(blocks: wp.array(dtype=wp.mat33f), x: wp.array(dtype=wp.vec3f), y: wp.array(dtype=wp.vec3f)):
     i = wp.tid()
     y[i] = blocks[i] * x[i]

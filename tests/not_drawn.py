@@ -6,13 +6,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from unittest.mock import patch
 
 import numpy as np
 
-from warpbrain.atomic import whole_file
 from warpbrain.cli import main
 from warpbrain.report.rendering import NAMES
 
@@ -30,9 +28,10 @@ def white(_scene: object, _cameras: object, size: tuple[int, int]) -> dict[str, 
     return {name: np.full((size[1], size[0], 3), 255, np.uint8) for name in NAMES}
 
 
-def _saved(_figure: object, path: Path, *_title: object, **_options: object) -> None:
-    with whole_file(path) as scratch:
-        scratch.write_bytes(b"\x89PNG" + bytes(5000) + b"IEND\xaeB`\x82")
+def not_drawn(figure: object, stream: BinaryIO, _dpi: float) -> None:
+    """A file of curves, of a page or by itself, without any: how they are drawn is tested by `tests/report`."""
+    assert figure is not None
+    stream.write(b"\x89PNG" + bytes(5000) + b"IEND\xaeB`\x82")
 
 
 def _empty(view: Any, name: str, _axis: int, _place: float) -> dict[str, object]:
@@ -41,7 +40,7 @@ def _empty(view: Any, name: str, _axis: int, _place: float) -> dict[str, object]
 
 _STAND_INS: tuple[tuple[str, Callable[..., object]], ...] = (
     ("warpbrain.report.picture.render", white),
-    ("warpbrain.report.views.save", _saved),
+    ("warpbrain.report.views.write_png", not_drawn),
     ("warpbrain.report.page.scene._cut", _empty),
 )
 

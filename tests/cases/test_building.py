@@ -8,10 +8,11 @@ import pytest
 
 pytest.importorskip("scipy")
 
-from warpbrain.cases.building import NAMES, BuildError, build
 from warpbrain.cases.building.cleaning import open_angles
+from warpbrain.cases.building.errors import BuildError
 from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
 from warpbrain.cases.building.mmg import Cells, Size
+from warpbrain.cases.building.pipeline import NAMES, build
 from warpbrain.cases.building.template import IndividualWarp, anterior_temporal_lobe
 from warpbrain.mesh import boundary_faces, dihedral_angles, pinched_nodes, read_mesh, split_boundary
 from warpbrain.mesh.tet_mesh import signed_volumes

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
-from not_drawn import white
+from not_drawn import not_drawn, white
 
 from warpbrain.report import picture, views
 
@@ -26,9 +24,4 @@ def drawn() -> None:
 @pytest.fixture(autouse=True)
 def _pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     if "drawn" not in request.fixturenames:
-        monkeypatch.setattr(views, "save", _not_drawn)
-
-
-def _not_drawn(figure: object, path: Path, *_title: object, **_options: object) -> None:
-    assert figure is not None
-    path.write_bytes(b"\x89PNG")
+        monkeypatch.setattr(views, "write_png", not_drawn)

@@ -90,7 +90,7 @@ def begin(options: argparse.Namespace) -> None:
 
 def build(options: argparse.Namespace) -> None:
     """Remake the meshes of a shipped case."""
-    from warpbrain.cases.building import NAMES, build
+    from warpbrain.cases.building.pipeline import NAMES, build
     from warpbrain.terminal.result_folder import claim
 
     if options.name in NAMES:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import SimpleNamespace
 from typing import cast
 
@@ -277,9 +277,12 @@ def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed:
 
     process = trained() if model is None else model
     require_groups(case, [label for labels in parameters.labels for label in labels], process)
-    return Prior.of(
-        process, parameters.groups, parameters.laws_of, parameters.poisson, parameters.formulations, count, seed
-    )
+    tissues = tuple(parameters.groups), tuple(parameters.laws_of), parameters.poisson, tuple(parameters.formulations)
+    return _prior_of_tissues(process, *tissues, count, seed)
+
+
+#: A diagnosis and its estimates ask for one prior several times, and 500 draws take a second.
+_prior_of_tissues = lru_cache(maxsize=8)(Prior.of)
 
 
 @dataclass(frozen=True, eq=False)

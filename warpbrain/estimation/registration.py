@@ -30,9 +30,7 @@ def registration_of(case: Case) -> Registration:
 
 def moved_back(positions: Floats, motion: Floats, centre: Floats) -> Floats:
     """Positions (n, 3) without a rigid motion: shift [m] and turn [rad] (6,) about a centre (3,)."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_rotvec(motion[3:]).inv().apply(positions - centre - motion[:3]) + centre)
+    return (positions - centre - motion[:3]) @ _turned_back(motion).T + centre
 
 
 def moved_back_columns(positions: Floats, motion: Floats, centre: Floats) -> Floats:
@@ -40,12 +38,10 @@ def moved_back_columns(positions: Floats, motion: Floats, centre: Floats) -> Flo
 
     Of `R(omega)^T v` it is `[R^T v]_x J(-omega)`, with the left Jacobian `J` of the rotation group.
     """
-    from scipy.spatial.transform import Rotation
-
+    back = _turned_back(motion)
     columns = np.zeros((len(positions), 3, 6))
-    columns[:, :, :3] = -Rotation.from_rotvec(motion[3:]).inv().as_matrix()
-    back = moved_back(positions, motion, centre) - centre
-    columns[:, :, 3:] = _crossed(back) @ _left_jacobian(-motion[3:])
+    columns[:, :, :3] = -back
+    columns[:, :, 3:] = _crossed((positions - centre - motion[:3]) @ back.T) @ _left_jacobian(-motion[3:])
     return columns
 
 
@@ -74,9 +70,18 @@ def realigned(case: Case, motion: Floats, centre: Floats) -> Case:
     return replace(case, recordings=tuple(map(moved, case.recordings)))
 
 
+def _turned_back(motion: Floats) -> Floats:
+    """Matrix (3, 3) of the inverse of a motion's rotation."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(-motion[3:]).as_matrix())
+
+
 def _crossed(vectors: Floats) -> Floats:
     """Matrices (n, 3, 3) that take `w` to the cross product of each vector (n, 3) with it."""
-    return np.cross(vectors[:, None, :], np.eye(3)).swapaxes(1, 2)
+    x, y, z = vectors.T
+    o = np.zeros(len(vectors))
+    return np.stack([o, -z, y, z, o, -x, -y, x, o], axis=1).reshape(-1, 3, 3)
 
 
 def _left_jacobian(turn: Floats) -> Floats:

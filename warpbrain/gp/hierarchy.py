@@ -452,6 +452,7 @@ class Hierarchical:
     sample: tuple[Hierarchy, ...] = ()
     name = "hierarchical"
     _structures_of: dict[tuple[Any, ...], Structures] = field(default_factory=dict, init=False, repr=False)
+    _moduli: dict[tuple[Any, ...], tuple[Floats, Floats]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -463,12 +464,18 @@ class Hierarchical:
 
         All groups are measured by one new paper, as in one subject.
         """
-        moments = self.moments(self.places(groups, stretches))
-        means = np.array([mean for mean, _ in moments])
-        # of a mixture of distributions of equal weight
-        away = means - means.mean(axis=0)
-        within = np.mean([covariance for _, covariance in moments], axis=0)
-        return means.mean(axis=0).reshape(len(groups), -1), within + away.T @ away / len(moments)
+        key = tuple(groups), np.asarray(stretches, dtype=np.float64).tobytes()
+        if key not in self._moduli:
+            # several curves of a group are asked for, and laws fitted to each; the last groups are kept
+            if len(self._moduli) >= len(GROUPS):
+                self._moduli.clear()
+            moments = self.moments(self.places(groups, stretches))
+            means = np.array([mean for mean, _ in moments])
+            # of a mixture of distributions of equal weight
+            away = means - means.mean(axis=0)
+            within = np.mean([covariance for _, covariance in moments], axis=0)
+            self._moduli[key] = means.mean(axis=0).reshape(len(groups), -1), within + away.T @ away / len(moments)
+        return self._moduli[key]
 
     def moduli_of(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> list[tuple[Floats, Floats]]:
         """Mean and covariance, under each hierarchy, of log secant moduli of studies that it has not seen.

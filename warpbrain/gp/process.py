@@ -61,6 +61,9 @@ class Process(Protocol):
     those of a new study of a group: what is not known of the group and what studies of it differ by are both in them.
     """
 
+    def __hash__(self) -> int:
+        """Of which model it is: what is drawn of one is kept."""
+
     @property
     def name(self) -> str:
         """Of the kind of model, as the command line calls it."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.errors import InputError
-from warpbrain.mesh.surface import FACES, Bools, Floats, Ints, boundary_faces, in_rows, interface_faces
+from warpbrain.mesh.surface import EDGES, FACES, Bools, Floats, Ints, boundary_faces, in_rows, interface_faces
 
 #: A coordinate [m] beyond this is no place.
 LARGEST = 1e12
@@ -347,7 +347,7 @@ def _flat_or_inverted(points: Floats, tetrahedra: Ints, numbers: NDArray[np.int6
     measurable = ~bad[tetrahedra].any(axis=1)
     with np.errstate(invalid="ignore", over="ignore"):
         volumes = signed_volumes(points, tetrahedra)
-        longest = np.sqrt(((corner[:, :, None] - corner[:, None]) ** 2).sum(-1).max(axis=(1, 2)))
+        longest = np.sqrt(((corner[:, EDGES[:, 0]] - corner[:, EDGES[:, 1]]) ** 2).sum(-1).max(axis=1))
         # flat to rounding: such a volume has no sign that means anything
         flat = measurable & (np.abs(volumes) <= 1e-12 * longest**3)
         inverted = measurable & ~flat & (volumes < 0)

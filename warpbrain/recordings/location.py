@@ -108,20 +108,22 @@ def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
     """Number of a tetrahedron (m, 4, 3) that each point is in, -1 if it is in none."""
     centres = corners.mean(axis=1)
     spheres = Spheres(centres, np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1))
-    sides = corners[:, 1:] - corners[:, :1]
-    longest = np.linalg.norm(sides, axis=2).max(axis=1)
-    flat = np.abs(np.linalg.det(sides)) <= 1e-14 * longest**3
-    # rows: gradients of the weights 1, 2 and 3
-    gradients = np.linalg.inv(np.where(flat[:, None, None], np.eye(3), sides)).transpose(0, 2, 1)
-    gradients = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1)
-    allowed = np.maximum(_WEIGHT, _LENGTH * longest[:, None] * np.linalg.norm(gradients, axis=2))
     element = np.full(len(points), -1, dtype=np.int64)
 
     def depth(which: NDArray[np.int64], candidates: NDArray[np.int64]) -> Floats:
         """The least weight, -inf if the point is not inside."""
-        w = np.einsum("nij,nj->ni", gradients[candidates], points[which] - corners[candidates, 0])
+        # of most meshes few tetrahedra are near any point
+        near, of = np.unique(candidates, return_inverse=True)
+        sides = corners[near, 1:] - corners[near, :1]
+        longest = np.linalg.norm(sides, axis=2).max(axis=1)
+        flat = np.abs(np.linalg.det(sides)) <= 1e-14 * longest**3
+        # rows: gradients of the weights 1, 2 and 3
+        gradients = np.linalg.inv(np.where(flat[:, None, None], np.eye(3), sides)).transpose(0, 2, 1)
+        gradients = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1)
+        allowed = np.maximum(_WEIGHT, _LENGTH * longest[:, None] * np.linalg.norm(gradients, axis=2))
+        w = np.einsum("nij,nj->ni", gradients[of], points[which] - corners[candidates, 0])
         w[:, 0] += 1.0
-        within = (w >= -allowed[candidates]).all(axis=1) & ~flat[candidates]
+        within = (w >= -allowed[of]).all(axis=1) & ~flat[of]
         return np.where(within, w.min(axis=1), -np.inf)
 
     # nearly every point is in one of the tetrahedra whose centres are nearest

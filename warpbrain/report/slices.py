@@ -34,8 +34,10 @@ def cut(points: Floats, tetrahedra: NDArray[np.integer], values: Floats, axis: i
     if not section.n_cells:
         return Cut(axis, section, [], np.zeros(0, dtype=np.int64), np.zeros(0))
     corners, polygons = np.delete(section.points, axis, axis=1), section.irregular_faces
-    means = np.array([section["values"][polygon].mean() for polygon in polygons])
-    return Cut(axis, section, [corners[polygon] for polygon in polygons], np.asarray(section["elements"]), means)
+    # PyVista looks for an array by name each time, which for every polygon takes longer than to cut
+    at_corners, elements = np.asarray(section["values"]), np.asarray(section["elements"])
+    means = np.array([at_corners[polygon].mean() for polygon in polygons])
+    return Cut(axis, section, [corners[polygon] for polygon in polygons], elements, means)
 
 
 def level_line(drawn: Cut, level: float) -> Floats:

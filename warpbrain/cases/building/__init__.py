@@ -1,9 +1,5 @@
-"""How the shipped brain meshes were made: `build` makes them again, from the ICBM152 template maps.
+"""How the shipped brain meshes were made: `pipeline.build` makes them again, from the ICBM152 template maps.
 
-Needs the extra ``warpbrain[build]``. Nothing here is imported when a simulation runs.
+Needs the extra ``warpbrain[build]``. Nothing here is imported when a simulation runs, and nothing with the folder
+itself: MMG runs in a process of its own, many times for a mesh.
 """
-
-from warpbrain.cases.building.errors import BuildError
-from warpbrain.cases.building.pipeline import NAMES, build
-
-__all__ = ["NAMES", "BuildError", "build"]
