@@ -304,10 +304,6 @@ class ConjugateGradient(abc.ABC):
         """`z = A x`."""
         self._product(x, z, z, 1.0, 0.0)
 
-    def precondition(self, x: wp.array, z: wp.array) -> None:
-        """`z = D^-1 x`, `D` the diagonal blocks; of a solver with that preconditioner that is not one launch."""
-        self._apply_diagonal(x, x, z, 1.0, 0.0)
-
     def prepare(self) -> None:
         """Renew the preconditioner after the values of the matrix changed; its pattern is kept."""
         if self._kind == "block-jacobi":
