@@ -292,38 +292,4 @@ def pore_kernels(precision: Precision) -> KernelSet:
             total += p[columns[k]] * transposed[k]
         y[i] = y[i] + factor * wp.cw_mul(mask[i], total)
 
-    @kernels.add
-    def multiply(
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        values: wp.array[scalar],
-        x: wp.array[scalar],
-        y: wp.array[scalar],
-    ):
-        """One thread for a row of a sparse matrix of scalars."""
-        i = wp.tid()
-        total = scalar(0.0)
-        for k in range(offsets[i], offsets[i + 1]):
-            total += values[k] * x[columns[k]]
-        y[i] = total
-
-    @kernels.add
-    def invert_diagonal(
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        values: wp.array[scalar],
-        inverse: wp.array[scalar],
-    ):
-        i = wp.tid()
-        # a node outside the pores has no row, and no pressure
-        inverse[i] = scalar(1.0)
-        for k in range(offsets[i], offsets[i + 1]):
-            if columns[k] == i:
-                inverse[i] = scalar(1.0) / values[k]
-
-    @kernels.add
-    def apply_diagonal(inverse: wp.array[scalar], x: wp.array[scalar], y: wp.array[scalar]):
-        i = wp.tid()
-        y[i] = inverse[i] * x[i]
-
     return kernels

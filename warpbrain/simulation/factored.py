@@ -1,18 +1,9 @@
 """Linear systems solved on the host, preconditioned by the factors of a state that is near.
 
 On the CPU one solve with factors takes as long as some ten iterations of the captured loops of `warpbrain.kernels`.
-Where many states follow each other three to six of them do what takes conjugate gradients 50 to 200 iterations, and
-MINRES 50 to 1,500: a step in time, another moment, a trial of a fit each changes a tangent a little. On a GPU:
+Where many states follow each other three to six of them do what takes conjugate gradients 50 to 200 iterations: a step
+in time, another moment, a trial of a fit each changes a tangent a little. On a GPU:
 `warpbrain.simulation.kept_inverse`.
-
-Where fluid has a pressure beside the displacement the matrix, that of `warpbrain.simulation.coupled`, is indefinite.
-Flexible generalised minimal residuals (Saad, Iterative Methods for Sparse Linear Systems, 2nd ed., section 9.4) are
-preconditioned by the block triangle
-
-    [      K0        0  ]
-    [ -sqrt(w) B    -S0 ],    S0 = A + w Y,
-
-`K0` of a state that is near, and `Y` what the term says that the solid gives way to its unknowns (`Coupling.yielding`).
 """
 
 from __future__ import annotations
@@ -25,7 +16,6 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
 from warpbrain.kernels.linear import LinearResult, LinearSolver, host_gradients
-from warpbrain.simulation.coupled import CoupledSolver
 from warpbrain.simulation.sparse_factors import SparseFactors
 
 if TYPE_CHECKING:
@@ -88,53 +78,57 @@ class FactoredSolver:
     """Solves a system's linear systems on the CPU, to a relative tolerance, with factors that are kept from one to the
     next.
 
-    These are made, and made anew, as needed; `captured` takes over where they do not help.
+    These are made, and made anew, as needed; the `plain` solver takes over where they do not help.
     """
 
-    def __init__(self, system: System, captured: LinearSolver, factors: KeptFactors, tolerance: float) -> None:
-        self._system, self._captured, self._factors, self._tolerance = system, captured, factors, tolerance
+    #: Whether a matrix that is not positive definite is of no use.
+    _definite = True
+
+    def __init__(self, system: System, plain: LinearSolver, factors: KeptFactors, tolerance: float) -> None:
+        self._system, self._plain, self._factors, self._tolerance = system, plain, factors, tolerance
         self._free = ~system.model.constrained.ravel()
         self._K: Any = None
-        self._block: CoupledBlock | None = None
         self._result: LinearResult | None = None
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
-        self._captured.multiply(x, z)
+        self._plain.multiply(x, z)
 
     def prepare(self) -> None:
+        self._plain.prepare()
+        self._take_matrix()
+
+    def _take_matrix(self) -> None:
+        """What is in blocks [N/m], constrained rows and columns those of the identity."""
         from scipy.sparse import bsr_matrix
 
-        self._captured.prepare()
         matrix, size = self._system.matrix, 3 * self._system.size
         values = matrix.values.numpy().astype(np.float64, copy=False)
         self._K = bsr_matrix((values, matrix.columns.numpy(), matrix.offsets.numpy()), shape=(size, size))
-        before, self._block = self._block, None
-        if isinstance(self._captured, CoupledSolver) and self._system.coupled:
-            self._block = CoupledBlock(self._system, self._captured, self._K, self._free, before)
 
     def solve(self, tolerance: float | None = None) -> None:
         """See `LinearSolver`; begins with zero."""
-        wanted = self._tolerance if tolerance is None else tolerance
-        # fluid that is pressed at once lends tissue a stiffness that is none without it: then `K` alone is no sign
-        definite = self._block is None
-        for attempt in range(2):
-            renews = attempt == 1 or not self._factors.serve(self._free, definite)
-            if renews and not self._factors.renew(self._K, self._free, definite):
-                break
-            self._result = self._try(wanted)
-            self._factors.count(self._result.iterations)
-            if self._result.converged or self._result.indefinite:
-                return
+        self._result = self._with_factors(self._tolerance if tolerance is None else tolerance)
+        if self._result is None or not (self._result.converged or self._result.indefinite):
+            self._result = None
+            self._system.solution.zero_()
+            self._plain.solve(tolerance)
+
+    def _with_factors(self, wanted: float) -> LinearResult | None:
+        """How a solve with factors ended, of this matrix where others do not help; None if it has none."""
+        for renews in (False, True):
             if renews:
+                if not self._factors.renew(self._K, self._free, self._definite):
+                    return None
+            elif not self._factors.serve(self._free, self._definite):
+                continue
+            result = self._try(wanted)
+            self._factors.count(result.iterations)
+            if result.converged or result.indefinite:
                 break
-        self._result = None
-        self._system.solution.zero_()
-        self._captured.solve(tolerance)
+        return result
 
     def _try(self, wanted: float) -> LinearResult:
         load = self._system.load.numpy().astype(np.float64).ravel()
-        if self._block is not None:
-            return self._block.solve(load, wanted, self._factors, MOST)
         x, residual = np.zeros_like(load), load.copy()
         goal = wanted * float(np.linalg.norm(load))
         result = host_gradients(lambda p: self._K @ p, self._factors.solve, x, residual, goal, MOST)
@@ -142,101 +136,4 @@ class FactoredSolver:
         return result
 
     def result(self) -> LinearResult:
-        return self._result or self._captured.result()
-
-
-class CoupledBlock:
-    """The system's matrix with the unknowns of terms of their own, on the host.
-
-    `K` is what is in blocks [N/m], SciPy BSR (3 n, 3 n), constrained rows and columns replaced by the identity, and
-    `free` (3 n,) says which are not. Of the matrix `before` the factors of `S0` are taken if that is still the same.
-    """
-
-    def __init__(
-        self, system: System, captured: CoupledSolver, K: Any, free: NDArray[np.bool_], before: CoupledBlock | None
-    ) -> None:
-        from scipy.sparse import block_diag, csr_matrix, diags, vstack
-
-        self._system, self._captured, self._K = system, captured, K
-        self._root = float(system.coupling_root.numpy()[0])
-        n, parts = system.size, []
-        for c in captured.couplings:
-            offsets, columns = c.offsets.numpy(), c.columns.numpy()
-            components = (3 * columns[:, None] + np.arange(3)).ravel()
-            coupling = self._root * c.own.numpy().astype(np.float64).ravel() * free[components]
-            A, Y = (
-                csr_matrix((values.numpy().astype(np.float64), columns, offsets), shape=(n, n))
-                for values in (c.compliance, c.yielding)
-            )
-            parts.append((A, csr_matrix((coupling, components, 3 * offsets), shape=(n, 3 * n)), Y))
-        compliances, couplings, yielding = zip(*parts, strict=True)
-        self._A = block_diag(compliances, format="csr")
-        self._B = vstack(couplings, format="csr")
-        self._BT = self._B.T
-        S = self._A + self._root**2 * block_diag(yielding, format="csr")
-        # a node without an unknown has no row
-        self._S = (S + diags((S.diagonal() == 0.0).astype(np.float64))).tocsc()
-        # it changes from step to step, not within one
-        if before is not None and np.array_equal(before._S.data, self._S.data):
-            self._schur: SparseFactors = before._schur
-        else:
-            self._schur = SparseFactors(self._S)
-
-    def solve(self, load: Floats, wanted: float, factors: KeptFactors, most: int) -> LinearResult:
-        """Leave the displacement under a load (3 n,) [N], zero on constrained components, in the system's solution.
-
-        Until the residual of the system without pressures is `wanted` times the load, or after `most` iterations, with
-        factors of a `K` that is near; returns how that ended.
-        """
-        size = len(load)
-
-        def operator(x: Floats) -> Floats:
-            d, p = x[:size], x[size:]
-            return np.concatenate([self._K @ d - self._BT @ p, -(self._B @ d) - self._A @ p])
-
-        def preconditioner(r: Floats) -> Floats:
-            d = factors.solve(r[:size])
-            return np.concatenate([d, -self._schur.solve(r[size:] + self._B @ d)])
-
-        # both kinds of residual as parts of what their own unknown makes of one unit of energy
-        weight = 1.0 / np.sqrt(np.abs(np.concatenate([self._K.diagonal(), self._S.diagonal()])))
-        b = np.concatenate([load, np.zeros(self._A.shape[0])])
-        x, length = np.zeros_like(b), float(np.linalg.norm(weight * b))
-
-        def go_on(tolerance: float, done: int) -> int:
-            nonlocal x
-            if done >= most:
-                return 0
-            residual = b - operator(x)
-            more, taken = _minimal_residual(operator, preconditioner, residual, weight, tolerance * length, most - done)
-            x = x + more
-            self._system.solution.assign(x[:size].reshape(-1, 3))
-            return taken
-
-        return self._captured.in_rounds(go_on, wanted)
-
-
-def _minimal_residual(
-    operator: Any, preconditioner: Any, b: Floats, weight: Floats, goal: float, most: int
-) -> tuple[Floats, int]:
-    """`x` with `|weight (b - A x)| <= goal` if `most` iterations find it, and how many it took."""
-    length = float(np.linalg.norm(weight * b))
-    if not length > goal:
-        return np.zeros_like(b), 0
-    basis, moved = [weight * b / length], []
-    H = np.zeros((most + 1, most))
-    answer = np.zeros(0)
-    for k in range(most):
-        moved.append(preconditioner(basis[k] / weight))
-        v = weight * operator(moved[k])
-        for i, vector in enumerate(basis):
-            H[i, k] = vector @ v
-            v -= H[i, k] * vector
-        H[k + 1, k] = np.linalg.norm(v)
-        begin = length * np.eye(1, k + 2)[0]
-        answer = np.linalg.lstsq(H[: k + 2, : k + 1], begin, rcond=None)[0]
-        residual = float(np.linalg.norm(begin - H[: k + 2, : k + 1] @ answer))
-        if not residual > goal or H[k + 1, k] == 0.0:
-            break
-        basis.append(v / H[k + 1, k])
-    return np.asarray(answer @ np.array(moved)), len(moved)
+        return self._result or self._plain.result()

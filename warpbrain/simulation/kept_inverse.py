@@ -109,7 +109,7 @@ class InvertedSolver(FactoredSolver):
     """Solves with a kept inverse, on a GPU, in double precision, without unknowns beside the displacement."""
 
     def prepare(self) -> None:
-        self._captured.prepare()
+        self._plain.prepare()
         self._K = self._system.matrix
 
     def _try(self, wanted: float) -> LinearResult:
@@ -122,7 +122,7 @@ class InvertedSolver(FactoredSolver):
 
             def multiply(direction: Any) -> Any:
                 flat_p[:] = direction
-                self._captured.multiply(p, Ap)
+                self._plain.multiply(p, Ap)
                 return flat_Ap
 
             residual = cupy.asarray(system.load).ravel().copy()

@@ -527,7 +527,8 @@ class System:
         """A solver for ``matrix solution = load``; all are chosen here.
 
         - Conjugate gradients (`warpbrain.kernels.linear.conjugate_gradient`) for one system after the other.
-        - MINRES (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is indefinite.
+        - GMRES on the host (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is
+          indefinite.
         - With what is kept from state to state (`kept_for`), which needs all of the matrix, the gradients of
           `warpbrain.simulation.factored`, or on a GPU in double precision of `warpbrain.simulation.kept_inverse`: a
           factorisation of one state nearly solves those that are near.
@@ -559,18 +560,16 @@ class System:
             beyond=None if self.assembled else self._add_beyond_blocks,
             nodes=(self.model.node_mesh.points, self.free) if at_rest else None,
         )
-        captured: LinearSolver = plain
-        if self._coupled:
-            # MINRES takes some times the iterations of CG
-            most = 4 * max_iterations
-            captured = CoupledSolver(self, self._coupled, plain, tolerance=tolerance, max_iterations=most)
-        if factors is None or not self.assembled:
-            return captured
-        if not isinstance(factors, KeptInverse):
-            return FactoredSolver(self, captured, factors, tolerance)
-        if self._coupled or self.precision.name != "double":
-            return captured
-        return InvertedSolver(self, captured, factors, tolerance)
+        solver: LinearSolver = plain
+        if isinstance(factors, KeptInverse):
+            if self.assembled and not self._coupled and self.precision.name == "double":
+                solver = InvertedSolver(self, plain, factors, tolerance)
+        elif factors is not None and self.assembled:
+            solver = FactoredSolver(self, plain, factors, tolerance)
+        if not self._coupled:
+            return solver
+        kept = KeptFactors() if factors is None or isinstance(factors, KeptInverse) else factors
+        return CoupledSolver(self, self._coupled, solver, kept, tolerance)
 
     def load_kernels(self) -> float:
         """Compile what a run needs, or find it in Warp's cache, at the present state; returns the seconds it took."""
