@@ -274,7 +274,7 @@ class TriangleTerm(KernelTerm):
         ramp: Callable[[float], float],
     ) -> None:
         super().__init__(body, triangles, kernels, ramp)
-        self._nodes = self.array(self.stencils, wp.vec3i if self.stencils.shape[1] == 3 else int)
+        self._nodes = self.array(self.stencils, int)
         self._points = self.array(points, body.precision.vec3)
         self._data = self.array(data, body.precision.scalar)
 
