@@ -1,4 +1,4 @@
-"""Factors of a state near by find what the captured loops find, in fewer iterations."""
+"""Factors of a state near by, where fluid flows."""
 
 import numpy as np
 import pytest
@@ -10,9 +10,8 @@ from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.drainage import Drainage
 from warpbrain.physics.mechanisms.gravity import Gravity
-from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.equilibrium import EquilibriumOptions
-from warpbrain.simulation.factored import FactoredSolver, KeptFactors
+from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
@@ -21,7 +20,6 @@ from warpbrain.simulation.system import System
 CAUSES: dict[str, Mechanism] = {
     "fluid": Drainage(permeability=2e-5, drained="top"),
     "fluid in a part": Drainage(permeability=1e-4, storage=1e-5, drained="wall", elements="half", exchange=1e-4),
-    "relaxing stress": Viscoelasticity(moduli=(1.0, 0.5), times=(0.5, 5.0)),
 }
 TIMES = (0.01, 0.1, 1.0, 10.0)
 
@@ -75,7 +73,7 @@ def exact(system: System) -> np.ndarray:
     return solution.reshape(-1, 3)
 
 
-@pytest.mark.parametrize("step", [1e-3, 1.0, np.inf])
+@pytest.mark.parametrize("step", [1e-3, 1.0])
 @pytest.mark.parametrize("cause", list(CAUSES))
 def test_the_solution_is_that_of_the_whole_tangent(cause: str, step: float) -> None:
     system = at_a_step(CAUSES[cause], step)
@@ -83,7 +81,7 @@ def test_the_solution_is_that_of_the_whole_tangent(cause: str, step: float) -> N
     for factors in (None, KeptFactors()):
         found, taken = solved(system, 1e-10, factors)
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
-        assert factors is None or taken < 40
+        assert taken < 40
 
 
 @pytest.mark.parametrize("cause", list(CAUSES))
@@ -99,8 +97,8 @@ def test_factors_of_another_tissue_and_step_serve(cause: str) -> None:
 
 
 def test_factors_that_waste_more_than_new_ones_cost_are_renewed() -> None:
-    system, factors = at_a_step(CAUSES["relaxing stress"], 1.0), KeptFactors()
-    solved(at_a_step(CAUSES["relaxing stress"], 1.0, stiffer=0.01), 1e-3, factors)
+    system, factors = at_a_step(CAUSES["fluid"], 1.0), KeptFactors()
+    solved(at_a_step(CAUSES["fluid"], 1.0, stiffer=0.01), 1e-3, factors)
     counts = [solved(system, 1e-8, factors)[1] for _ in range(12)]
     # those of tissue of which the other half is the stiff one, then its own
     assert counts[-1] < counts[0] / 2
@@ -116,27 +114,17 @@ def test_factors_serve_where_the_same_is_held() -> None:
     assert not factors.serve(fewer, True)
 
 
-def test_an_unstable_state_is_seen() -> None:
+def test_factors_of_an_unstable_state_are_told() -> None:
     from scipy.linalg import eigh
     from scipy.sparse import diags
 
-    system, factors = at_a_step(CAUSES["relaxing stress"], 1.0), KeptFactors()
+    system, factors = at_a_step(CAUSES["fluid"], 1.0), KeptFactors()
     free = ~system.model.constrained.ravel()
     K = system.stiffness()
     mass = np.repeat(system.model.node_masses, 3)
-    softest, mode = (part[..., 0] for part in eigh(K.toarray()[free][:, free], np.diag(mass[free])))
+    softest = eigh(K.toarray()[free][:, free], np.diag(mass[free]), eigvals_only=True)[0]
     unstable = K - 1.5 * softest * diags(mass)
     assert not factors.renew(unstable, free, True) and factors.serve(free, False)
-    # a tangent that is unstable, with the factors of one that is not
-    assert factors.renew(K, free, True)
-    system.assemble(1.0, -1.5 * softest)
-    load = np.random.default_rng(3).normal(size=len(free)) * free
-    load[free] += mode
-    system.load.assign(load.reshape(-1, 3))
-    solver = FactoredSolver(system, system.linear_solver(tolerance=1e-3, max_iterations=500), factors, 1e-3)
-    solver.prepare()
-    solver.solve()
-    assert solver.result().indefinite
 
 
 @pytest.mark.parametrize("cause", list(CAUSES))
@@ -149,6 +137,3 @@ def test_a_course_is_the_same(cause: str) -> None:
         np.testing.assert_allclose(one.u, other.u, rtol=0, atol=1e-6 * np.abs(other.u).max())
     # and it goes on giving way
     assert np.linalg.norm(found[-1].u - found[0].u) > 0.03 * np.linalg.norm(found[0].u)
-    counts = [sum(step.cg_iterations for state in states for step in state.history) for states in (found, expected)]
-    # a fluid has factors anyway
-    assert counts[0] < counts[1] / 3 or isinstance(CAUSES[cause], Drainage)

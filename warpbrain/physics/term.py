@@ -77,7 +77,6 @@ class Coupling:
     #: solution depends on.
     yielding: wp.array
     own: wp.array  # `db_i/du_j`
-    others: wp.array  # `db_j/du_i`
     #: `b(u) + A p` where the term advanced last, without what flowed in that step; zero once it has forgotten
     content: wp.array
 

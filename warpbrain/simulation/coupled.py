@@ -22,6 +22,7 @@ a solve ends only when the residual of the eliminated system is small.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -66,15 +67,17 @@ class CoupledSolver(FactoredSolver):
     def prepare(self) -> None:
         if self._system.coupled:
             self._take_matrix()
-            self._take_couplings()
         else:
             self._plain.prepare()
 
-    def _take_couplings(self) -> None:
-        from scipy.sparse import block_diag, csr_matrix, diags, vstack
+    def _take_matrix(self) -> None:
+        from scipy.sparse import block_diag, bsr_matrix, csr_matrix, diags, vstack
 
-        n, parts = self._system.size, []
-        self._root = float(self._system.coupling_root.numpy()[0])
+        n, matrix, parts = self._system.size, self._system.matrix, []
+        values = matrix.values.numpy().astype(np.float64, copy=False)
+        # constrained rows and columns are those of the identity
+        self._K = bsr_matrix((values, matrix.columns.numpy(), matrix.offsets.numpy()), shape=(3 * n, 3 * n))
+        self._root = math.sqrt(self._system.coupling_factor)
         for c in (term.coupling for term in self._terms if term.coupled and term.coupling is not None):
             offsets, columns = c.offsets.numpy(), c.columns.numpy()
             components = (3 * columns[:, None] + np.arange(3)).ravel()

@@ -1,13 +1,13 @@
-"""Linear systems solved on the host, preconditioned by the factors of a state that is near.
+"""Factors of a state that is near, which precondition linear systems of states that follow each other.
 
-On the CPU one solve with factors takes as long as some ten iterations of the captured loops of `warpbrain.kernels`.
-Where many states follow each other three to six of them do what takes conjugate gradients 50 to 200 iterations: a step
-in time, another moment, a trial of a fit each changes a tangent a little. On a GPU:
-`warpbrain.simulation.kept_inverse`.
+A step in time, another moment, a trial of a fit each changes a tangent a little. Where the matrix is indefinite
+(`warpbrain.simulation.coupled`) three to six products with them do what takes hundreds of iterations without. Of a
+definite one, on the CPU, conjugate gradients with a coarse space (`warpbrain.kernels.linear`) are as soon done.
 """
 
 from __future__ import annotations
 
+import abc
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
-from warpbrain.kernels.linear import LinearResult, LinearSolver, host_gradients
+from warpbrain.kernels.linear import LinearResult, LinearSolver
 from warpbrain.simulation.sparse_factors import SparseFactors
 
 if TYPE_CHECKING:
@@ -70,13 +70,12 @@ class KeptFactors:
         return displacement
 
 
-#: Iterations after which factors are of no use, and with new ones the captured loop takes over.
+#: Iterations after which factors are of no use, and with new ones the plain solver takes over.
 MOST = 60
 
 
-class FactoredSolver:
-    """Solves a system's linear systems on the CPU, to a relative tolerance, with factors that are kept from one to the
-    next.
+class FactoredSolver(abc.ABC):
+    """Solves a system's linear systems, to a relative tolerance, with factors that are kept from one to the next.
 
     These are made, and made anew, as needed; the `plain` solver takes over where they do not help.
     """
@@ -92,18 +91,6 @@ class FactoredSolver:
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         self._plain.multiply(x, z)
-
-    def prepare(self) -> None:
-        self._plain.prepare()
-        self._take_matrix()
-
-    def _take_matrix(self) -> None:
-        """What is in blocks [N/m], constrained rows and columns those of the identity."""
-        from scipy.sparse import bsr_matrix
-
-        matrix, size = self._system.matrix, 3 * self._system.size
-        values = matrix.values.numpy().astype(np.float64, copy=False)
-        self._K = bsr_matrix((values, matrix.columns.numpy(), matrix.offsets.numpy()), shape=(size, size))
 
     def solve(self, tolerance: float | None = None) -> None:
         """See `LinearSolver`; begins with zero."""
@@ -127,13 +114,9 @@ class FactoredSolver:
                 break
         return result
 
+    @abc.abstractmethod
     def _try(self, wanted: float) -> LinearResult:
-        load = self._system.load.numpy().astype(np.float64).ravel()
-        x, residual = np.zeros_like(load), load.copy()
-        goal = wanted * float(np.linalg.norm(load))
-        result = host_gradients(lambda p: self._K @ p, self._factors.solve, x, residual, goal, MOST)
-        self._system.solution.assign(x.reshape(-1, 3))
-        return result
+        """Solve with the factors that there are."""
 
     def result(self) -> LinearResult:
         return self._result or self._plain.result()

@@ -7,7 +7,8 @@ takes a captured loop hundreds of iterations. By CuPy, which is an extra, and as
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -16,7 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.kernels.linear import LinearResult, host_gradients
+from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.factored import MOST, FactoredSolver, KeptFactors
 
 
@@ -128,9 +129,49 @@ class InvertedSolver(FactoredSolver):
             residual = cupy.asarray(system.load).ravel().copy()
             x = cupy.zeros_like(residual)
             goal = wanted * float(cupy.linalg.norm(residual))
-            result = host_gradients(multiply, self._factors.solve, x, residual, goal, MOST)
+            result = _gradients(multiply, self._factors.solve, x, residual, goal, MOST)
             cupy.asarray(system.solution).ravel()[:] = x
         return result
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _gradients(
+    multiply: Callable[[Any], Any],
+    precondition: Callable[[Any], Any],
+    x: Any,
+    r: Any,
+    goal: float,
+    most: int,
+) -> LinearResult:
+    """Preconditioned conjugate gradients of arrays of CuPy (Hestenes and Stiefel 1952) that watch the curvature.
+
+    They go on until the norm of the residual is at most the `goal`, and leave what they find in `x` (n,) and its
+    residual in `r`. They also end where the matrix or the preconditioner is not positive definite, or what they make is
+    not finite: so does a search that went too far.
+    """
+    p = 0.0 * r
+    before, least = math.inf, math.inf
+    for iteration in range(most + 1):
+        # as a product, since NumPy hands a norm of CuPy's over to three kernels
+        residual = math.sqrt(float(r @ r))
+        if not residual > goal or iteration == most:
+            break
+        z = precondition(r)
+        along = float(r @ z)
+        if not 0.0 < along < math.inf:
+            break
+        p *= along / before
+        p += z
+        Ap = multiply(p)
+        curvature = float(p @ Ap)
+        least = min(least, curvature / float(p @ p))
+        # written so that what is not a number ends here, too
+        if not curvature > 0.0:
+            break
+        x += along / curvature * p
+        r -= along / curvature * Ap
+        before = along
+    return LinearResult(iteration, residual, goal, least if math.isfinite(least) else math.nan)
 
 
 def _dense(matrix: Any) -> Any:
@@ -149,7 +190,10 @@ def _dense(matrix: Any) -> Any:
 
 
 def kept_for(device: Any) -> KeptFactors | None:
-    """What is kept where states are solved on a Warp device; None on a GPU for which there is no CuPy."""
+    """What is kept where states are solved on a Warp device; None on a GPU for which there is no CuPy.
+
+    On a CPU it serves terms with unknowns of their own alone.
+    """
     if device.is_cpu:
         return KeptFactors()
     return KeptInverse(device) if has_cupy(device) else None

@@ -183,14 +183,14 @@ class DrainageTerm(Term):
     """
 
     memory = ("_held", "_shape", "_beyond")
-    lasting = ("coupling",)
+    lasting = ("coupling", "_pores")
     coupling: Coupling
 
     def __init__(self, body: Body, mechanism: Drainage) -> None:
         elements = elements_of(body.mesh, mechanism.elements)
         super().__init__(body, body.tetrahedra[elements], mechanism.factor)
         self.mechanism = mechanism
-        self._kernels = pore_kernels(body.precision)
+        made, self._kernels = pore_kernels(body.precision)
         scalar, vec3 = body.precision.scalar, body.precision.vec3
         size, count = len(body.mesh.points), len(elements)
         volumes = body.mesh.volumes[elements]
@@ -208,10 +208,19 @@ class DrainageTerm(Term):
         self._shape = self.zeros(size, dtype=vec3)
         compliance, yielding = (self.zeros(len(self._rows)) for _ in range(2))
         own, others = (self.zeros(len(self._rows), dtype=vec3) for _ in range(2))
-        self.coupling = Coupling(self._offsets, self._columns, compliance, yielding, own, others, self._held)
+        self.coupling = Coupling(self._offsets, self._columns, compliance, yielding, own, self._held)
         self._h = np.inf
         # of `A`, made where they are needed
         self._factors: Any = None
+        self._pores = made()
+        self._pores.nodes, self._pores.inverse_edges = body.nodes, body.inverse_edges
+        self._pores.softness, self._pores.scale = self.softness, self.scale
+        self._pores.own, self._pores.others = own, others
+        for name in (
+            *("elements", "volume", "taken", "corner_first", "corners", "closed", "lumped", "held", "beyond"),
+            *("rows", "offsets", "columns", "first", "contributions", "numbers"),
+        ):
+            setattr(self._pores, name, getattr(self, f"_{name}"))
         self.take_moduli()
 
     def _place_rows(self, size: int) -> None:
@@ -232,10 +241,6 @@ class DrainageTerm(Term):
 
     # -- the pressure's system ------------------------------------------------------------------------------------
 
-    @property
-    def _geometry(self) -> tuple[wp.array, ...]:
-        return (self._elements, self.body.nodes, self.body.inverse_edges, self._volume)
-
     def _over_compliance(self, given: wp.array) -> Floats:
         """`A^-1` times numbers of the nodes, on the host: fewer than a third of those of a displacement."""
         from scipy.sparse import csr_matrix, diags
@@ -255,8 +260,8 @@ class DrainageTerm(Term):
     def _element_compliance(self, mass: float, stabilisation: float, flow: float, out: wp.array) -> None:
         scalar = self.body.precision.scalar
         self.launch(
-            self._kernels.compliance, len(self.stencils), *self._geometry, self.softness,
-            scalar(self.mechanism.permeability), scalar(mass), scalar(stabilisation), scalar(flow), self._shape, out,
+            self._kernels.compliance, len(self.stencils), self._pores, scalar(mass), scalar(stabilisation),
+            scalar(flow * self.mechanism.permeability), self._shape, out,
         )  # fmt: skip
 
     def take_moduli(self) -> None:
@@ -284,18 +289,12 @@ class DrainageTerm(Term):
 
     def _gather(self, out: wp.array) -> None:
         """Sum entries of elements into sparse rows."""
-        self.launch(
-            self._kernels.gather_compliance, len(self._rows), self._rows, self._columns, self._first,
-            self._contributions, self._entries, self._closed, out,
-        )  # fmt: skip
+        self.launch(self._kernels.gather_compliance, len(self._rows), self._pores, self._entries, out)
 
     def _solve(self, u: wp.array) -> None:
         """The pressure at a displacement."""
-        self.launch(self._kernels.volumes, len(self.stencils), *self._geometry, u, self._taken)
-        self.launch(
-            self._kernels.supply, len(self._held), self._corner_first, self._corners, self._taken, self._held,
-            self._lumped, self._closed, self._numbers, self.scale, self._supply,
-        )  # fmt: skip
+        self.launch(self._kernels.volumes, len(self.stencils), self._pores, u)
+        self.launch(self._kernels.supply, len(self._held), self._pores, self._supply)
         self._beyond.assign(self._over_compliance(self._supply))
 
     def pressures(self) -> Floats:
@@ -323,10 +322,7 @@ class DrainageTerm(Term):
 
     def advance(self, u: wp.array) -> None:
         self._solve(u)
-        self.launch(
-            self._kernels.content, len(self._held), self._corner_first, self._corners, self._elements,
-            self.body.nodes, self._taken, self._storage, self._beyond, self._numbers, self.scale, self._held,
-        )  # fmt: skip
+        self.launch(self._kernels.content, len(self._held), self._pores, self._storage)
         wp.copy(self._shape, u)
         self._renew()
 
@@ -358,32 +354,23 @@ class DrainageTerm(Term):
 
     # -- forces ---------------------------------------------------------------------------------------------------
 
-    def _act(self, kernel: object, u: wp.array, *outputs: wp.array) -> None:
-        inputs = (self._beyond, self._numbers, self.scale, u)
-        self.launch(kernel, len(self.stencils), *self._geometry, *inputs, *outputs)
-
     def evaluate_forces(self, u: wp.array) -> None:
         self._solve(u)
-        self._act(self._kernels.forces, u, self.forces)
+        self.launch(self._kernels.forces, len(self.stencils), self._pores, u, self.forces)
 
     def evaluate_tangents(self, u: wp.array) -> None:
         self._solve(u)
-        self._act(self._kernels.tangents, u, self.forces, self.blocks, self._element_coupling)
-        coupling = self.coupling
-        self.launch(
-            self._kernels.gather_coupling, len(self._rows), self._rows, self._columns, self._first,
-            self._contributions, self._element_coupling, self._closed, coupling.own, coupling.others,
-        )  # fmt: skip
+        outputs = (self.forces, self.blocks, self._element_coupling)
+        self.launch(self._kernels.tangents, len(self.stencils), self._pores, u, *outputs)
+        self.launch(self._kernels.gather_coupling, len(self._rows), self._pores, self._element_coupling)
 
     def add_stiffness(self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array) -> None:
         if not self.coupled:
             return
-        coupling, n = self.coupling, len(self._held)
-        sparse = (coupling.offsets, coupling.columns)
-        self.launch(self._kernels.taken_up, n, *sparse, coupling.own, columns, x, self._change)
+        self.launch(self._kernels.taken_up, len(self._held), self._pores, columns, x, self._change)
         self._change.assign(self._over_compliance(self._change))
         number = self.body.precision.scalar(factor)
-        self.launch(self._kernels.push, n, *sparse, coupling.others, self._change, number, rows, y)
+        self.launch(self._kernels.push, len(self._held), self._pores, self._change, number, rows, y)
 
     def energy(self, u: wp.array) -> float:
         self._solve(u)
