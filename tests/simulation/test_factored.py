@@ -107,24 +107,11 @@ def test_factors_that_waste_more_than_new_ones_cost_are_renewed() -> None:
 def test_factors_serve_where_the_same_is_held() -> None:
     system, factors = at_a_step(CAUSES["fluid"], 1.0), KeptFactors()
     free = ~system.model.constrained.ravel()
-    assert not factors.serve(free, True)
-    assert factors.renew(system.stiffness(), free, True) and factors.serve(free, True)
+    assert not factors.serve(free)
+    assert factors.renew(system.stiffness(), free) and factors.serve(free)
     fewer = free.copy()
     fewer[-3:] = False
-    assert not factors.serve(fewer, True)
-
-
-def test_factors_of_an_unstable_state_are_told() -> None:
-    from scipy.linalg import eigh
-    from scipy.sparse import diags
-
-    system, factors = at_a_step(CAUSES["fluid"], 1.0), KeptFactors()
-    free = ~system.model.constrained.ravel()
-    K = system.stiffness()
-    mass = np.repeat(system.model.node_masses, 3)
-    softest = eigh(K.toarray()[free][:, free], np.diag(mass[free]), eigvals_only=True)[0]
-    unstable = K - 1.5 * softest * diags(mass)
-    assert not factors.renew(unstable, free, True) and factors.serve(free, False)
+    assert not factors.serve(fewer)
 
 
 @pytest.mark.parametrize("cause", list(CAUSES))

@@ -32,7 +32,7 @@ import warp as wp
 from warpbrain.arrays import Floats
 from warpbrain.kernels.linear import LinearResult, LinearSolver
 from warpbrain.physics.term import Term
-from warpbrain.simulation.factored import FactoredSolver, KeptFactors
+from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.sparse_factors import SparseFactors
 from warpbrain.threads import one_thread_of_blas
 
@@ -42,27 +42,29 @@ if TYPE_CHECKING:
 #: What is asked of the whole system, relative to what is asked of the solve, in the first place; and how often it may
 #: go on.
 _FIRST, _ROUNDS = 0.3, 6
-#: Iterations at most.
+#: Iterations at most, with factors of a state nearby and with its own.
 _MOST = 120
 
 
-class CoupledSolver(FactoredSolver):
+class CoupledSolver:
     """Solves the system's matrix together with what terms with unknowns of their own add to it.
 
-    `plain` is for times when none of these follow the displacement; the tolerance is relative.
+    `plain` is for times when none of these follow the displacement; the tolerance is relative. The `factors` are kept
+    from one solve to the next, and renewed where they do not help.
     """
-
-    #: Fluid that is pressed at once lends tissue a stiffness that is none without it: `K` alone is no sign.
-    _definite = False
 
     def __init__(
         self, system: System, terms: Sequence[Term], plain: LinearSolver, factors: KeptFactors, tolerance: float
     ) -> None:
-        super().__init__(system, plain, factors, tolerance)
-        self._terms = terms
+        self._system, self._plain, self._factors, self._tolerance = system, plain, factors, tolerance
+        self._terms, self._free = terms, ~system.model.constrained.ravel()
+        self._result: LinearResult | None = None
         self._product = wp.zeros(system.size, dtype=system.precision.vec3, device=system.device)
         #: That of `S0`, and its factors: it changes from step to step, not within one.
         self._schur: tuple[Any, SparseFactors] | None = None
+
+    def multiply(self, x: wp.array, z: wp.array) -> None:
+        self._plain.multiply(x, z)
 
     def prepare(self) -> None:
         if self._system.coupled:
@@ -101,14 +103,21 @@ class CoupledSolver(FactoredSolver):
 
     def solve(self, tolerance: float | None = None) -> None:
         """See `LinearSolver`; begins with zero, for a guess of the displacement alone is none for both."""
-        if self._system.coupled:
-            wanted = self._tolerance if tolerance is None else tolerance
-            # sums over nodes take less than to wake other threads
-            with one_thread_of_blas():
-                self._result = self._with_factors(wanted) or LinearResult(0, np.inf, 0.0, np.nan)
-        else:
-            self._result = None
+        self._result = None
+        if not self._system.coupled:
             self._plain.solve(tolerance)
+            return
+        wanted = self._tolerance if tolerance is None else tolerance
+        # sums over nodes take less than to wake other threads
+        with one_thread_of_blas():
+            if self._factors.serve(self._free):
+                self._result = self._try(wanted)
+            if self._result is None or not (self._result.converged or self._result.indefinite):
+                renewed = self._factors.renew(self._K, self._free)
+                self._result = self._try(wanted) if renewed else LinearResult(0, np.inf, 0.0, np.nan)
+
+    def result(self) -> LinearResult:
+        return self._result or self._plain.result()
 
     def _try(self, wanted: float) -> LinearResult:
         """Ever closer, until what is left of the eliminated system is at most `wanted` times the load."""
@@ -125,6 +134,7 @@ class CoupledSolver(FactoredSolver):
             if result.converged or taken == 0 or iterations >= _MOST or not np.isfinite(result.residual):
                 break
             tighter *= 0.3 * result.tolerance / result.residual
+        self._factors.count(iterations)
         return result
 
     def _multiply(self, x: Floats) -> Floats:

@@ -33,7 +33,6 @@ from warpbrain.simulation.assembly import Assembly
 from warpbrain.simulation.averaged import PART, AveragedTerm, Patches, averaged_modulus, own_modulus, patches_of
 from warpbrain.simulation.coupled import CoupledSolver
 from warpbrain.simulation.factored import KeptFactors
-from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
 
@@ -528,8 +527,6 @@ class System:
         - Conjugate gradients (`warpbrain.kernels.linear.conjugate_gradient`) for one system after the other.
         - GMRES on the host (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is
           indefinite.
-        - On a GPU with an inverse that is kept from state to state (`warpbrain.simulation.kept_inverse`): it nearly
-          solves those that are near.
 
         Parameters
         ----------
@@ -543,6 +540,7 @@ class System:
         at_rest : bool
             The matrix is without inertia, so that a coarse space is worth its making.
         factors : KeptFactors, optional
+            Of states nearby, for an indefinite matrix.
         """
         kind = conjugate_gradient(self.device, preconditioner, only_blocks=self.assembled)
         plain = kind(
@@ -559,10 +557,7 @@ class System:
             nodes=(self.model.node_mesh.points, self.free) if at_rest else None,
         )
         if self._coupled:
-            kept = KeptFactors() if factors is None or isinstance(factors, KeptInverse) else factors
-            return CoupledSolver(self, self._coupled, plain, kept, tolerance)
-        if isinstance(factors, KeptInverse) and self.assembled and self.precision.name == "double":
-            return InvertedSolver(self, plain, factors, tolerance)
+            return CoupledSolver(self, self._coupled, plain, factors or KeptFactors(), tolerance)
         return plain
 
     def load_kernels(self) -> float:
