@@ -106,7 +106,7 @@ def linear_course(model: Model) -> list[Floats]:
     return course
 
 
-@pytest.mark.parametrize("factors", [None, KeptFactors()], ids=["minres", "kept factors"])
+@pytest.mark.parametrize("factors", [None, KeptFactors()], ids=["own factors", "kept factors"])
 def test_two_fluids_are_those_of_biots_equations(factors: KeptFactors | None) -> None:
     model = body(3e-6)
     system = System(model, "cpu")
@@ -131,13 +131,11 @@ def test_the_solution_leaves_nothing_of_a_large_deformation() -> None:
     system.assemble(1.0, 0.0)
     load = np.random.default_rng(3).normal(size=(system.size, 3)) * free
     system.load.assign(load)
-    by_minres = solution(system)
-    by_factors = solution(system, KeptFactors())
-    np.testing.assert_allclose(by_factors, by_minres, rtol=0, atol=1e-8 * np.abs(by_minres).max())
-    step = 1e-5 / np.abs(by_minres).max()
+    along_load = solution(system)
+    step = 1e-5 / np.abs(along_load).max()
     forces = []
     for sign in (-1.0, 1.0):
-        system.u.assign(u + sign * step * by_minres)
+        system.u.assign(u + sign * step * along_load)
         forces.append(system.internal_forces())
     along = (forces[1] - forces[0]) / (2.0 * step)
     assert np.linalg.norm((along - load)[free]) < 1e-5 * np.linalg.norm(load)

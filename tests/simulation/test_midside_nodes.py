@@ -15,8 +15,7 @@ from warpbrain.physics.mechanisms.gravity import STANDARD_GRAVITY, Gravity
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.dynamics import Simulator
-from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, solve_equilibrium
-from warpbrain.simulation.kept_inverse import kept_for
+from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import QUADRATIC, Damping, Material, Model, Motion
 from warpbrain.simulation.relaxation import relax_to_rest
 from warpbrain.simulation.result import result_of
@@ -168,14 +167,6 @@ def test_a_damped_step_is_that_of_the_whole_matrix(device: str) -> None:
     simulator = Simulator(system, time_step=h, tolerance=1e-12)
     simulator.step()
     assert np.abs(simulator.v.numpy().ravel() - v).max() <= 1e-9 * np.abs(v).max()
-
-
-def test_factors_that_are_kept_are_not_of_a_matrix_that_lacks_a_part(device: str) -> None:
-    system = System(block(elements="tet10-mixed"), device)
-    expected = solve_equilibrium(system, EquilibriumOptions(tolerance=1e-10)).u
-    kept = EquilibriumSolver(system, EquilibriumOptions(tolerance=1e-10), factors=kept_for(system.device))
-    for _ in range(2):
-        assert np.abs(kept.solve().u - expected).max() <= 1e-8 * np.abs(expected).max()
 
 
 class Unknown(Load):

@@ -16,10 +16,9 @@ def _matrix(n: int = 400):
     return csr_array(A), rng.normal(size=(n, 3))
 
 
-def test_definite_or_not():
+def test_solutions_of_one_side_and_of_several():
     A, b = _matrix()
     factors = SparseFactors(A)
-    assert factors.is_definite and not SparseFactors(A - 3.3 * csr_array(np.eye(400))).is_definite
     np.testing.assert_allclose(A @ factors.solve(b), b, atol=1e-12)
     np.testing.assert_allclose(A @ factors.solve(b[:, 0]), b[:, 0], atol=1e-12)
 
@@ -31,7 +30,7 @@ def test_in_a_fork():
     process = os.fork()
     if process == 0:
         factors = SparseFactors(A)
-        right = factors.is_definite and np.abs(A @ factors.solve(b) - b).max() < 1e-12
+        right = np.abs(A @ factors.solve(b) - b).max() < 1e-12
         os._exit(0 if right else 1)
     end = time.monotonic() + 30.0
     while (ended := os.waitpid(process, os.WNOHANG))[0] == 0:

@@ -21,8 +21,7 @@ All are estimated along with the tissue and integrated out.
 `d` depends on the tissue as the displacement itself does. It is taken to first order in the tissue about the estimate:
 held fixed, it would make the displacement change too little with a modulus, by the share that d is of it.
 
-A finer state is begun at that of the coarse mesh plus the difference of earlier ones. On the CPU the factorised
-stiffness of the coarse mesh preconditions it (`warpbrain.kernels.two_level`), anew when it helps less.
+A finer state is begun at that of the coarse mesh plus the difference of earlier ones.
 """
 
 from __future__ import annotations
@@ -35,27 +34,22 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.inference.beliefs import belief
-from warpbrain.kernels.linear import ConjugateGradient
-from warpbrain.kernels.two_level import TwoLevelGradient
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.mesh_error import FinerCase, free_prolongation, restricted
+from warpbrain.simulation.mesh_error import FinerCase, restricted
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.simulation.sensitivity import SensitivitySolver
-from warpbrain.simulation.sparse_factors import SparseFactors
 from warpbrain.simulation.system import System
 
 #: Out-of-balance force of a finer state, relative: far below the error that is looked for; and of linear solves for
 #: derivatives: what is left of the error is far below a standard deviation of any parameter.
 ROUGH, _DERIVATIVES = 1e-5, 1e-4
-#: Iterations of conjugate gradients at most, where the two levels are of no help.
-_MOST = 10_000
 #: Earlier states that are kept beside the last one.
 _KEPT = 11
 #: Of the range of `b` in which the error of the stiffness is finite: beyond, `a` goes on along its tangent.
@@ -183,9 +177,6 @@ class FinerMesh:
         # of earlier states: kinds of mechanisms, coarse displacements, flat, and the finer ones less those
         self._earlier: list[tuple[frozenset[str], Floats, Floats]] = []
         self._system: System | None = None
-        self._factors: tuple[Any, Bools] | None = None
-        # solver of the system with these factors
-        self._linear: TwoLevelGradient | None = None
         # to its mesh, its model and its displacement
         self._last: tuple[Any, Model, Floats] | None = None
 
@@ -194,18 +185,17 @@ class FinerMesh:
     ) -> Difference:
         """By how much the state of a case with the tissue of `theta` (p,) differs from that on the mesh as it is.
 
-        That is `u` [m] and `reactions` [N] (n, 3) of a system, whose displacement is the state's afterwards;
-        `tolerance` is the out-of-balance force of the finer state, relative. `SolveError` if there is none.
+        That is `u` [m] and `reactions` [N] (n, 3) of a system; `tolerance` is the out-of-balance force of the finer
+        state, relative. `SolveError` if there is none.
         """
         self.solves += 1
         finer = FinerCase(case)
         model = finer.model(system.model)
         external = model.external_forces()
         finer_system = self._system_of(model)
-        linear = self._two_level(finer_system, system, u, finer.prolongation)
         # the loads act already: one load step, or the state is taken not to exist there
         options = EquilibriumOptions(tolerance=tolerance, max_total_newton=EquilibriumOptions.max_newton)
-        solver = EquilibriumSolver(finer_system, options, linear=linear)
+        solver = EquilibriumSolver(finer_system, options)
         flat = finer.prolongation @ u
         acting = frozenset(mechanism.kind for mechanism in case.mechanisms)
         # the error at the edges of another mechanism would nearly invert elements
@@ -217,8 +207,6 @@ class FinerMesh:
             if not earlier:
                 raise
             solution = solver.solve(external, flat)
-        if linear is not None and linear.slow:
-            self._factors = self._linear = None
         self._earlier = [*self._earlier[-_KEPT:], (acting, u.ravel(), solution.u - flat)]
         self._last = finer.prolongation, model, solution.u
         finer_u, finer_reactions = restricted(
@@ -242,30 +230,6 @@ class FinerMesh:
         ]
         return np.array([du for du, _ in each]), np.array([dR for _, dR in each])
 
-    def _two_level(self, system: System, coarse: System, u: Floats, prolongation: Any) -> TwoLevelGradient | None:
-        """A solver of the finer system with the factors of the coarse one; None for the system's own solver.
-
-        That is needed for terms with unknowns of their own, and for midside nodes, which the coarse mesh has not.
-        """
-        if not system.device.is_cpu or system.quadratic is not None:
-            return None
-        if self._linear is not None:
-            return self._linear
-        plain = system.linear_solver(tolerance=ROUGH, max_iterations=_MOST, watch_curvature=True)
-        if not isinstance(plain, ConjugateGradient):
-            return None
-        if self._factors is None:
-            coarse.u.assign(u)
-            free = ~coarse.model.constrained.ravel()
-            try:
-                self._factors = SparseFactors(coarse.stiffness().tocsr()[free][:, free]), free
-            except RuntimeError:
-                return None
-        factors, free = self._factors
-        prolong = free_prolongation(prolongation, free, system.model.constrained)
-        self._linear = TwoLevelGradient(plain, system.load, system.solution, factors, prolong, tolerance=ROUGH)
-        return self._linear
-
     def _system_of(self, model: Model) -> System:
         """The system of the last state with other parameters, or a new one if more than parameters changed."""
         if self._system is not None:
@@ -274,7 +238,7 @@ class FinerMesh:
                 return self._system
             except InputError:
                 pass
-        self._system, self._linear = System(model, self._device), None
+        self._system = System(model, self._device)
         return self._system
 
 

@@ -304,10 +304,6 @@ class ConjugateGradient(abc.ABC):
         """`z = A x`."""
         self._product(x, z, z, 1.0, 0.0)
 
-    def precondition(self, x: wp.array, z: wp.array) -> None:
-        """`z = D^-1 x`, `D` the diagonal blocks; of a solver with that preconditioner that is not one launch."""
-        self._apply_diagonal(x, x, z, 1.0, 0.0)
-
     def prepare(self) -> None:
         """Renew the preconditioner after the values of the matrix changed; its pattern is kept."""
         if self._kind == "block-jacobi":
@@ -652,43 +648,3 @@ class WarpGradient(ConjugateGradient):
         outcome = (*self._outcome, self._least)
         iterations, residual, goal, curvature = (float(values.numpy().ravel()[0]) for values in outcome)
         return iterations, residual**0.5, goal**0.5, curvature
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def host_gradients(
-    multiply: Callable[[Floats], Floats],
-    precondition: Callable[[Floats], Floats],
-    x: Floats,
-    r: Floats,
-    goal: float,
-    most: int,
-) -> LinearResult:
-    """Preconditioned conjugate gradients on the host (Hestenes and Stiefel 1952) that watch the curvature.
-
-    They go on until the norm of the residual is at most the `goal`, and leave what they find in `x` (n,) and its
-    residual in `r`. They also end where the matrix or the preconditioner is not positive definite, or what they make is
-    not finite: so does a search that went too far.
-    """
-    p = np.zeros_like(r)
-    before, least = math.inf, math.inf
-    for iteration in range(most + 1):
-        # as a product, since NumPy hands a norm of CuPy's over to three kernels
-        residual = math.sqrt(float(r @ r))
-        if not residual > goal or iteration == most:
-            break
-        z = precondition(r)
-        along = float(r @ z)
-        if not 0.0 < along < math.inf:
-            break
-        p *= along / before
-        p += z
-        Ap = multiply(p)
-        curvature = float(p @ Ap)
-        least = min(least, curvature / float(p @ p))
-        # written so that what is not a number ends here, too
-        if not curvature > 0.0:
-            break
-        x += along / curvature * p
-        r -= along / curvature * Ap
-        before = along
-    return LinearResult(iteration, residual, goal, least if math.isfinite(least) else math.nan)

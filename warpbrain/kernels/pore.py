@@ -7,8 +7,8 @@ In an element of reference volume `V` with the gradients `g_a` of its shape func
     M_ab = V (1 + delta_ab)/20                     storage and exchange
     N_ab = V/(2 mu) ((1 + delta_ab)/20 - 1/16)     stabilisation
 
-Numbers that a captured graph must see are in an array: the pressure at drained nodes [Pa], the source of each volume
-[1, or 1/s of a steady flow], and 1 or 0, whether a step or a steady flow.
+Numbers of a step are in an array: the pressure at drained nodes [Pa], the source of each volume [1, or 1/s of a steady
+flow], and 1 or 0, whether a step or a steady flow.
 
 `J C^-1 = cof F^T cof F / J`. `N` is what White and Borja (2008) add to the rate of storage: the product of what of two
 pressures is not constant in an element (Dohrmann and Bochev 2004). It is zero for a uniform pressure, so no fluid is
@@ -16,6 +16,7 @@ lost, and zero in a steady flow, which has no rate.
 """
 
 from functools import cache
+from typing import Any
 
 import warp as wp
 
@@ -29,12 +30,40 @@ PLACES = tuple(PAIRS.index((min(a, b), max(a, b))) for a in range(4) for b in ra
 
 
 @cache
-def pore_kernels(precision: Precision) -> KernelSet:
-    """Make (once) the kernels of a precision."""
+def pore_kernels(precision: Precision) -> tuple[Any, KernelSet]:
+    """Make (once) what the kernels of a precision know, and these."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"pore_{precision.name}")
     vec16i = wp.types.vector(length=16, dtype=int)
     places = wp.constant(vec16i(*PLACES))
+
+    @wp.struct
+    class Pores:
+        # of each element, and its place among all
+        elements: wp.array[int]
+        nodes: wp.array[wp.vec4i]
+        inverse_edges: wp.array[mat33]
+        volume: wp.array[scalar]
+        softness: wp.array[scalar]
+        taken: wp.array[scalar]
+        # of each node, and elements around it
+        corner_first: wp.array[int]
+        corners: wp.array[int]
+        closed: wp.array[scalar]
+        lumped: wp.array[scalar]
+        held: wp.array[scalar]
+        beyond: wp.array[scalar]
+        # sparse rows over the nodes, and which parts of elements each entry is the sum of
+        rows: wp.array[int]
+        offsets: wp.array[int]
+        columns: wp.array[int]
+        first: wp.array[int]
+        contributions: wp.array[int]
+        own: wp.array[vec3]
+        others: wp.array[vec3]
+        # of the step
+        numbers: wp.array[scalar]
+        scale: wp.array[scalar]
 
     @wp.func
     def shape_gradient(G: mat33, a: int):
@@ -45,29 +74,19 @@ def pore_kernels(precision: Precision) -> KernelSet:
 
     @kernels.add
     def compliance(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        softness: wp.array[scalar],
-        permeability: scalar,
-        mass: scalar,
-        stabilisation: scalar,
-        flow: scalar,
-        u: wp.array[vec3],
-        out: wp.array2d[scalar],
+        pores: Pores, mass: scalar, stabilisation: scalar, flow: scalar, u: wp.array[vec3], out: wp.array2d[scalar]
     ):
         """One thread for an element: the ten entries of its part of `S M + N + h (H + k_c M)`."""
         t = wp.tid()
-        e = elements[t]
-        G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
+        e = pores.elements[t]
+        G = pores.inverse_edges[e]
+        F = deformation_gradient(u, pores.nodes[e], G)
         cof = cofactor(F)
         J = wp.dot(F[0], cof[0])
-        V = volume[t]
-        k = flow * permeability * V / J
-        even = V / scalar(20.0) * (mass + stabilisation * softness[t])
-        less = V / scalar(16.0) * stabilisation * softness[t]
+        V = pores.volume[t]
+        k = flow * V / J
+        even = V / scalar(20.0) * (mass + stabilisation * pores.softness[t])
+        less = V / scalar(16.0) * stabilisation * pores.softness[t]
         for a in range(4):
             ga = cof * shape_gradient(G, a)
             for b in range(a, 4):
@@ -77,115 +96,73 @@ def pore_kernels(precision: Precision) -> KernelSet:
                 out[t, places[4 * a + b]] = entry
 
     @kernels.add
-    def gather_compliance(
-        rows: wp.array[int],
-        columns: wp.array[int],
-        first: wp.array[int],
-        contributions: wp.array[int],
-        entries: wp.array2d[scalar],
-        closed: wp.array[scalar],
-        values: wp.array[scalar],
-    ):
+    def gather_compliance(pores: Pores, entries: wp.array2d[scalar], values: wp.array[scalar]):
         """One thread for an entry of the sparse matrix of all nodes; rows and columns of drained nodes are those of the
         identity."""
         k = wp.tid()
-        i = rows[k]
-        j = columns[k]
+        i = pores.rows[k]
+        j = pores.columns[k]
         total = scalar(0.0)
-        for c in range(first[k], first[k + 1]):
-            which = contributions[c]
+        for c in range(pores.first[k], pores.first[k + 1]):
+            which = pores.contributions[c]
             total += entries[which // 16, places[which % 16]]
-        total *= closed[i] * closed[j]
+        total *= pores.closed[i] * pores.closed[j]
         if i == j:
-            total += scalar(1.0) - closed[i]
+            total += scalar(1.0) - pores.closed[i]
         values[k] = total
 
     @kernels.add
-    def volumes(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array[scalar],
-    ):
+    def volumes(pores: Pores, u: wp.array[vec3]):
         """One thread for an element: `b_a`, the same for each of its nodes."""
         t = wp.tid()
-        e = elements[t]
-        F = deformation_gradient(u, nodes[e], inverse_edges[e])
+        e = pores.elements[t]
+        F = deformation_gradient(u, pores.nodes[e], pores.inverse_edges[e])
         # det(I + D) - 1 from the invariants of D: small changes keep their digits in single precision
         D = F - wp.identity(n=3, dtype=scalar)
         tr = wp.trace(D)
         second = scalar(0.5) * (tr * tr - wp.ddot(D, wp.transpose(D)))
-        out[t] = volume[t] / scalar(4.0) * (tr + second + wp.determinant(D))
+        pores.taken[t] = pores.volume[t] / scalar(4.0) * (tr + second + wp.determinant(D))
 
     @kernels.add
-    def content(
-        corner_first: wp.array[int],
-        corners: wp.array[int],
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        taken: wp.array[scalar],
-        entries: wp.array2d[scalar],
-        beyond: wp.array[scalar],
-        numbers: wp.array[scalar],
-        scale: wp.array[scalar],
-        out: wp.array[scalar],
-    ):
-        """One thread for a node: the fluid `b + (S M + N) p` around it."""
+    def content(pores: Pores, entries: wp.array2d[scalar]):
+        """One thread for a node: the fluid `b + (S M + N) p` around it is what it holds now."""
         i = wp.tid()
         total = scalar(0.0)
-        for c in range(corner_first[i], corner_first[i + 1]):
-            t = corners[c] // 4
-            a = corners[c] % 4
-            near = nodes[elements[t]]
-            total += taken[t]
+        for c in range(pores.corner_first[i], pores.corner_first[i + 1]):
+            t = pores.corners[c] // 4
+            a = pores.corners[c] % 4
+            near = pores.nodes[pores.elements[t]]
+            total += pores.taken[t]
             for b in range(4):
-                total += entries[t, places[4 * a + b]] * (beyond[near[b]] + numbers[0] * scale[0])
-        out[i] = total
+                total += entries[t, places[4 * a + b]] * (pores.beyond[near[b]] + pores.numbers[0] * pores.scale[0])
+        pores.held[i] = total
 
     @kernels.add
-    def supply(
-        corner_first: wp.array[int],
-        corners: wp.array[int],
-        taken: wp.array[scalar],
-        held: wp.array[scalar],
-        lumped: wp.array[scalar],
-        closed: wp.array[scalar],
-        numbers: wp.array[scalar],
-        scale: wp.array[scalar],
-        out: wp.array[scalar],
-    ):
+    def supply(pores: Pores, out: wp.array[scalar]):
         """One thread for a node: right-hand side of the pressure beyond that of the drained nodes."""
         i = wp.tid()
         total = scalar(0.0)
-        for c in range(corner_first[i], corner_first[i + 1]):
-            total += taken[corners[c] // 4]
-        out[i] = closed[i] * (numbers[2] * (held[i] - total) + numbers[1] * scale[0] * lumped[i])
+        for c in range(pores.corner_first[i], pores.corner_first[i + 1]):
+            total += pores.taken[pores.corners[c] // 4]
+        source = pores.numbers[1] * pores.scale[0] * pores.lumped[i]
+        out[i] = pores.closed[i] * (pores.numbers[2] * (pores.held[i] - total) + source)
 
     @wp.func
-    def mean_pressure(near: wp.vec4i, beyond: wp.array[scalar], pressure: scalar):
-        total = beyond[near[0]] + beyond[near[1]] + beyond[near[2]] + beyond[near[3]]
-        return pressure + total / scalar(4.0)
+    def mean_pressure(pores: Pores, e: int):
+        total = scalar(0.0)
+        for a in range(4):
+            total += pores.beyond[pores.nodes[e][a]]
+        return pores.numbers[0] * pores.scale[0] + total / scalar(4.0)
 
     @kernels.add
-    def forces(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        beyond: wp.array[scalar],
-        numbers: wp.array[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-    ):
+    def forces(pores: Pores, u: wp.array[vec3], element_forces: wp.array2d[vec3]):
         """One thread for an element: forces of the pressure."""
         t = wp.tid()
-        e = elements[t]
-        G = inverse_edges[e]
-        p = mean_pressure(nodes[e], beyond, numbers[0] * scale[0])
-        store_forces(-p * volume[t] * cofactor(deformation_gradient(u, nodes[e], G)), G, element_forces, t)
+        e = pores.elements[t]
+        G = pores.inverse_edges[e]
+        p = mean_pressure(pores, e)
+        F = deformation_gradient(u, pores.nodes[e], G)
+        store_forces(-p * pores.volume[t] * cofactor(F), G, element_forces, t)
 
     @wp.func
     def second_derivative(c: vec3, d: vec3):
@@ -194,13 +171,7 @@ def pore_kernels(precision: Precision) -> KernelSet:
 
     @kernels.add
     def tangents(
-        elements: wp.array[int],
-        nodes: wp.array[wp.vec4i],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        beyond: wp.array[scalar],
-        numbers: wp.array[scalar],
-        scale: wp.array[scalar],
+        pores: Pores,
         u: wp.array[vec3],
         element_forces: wp.array2d[vec3],
         element_blocks: wp.array2d[mat33],
@@ -208,13 +179,13 @@ def pore_kernels(precision: Precision) -> KernelSet:
     ):
         """Forces of the pressure, tangent blocks, and `db/du` of the nodes of an element."""
         t = wp.tid()
-        e = elements[t]
-        G = inverse_edges[e]
-        F = deformation_gradient(u, nodes[e], G)
+        e = pores.elements[t]
+        G = pores.inverse_edges[e]
+        F = deformation_gradient(u, pores.nodes[e], G)
         cof = cofactor(F)
         J = wp.dot(F[0], cof[0])
-        V = volume[t]
-        p = mean_pressure(nodes[e], beyond, numbers[0] * scale[0])
+        V = pores.volume[t]
+        p = mean_pressure(pores, e)
         store_forces(-p * V * cof, G, element_forces, t)
         a, b, c = cof * G[0], cof * G[1], cof * G[2]
         s = -p * V / J
@@ -236,94 +207,36 @@ def pore_kernels(precision: Precision) -> KernelSet:
         element_coupling[t, 3] = quarter * c
 
     @kernels.add
-    def gather_coupling(
-        rows: wp.array[int],
-        columns: wp.array[int],
-        first: wp.array[int],
-        contributions: wp.array[int],
-        element_coupling: wp.array2d[vec3],
-        closed: wp.array[scalar],
-        coupling: wp.array[vec3],
-        transposed: wp.array[vec3],
-    ):
+    def gather_coupling(pores: Pores, element_coupling: wp.array2d[vec3]):
         """One thread for an entry: `db_i/du_j` and `db_j/du_i`, zero for the `b` of drained nodes."""
         k = wp.tid()
         total = vec3()
         total_transposed = vec3()
-        for c in range(first[k], first[k + 1]):
-            which = contributions[c]
+        for c in range(pores.first[k], pores.first[k + 1]):
+            which = pores.contributions[c]
             corner = which % 16
             total += element_coupling[which // 16, corner % 4]
             total_transposed += element_coupling[which // 16, corner // 4]
-        coupling[k] = closed[rows[k]] * total
-        transposed[k] = closed[columns[k]] * total_transposed
+        pores.own[k] = pores.closed[pores.rows[k]] * total
+        pores.others[k] = pores.closed[pores.columns[k]] * total_transposed
 
     @kernels.add
-    def taken_up(
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        coupling: wp.array[vec3],
-        mask: wp.array[vec3],
-        x: wp.array[vec3],
-        out: wp.array[scalar],
-    ):
+    def taken_up(pores: Pores, mask: wp.array[vec3], x: wp.array[vec3], out: wp.array[scalar]):
         """One thread for a node: `db/du x`."""
         i = wp.tid()
         total = scalar(0.0)
-        for k in range(offsets[i], offsets[i + 1]):
-            j = columns[k]
-            total += wp.dot(coupling[k], wp.cw_mul(mask[j], x[j]))
+        for k in range(pores.offsets[i], pores.offsets[i + 1]):
+            j = pores.columns[k]
+            total += wp.dot(pores.own[k], wp.cw_mul(mask[j], x[j]))
         out[i] = total
 
     @kernels.add
-    def push(
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        transposed: wp.array[vec3],
-        p: wp.array[scalar],
-        factor: scalar,
-        mask: wp.array[vec3],
-        y: wp.array[vec3],
-    ):
+    def push(pores: Pores, p: wp.array[scalar], factor: scalar, mask: wp.array[vec3], y: wp.array[vec3]):
         """One thread for a node: `y += factor (db/du)^T p`."""
         i = wp.tid()
         total = vec3()
-        for k in range(offsets[i], offsets[i + 1]):
-            total += p[columns[k]] * transposed[k]
+        for k in range(pores.offsets[i], pores.offsets[i + 1]):
+            total += p[pores.columns[k]] * pores.others[k]
         y[i] = y[i] + factor * wp.cw_mul(mask[i], total)
 
-    @kernels.add
-    def multiply(
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        values: wp.array[scalar],
-        x: wp.array[scalar],
-        y: wp.array[scalar],
-    ):
-        """One thread for a row of a sparse matrix of scalars."""
-        i = wp.tid()
-        total = scalar(0.0)
-        for k in range(offsets[i], offsets[i + 1]):
-            total += values[k] * x[columns[k]]
-        y[i] = total
-
-    @kernels.add
-    def invert_diagonal(
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        values: wp.array[scalar],
-        inverse: wp.array[scalar],
-    ):
-        i = wp.tid()
-        # a node outside the pores has no row, and no pressure
-        inverse[i] = scalar(1.0)
-        for k in range(offsets[i], offsets[i + 1]):
-            if columns[k] == i:
-                inverse[i] = scalar(1.0) / values[k]
-
-    @kernels.add
-    def apply_diagonal(inverse: wp.array[scalar], x: wp.array[scalar], y: wp.array[scalar]):
-        i = wp.tid()
-        y[i] = inverse[i] * x[i]
-
-    return kernels
+    return Pores, kernels

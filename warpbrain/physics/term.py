@@ -77,7 +77,6 @@ class Coupling:
     #: solution depends on.
     yielding: wp.array
     own: wp.array  # `db_i/du_j`
-    others: wp.array  # `db_j/du_i`
     #: `b(u) + A p` where the term advanced last, without what flowed in that step; zero once it has forgotten
     content: wp.array
 
@@ -274,7 +273,7 @@ class TriangleTerm(KernelTerm):
         ramp: Callable[[float], float],
     ) -> None:
         super().__init__(body, triangles, kernels, ramp)
-        self._nodes = self.array(self.stencils, wp.vec3i if self.stencils.shape[1] == 3 else int)
+        self._nodes = self.array(self.stencils, int)
         self._points = self.array(points, body.precision.vec3)
         self._data = self.array(data, body.precision.scalar)
 

@@ -6,158 +6,175 @@ sparse, and symmetric:
     [      K       -sqrt(w) B^T ] [ d ]   [ r ]
     [ -sqrt(w) B        -A      ] [ p ] = [ 0 ]
 
-but indefinite: MINRES (`warpbrain.kernels.minimal_residual`), preconditioned by the inverse diagonal blocks of `K` and
-the diagonal of `A + w B diag(K)^-1 B^T`. Of several such terms, as of two fluids in one skeleton, `p` are the unknowns
-of each in turn: they meet in the displacement alone, so `A` has a block for each term. `A` is next to nothing where
-fluid has no time to flow; what is left of the second row is a force many times larger. So a solve ends only when the
-residual of the eliminated system is small.
+but indefinite. Of several such terms, as of two fluids in one skeleton, `p` are the unknowns of each in turn: they
+meet in the displacement alone, so `A` has a block for each term. Generalised minimal residuals (SciPy's, on the host
+whatever the device) are preconditioned by the block triangle (Saad, Iterative Methods for Sparse Linear Systems, 2nd
+ed., section 9.4)
+
+    [      K0        0  ]
+    [ -sqrt(w) B    -S0 ],    S0 = A + w Y,
+
+`K0` of a state that is near, and `Y` what the term says that the solid gives way to its unknowns (`Coupling.yielding`).
+
+`A` is next to nothing where fluid has no time to flow; what is left of the second row is a force many times larger. So
+a solve ends only when the residual of the eliminated system is small.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
-from warpbrain.kernels.coupled import coupled_kernels
-from warpbrain.kernels.linear import ConjugateGradient, LinearResult, linear_kernels
-from warpbrain.kernels.minimal_residual import MinimalResidual, node_vector
-from warpbrain.kernels.multicore import launch
-from warpbrain.physics.term import Coupling, Term
+from warpbrain.arrays import Floats
+from warpbrain.kernels.linear import LinearResult, LinearSolver
+from warpbrain.physics.term import Term
+from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.sparse_factors import SparseFactors
+from warpbrain.threads import one_thread_of_blas
 
 if TYPE_CHECKING:
     from warpbrain.simulation.system import System
 
-#: What MINRES is asked for, relative to what is asked of the solve, in the first place; and how often it may go on.
+#: What is asked of the whole system, relative to what is asked of the solve, in the first place; and how often it may
+#: go on.
 _FIRST, _ROUNDS = 0.3, 6
+#: Iterations at most, with factors of a state nearby and with its own.
+_MOST = 120
 
 
 class CoupledSolver:
     """Solves the system's matrix together with what terms with unknowns of their own add to it.
 
-    `conjugate_gradient` is for times when none of these follow the displacement; the tolerance is relative.
+    `plain` is for times when none of these follow the displacement; the tolerance is relative. The `factors` are kept
+    from one solve to the next, and renewed where they do not help.
     """
 
     def __init__(
-        self,
-        system: System,
-        terms: Sequence[Term],
-        conjugate_gradient: ConjugateGradient,
-        *,
-        tolerance: float,
-        max_iterations: int,
+        self, system: System, terms: Sequence[Term], plain: LinearSolver, factors: KeptFactors, tolerance: float
     ) -> None:
-        self._system, self._terms, self._plain = system, terms, conjugate_gradient
-        self._tolerance, self._max_iterations = tolerance, max_iterations
-        p, n, device = system.precision, system.size, system.device
-        self._inverse = wp.zeros(n, dtype=p.mat33, device=device)
-        self._product = wp.zeros(n, dtype=p.vec3, device=device)
-        #: Of the terms whose unknowns follow the displacement, as of the last `prepare`.
-        self.couplings: list[Coupling] = []
+        self._system, self._plain, self._factors, self._tolerance = system, plain, factors, tolerance
+        self._terms, self._free = terms, ~system.model.constrained.ravel()
         self._result: LinearResult | None = None
-
-    def _begin(self, couplings: list[Coupling]) -> None:
-        """Make what is needed for as many unknowns at each node."""
-        p, n, device, count = self._system.precision, self._system.size, self._system.device, len(couplings)
-        self.couplings = couplings
-        self._kernels = coupled_kernels(p, count)
-        self._diagonal = wp.zeros(n, dtype=node_vector(p, count), device=device)
-        self._solver = MinimalResidual(
-            n, node_vector(p, count), p, device,
-            operator=self._multiply, preconditioner=self._precondition, max_iterations=self._max_iterations,
-        )  # fmt: skip
-
-    def _launch(self, kernel: object, *inputs: object) -> None:
-        launch(kernel, self._system.size, inputs, self._system.device)
-
-    def _multiply(self, x: wp.array, y: wp.array) -> None:
-        s, matrix = self._system, self._system.matrix
-        self._launch(self._kernels.multiply, matrix.offsets, matrix.columns, matrix.values, x, y)
-        for place, c in enumerate(self.couplings, 3):
-            self._launch(
-                self._kernels.couple, place, c.offsets, c.columns, c.compliance, c.own, c.others, s.free,
-                s.coupling_root, x, y,
-            )  # fmt: skip
-
-    def _precondition(self, x: wp.array, y: wp.array) -> None:
-        self._launch(self._kernels.apply_diagonal, self._inverse, self._diagonal, x, y)
+        self._product = wp.zeros(system.size, dtype=system.precision.vec3, device=system.device)
+        #: That of `S0`, and its factors: it changes from step to step, not within one.
+        self._schur: tuple[Any, SparseFactors] | None = None
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         self._plain.multiply(x, z)
 
     def prepare(self) -> None:
-        couplings = [term.coupling for term in self._terms if term.coupled and term.coupling is not None]
-        if not couplings:
-            self.couplings = couplings
+        if self._system.coupled:
+            self._take_matrix()
+        else:
             self._plain.prepare()
-            return
-        if [id(coupling) for coupling in couplings] != [id(coupling) for coupling in self.couplings]:
-            self._begin(couplings)
-        s = self._system
-        self._launch(linear_kernels(s.precision).invert_diagonal, s.diagonal, s.matrix.values, self._inverse)
-        for place, c in enumerate(couplings, 3):
-            self._launch(
-                self._kernels.invert_coupled_diagonal, place, c.offsets, c.columns, c.compliance, c.own, s.free,
-                s.coupling_root, self._inverse, self._diagonal,
-            )  # fmt: skip
+
+    def _take_matrix(self) -> None:
+        from scipy.sparse import block_diag, bsr_matrix, csr_matrix, diags, vstack
+
+        n, matrix, parts = self._system.size, self._system.matrix, []
+        values = matrix.values.numpy().astype(np.float64, copy=False)
+        # constrained rows and columns are those of the identity
+        self._K = bsr_matrix((values, matrix.columns.numpy(), matrix.offsets.numpy()), shape=(3 * n, 3 * n))
+        self._root = math.sqrt(self._system.coupling_factor)
+        for c in (term.coupling for term in self._terms if term.coupled and term.coupling is not None):
+            offsets, columns = c.offsets.numpy(), c.columns.numpy()
+            components = (3 * columns[:, None] + np.arange(3)).ravel()
+            coupling = self._root * c.own.numpy().astype(np.float64).ravel() * self._free[components]
+            A, Y = (
+                csr_matrix((values.numpy().astype(np.float64), columns, offsets), shape=(n, n))
+                for values in (c.compliance, c.yielding)
+            )
+            parts.append((A, csr_matrix((coupling, components, 3 * offsets), shape=(n, 3 * n)), Y))
+        compliances, couplings, yielding = zip(*parts, strict=True)
+        self._A = block_diag(compliances, format="csr")
+        self._B = vstack(couplings, format="csr")
+        self._BT = self._B.T
+        S = self._A + self._root**2 * block_diag(yielding, format="csr")
+        # a node without an unknown has no row
+        S = (S + diags((S.diagonal() == 0.0).astype(np.float64))).tocsc()
+        if self._schur is None or not np.array_equal(self._schur[0].data, S.data):
+            self._schur = S, SparseFactors(S)
+        # both kinds of residual as parts of what their own unknown makes of one unit of energy
+        self._weight = 1.0 / np.sqrt(np.abs(np.concatenate([self._K.diagonal(), S.diagonal()])))
 
     def solve(self, tolerance: float | None = None) -> None:
         """See `LinearSolver`; begins with zero, for a guess of the displacement alone is none for both."""
         self._result = None
-        if not self.couplings:
+        if not self._system.coupled:
             self._plain.solve(tolerance)
             return
-        s = self._system
         wanted = self._tolerance if tolerance is None else tolerance
-        self._launch(self._kernels.pack, s.load, self._solver.b)
-        self._solver.x.zero_()
+        # sums over nodes take less than to wake other threads
+        with one_thread_of_blas():
+            if self._factors.serve(self._free):
+                self._result = self._try(wanted)
+            if self._result is None or not (self._result.converged or self._result.indefinite):
+                renewed = self._factors.renew(self._K, self._free)
+                self._result = self._try(wanted) if renewed else LinearResult(0, np.inf, 0.0, np.nan)
 
-        def go_on(tolerance: float) -> None:
-            self._solver.solve(tolerance)
-            self._launch(self._kernels.unpack, self._solver.x, s.solution)
+    def result(self) -> LinearResult:
+        return self._result or self._plain.result()
 
-        def steps(tolerance: float, _done: int) -> int:
-            go_on(tolerance)
-            return self._solver.result()[0]
-
-        if s.device.is_capturing:
-            go_on(_FIRST * wanted)
-        else:
-            self._result = self.in_rounds(steps, wanted)
-
-    def in_rounds(self, steps: Callable[[float, int], int], wanted: float) -> LinearResult:
-        """Solve ever closer until what is left of the eliminated system is at most `wanted` times the load.
-
-        `steps` goes on to a relative tolerance of the whole system, given the iterations that are done, and leaves what
-        it finds in the solution array; it returns how many it took, 0 if it can do no more.
-        """
+    def _try(self, wanted: float) -> LinearResult:
+        """Ever closer, until what is left of the eliminated system is at most `wanted` times the load."""
+        system, size = self._system, 3 * self._system.size
+        b = np.concatenate([system.load.numpy().astype(np.float64).ravel(), np.zeros(self._A.shape[0])])
+        x, length = np.zeros_like(b), float(np.linalg.norm(self._weight * b))
         tighter, iterations = _FIRST, 0
         for _ in range(_ROUNDS):
-            taken = steps(tighter * wanted, iterations)
-            iterations += taken
-            result = self.look(iterations, wanted)
-            if result.converged or taken == 0 or not np.isfinite(result.residual):
+            goal = tighter * wanted * length
+            step, taken = self._minimal_residual(b - self._multiply(x), goal, _MOST - iterations)
+            x, iterations = x + step, iterations + taken
+            system.solution.assign(x[:size].reshape(-1, 3))
+            result = self._look(iterations, wanted)
+            if result.converged or taken == 0 or iterations >= _MOST or not np.isfinite(result.residual):
                 break
             tighter *= 0.3 * result.tolerance / result.residual
+        self._factors.count(iterations)
         return result
 
-    def look(self, iterations: int, wanted: float) -> LinearResult:
+    def _multiply(self, x: Floats) -> Floats:
+        """The whole matrix times displacements and unknowns."""
+        d, p = np.split(x, [self._K.shape[0]])
+        return np.concatenate([self._K @ d - self._BT @ p, -(self._B @ d) - self._A @ p])
+
+    def _precondition(self, r: Floats) -> Floats:
+        """What the block triangle makes of a residual."""
+        assert self._schur is not None
+        of_forces, of_unknowns = np.split(r, [self._K.shape[0]])
+        d = self._factors.solve(of_forces)
+        return np.concatenate([d, -self._schur[1].solve(of_unknowns + self._B @ d)])
+
+    def _minimal_residual(self, b: Floats, goal: float, most: int) -> tuple[Floats, int]:
+        """`x` with `|weight (b - A x)| <= goal` if `most` iterations find it, and how many it took."""
+        from scipy.sparse.linalg import LinearOperator, gmres
+
+        weight, taken = self._weight, 0
+
+        def count(_residual: float) -> None:
+            nonlocal taken
+            taken += 1
+
+        def weighted(y: Floats) -> Floats:
+            return weight * self._multiply(self._precondition(y / weight))
+
+        operator = LinearOperator((len(b), len(b)), matvec=weighted, dtype=np.float64)
+        y, _ = gmres(
+            operator, weight * b, rtol=0.0, atol=goal, restart=most, maxiter=1, callback=count, callback_type="pr_norm"
+        )
+        return self._precondition(y / weight), taken
+
+    def _look(self, iterations: int, wanted: float) -> LinearResult:
         """The residual of the eliminated system with what is in the solution array, and the curvature along that."""
         s = self._system
         self._plain.multiply(s.solution, self._product)
-        root = float(s.coupling_root.numpy()[0])
-        s.add_coupling(s.solution, root * root, self._product)
-        load, product = s.load.numpy().astype(np.float64), self._product.numpy().astype(np.float64)
-        solution = s.solution.numpy().astype(np.float64)
+        s.add_coupling(s.solution, self._root**2, self._product)
+        load, product, solution = (array.numpy().astype(np.float64) for array in (s.load, self._product, s.solution))
         along = float(np.vdot(solution, solution))
         curvature = float(np.vdot(solution, product)) / along if along > 0.0 else float("nan")
         residual = float(np.linalg.norm(load - product))
         return LinearResult(iterations, residual, wanted * float(np.linalg.norm(load)), curvature)
-
-    def result(self) -> LinearResult:
-        if not self.couplings:
-            return self._plain.result()
-        # of a captured solve there is nothing but what it left
-        return self._result or self.look(self._solver.result()[0], self._tolerance)

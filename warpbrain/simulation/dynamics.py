@@ -285,7 +285,12 @@ class Simulator:
         return self.check()
 
     def capture(self) -> None:
-        """Capture a step in a graph that later steps replay: one launch from the host instead of hundreds."""
+        """Capture a step in a graph that later steps replay: one launch from the host instead of hundreds.
+
+        Not where a term has unknowns of its own, which are solved for on the host.
+        """
+        if self.system.coupled:
+            return
         self._graph_moves = self._moving
         # a step outside the capture loads every module
         u, v = wp.clone(self.system.u), wp.clone(self.v)

@@ -16,7 +16,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
-from warpbrain.kernels.linear import LinearResult, LinearSolver
+from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.dynamics import PhaseClock
 from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.model import require_held
@@ -143,8 +143,6 @@ class EquilibriumSolver:
         Called with each `NewtonStep` as it is taken.
     clock : PhaseClock, optional
         Adds up the wall time by phase.
-    linear : LinearSolver, optional
-        Solves the system's linear systems; by default what `System.linear_solver` gives for the options.
     factors : KeptFactors, optional
         Kept by who solves for many states that are near to each other; they serve on the CPU alone.
 
@@ -160,7 +158,6 @@ class EquilibriumSolver:
         options: EquilibriumOptions | None = None,
         on_step: Callable[[NewtonStep], None] | None = None,
         clock: PhaseClock | None = None,
-        linear: LinearSolver | None = None,
         factors: KeptFactors | None = None,
     ) -> None:
         require_kind(system, System, "system", "a System, as warpbrain.System(model) gives")
@@ -169,7 +166,7 @@ class EquilibriumSolver:
         self._on_step = on_step
         self.clock = clock or PhaseClock(system.device)
         self._reference_shift: float | None = None
-        self._linear: LinearSolver = linear or system.linear_solver(
+        self._linear = system.linear_solver(
             tolerance=self.options.cg_tolerance,
             max_iterations=self.options.max_cg,
             preconditioner=self.options.preconditioner,

@@ -1,23 +1,11 @@
-"""The inverse of one stiffness on a GPU, kept to precondition the systems of many states near to it.
-
-What `KeptFactors` does on the CPU. A GPU has no use for sparse factors, whose rows wait for each other; but it reads a
-dense matrix of 15,000 rows in a fifth of a millisecond, and three to six products with the inverse of a factor do what
-takes a captured loop hundreds of iterations. By CuPy, which is an extra, and as far as memory goes.
-"""
+"""CuPy on a GPU: whether it works, and whether there is memory; and what is kept from state to state."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
-import numpy as np
-import warp as wp
-from numpy.typing import NDArray
-
-from warpbrain.kernels.linear import LinearResult, host_gradients
-from warpbrain.simulation.factored import MOST, FactoredSolver, KeptFactors
+from warpbrain.simulation.factored import KeptFactors
 
 
 def has_cupy(device: Any) -> bool:
@@ -49,107 +37,6 @@ def require_memory(device: Any, needed: int) -> None:
         raise MemoryError(f"{needed / 1e9:.1f} GB of memory of {device.alias} are needed, {free / 1e9:.1f} GB are free")
 
 
-@contextmanager
-def stream_of(device: Any) -> Iterator[None]:
-    """While it lasts, CuPy works on a GPU in the order in which Warp does."""
-    import cupy
-    import warp as wp
-
-    # a stream of another GPU than the present one is refused
-    with (
-        cupy.cuda.Device(device.ordinal),
-        cupy.cuda.ExternalStream(wp.get_stream(device).cuda_stream, device.ordinal),
-    ):
-        yield
-
-
-#: Dense matrices in single precision for which there has to be memory.
-_MATRICES = 3
-
-
-class KeptInverse(KeptFactors):
-    """Of the stiffness of the last state that it was renewed at, of none at first, on a GPU for which there is CuPy."""
-
-    _worth = 60
-
-    def __init__(self, device: Any) -> None:
-        super().__init__()
-        self._device = device
-
-    def renew(self, stiffness: Any, free: NDArray[np.bool_], definite: bool) -> bool:
-        """Invert a factor of a system's matrix, a `warp.sparse.BsrMatrix`; whether that serves."""
-        import cupy
-        import cupyx
-        from cupyx.scipy.linalg import solve_triangular
-
-        self._free, self._factors, self._wasted = None, None, 0
-        size = 3 * stiffness.nrow
-        with stream_of(self._device):
-            try:
-                require_memory(self._device, _MATRICES * 4 * size**2)
-                with cupyx.errstate(linalg="raise"):
-                    L = cupy.linalg.cholesky(_dense(stiffness))
-            except (MemoryError, np.linalg.LinAlgError):
-                return False
-            self._factors = solve_triangular(L, cupy.eye(size, dtype=np.float32), lower=True, overwrite_b=True)
-        self._free, self._definite = free.copy(), True
-        return True
-
-    def solve(self, forces: Any) -> Any:
-        """What nodal forces (3 n,) [N] move: (3 n,) [m], arrays of CuPy."""
-        import cupy
-
-        # as a number of the order of one: forces may be too small for single precision
-        scale = cupy.maximum(cupy.abs(forces).max(), np.finfo(np.float64).tiny)
-        inverse = self._factors
-        return scale * (inverse.T @ (inverse @ (forces / scale).astype(np.float32))).astype(np.float64)
-
-
-class InvertedSolver(FactoredSolver):
-    """Solves with a kept inverse, on a GPU, in double precision, without unknowns beside the displacement."""
-
-    def prepare(self) -> None:
-        self._captured.prepare()
-        self._K = self._system.matrix
-
-    def _try(self, wanted: float) -> LinearResult:
-        import cupy
-
-        system = self._system
-        p, Ap = wp.empty_like(system.load), wp.empty_like(system.load)
-        with stream_of(system.device):
-            flat_p, flat_Ap = cupy.asarray(p).ravel(), cupy.asarray(Ap).ravel()
-
-            def multiply(direction: Any) -> Any:
-                flat_p[:] = direction
-                self._captured.multiply(p, Ap)
-                return flat_Ap
-
-            residual = cupy.asarray(system.load).ravel().copy()
-            x = cupy.zeros_like(residual)
-            goal = wanted * float(cupy.linalg.norm(residual))
-            result = host_gradients(multiply, self._factors.solve, x, residual, goal, MOST)
-            cupy.asarray(system.solution).ravel()[:] = x
-        return result
-
-
-def _dense(matrix: Any) -> Any:
-    """A `warp.sparse.BsrMatrix` of 3 x 3 blocks as an array of CuPy, in single precision."""
-    import cupy
-
-    count = matrix.nrow
-    offsets = matrix.offsets.numpy()[: count + 1]
-    rows = cupy.asarray(3 * np.repeat(np.arange(count), np.diff(offsets)))
-    columns = 3 * cupy.asarray(matrix.columns)[: int(offsets[-1])]
-    within = cupy.arange(3)
-    dense = cupy.zeros((3 * count, 3 * count), dtype=np.float32)
-    at = rows[:, None, None] + within[:, None], columns[:, None, None] + within
-    dense[at] = cupy.asarray(matrix.values)[: int(offsets[-1])]
-    return dense
-
-
-def kept_for(device: Any) -> KeptFactors | None:
-    """What is kept where states are solved on a Warp device; None on a GPU for which there is no CuPy."""
-    if device.is_cpu:
-        return KeptFactors()
-    return KeptInverse(device) if has_cupy(device) else None
+def kept_for(device: Any) -> KeptFactors:
+    """What is kept where states are solved on a Warp device: it serves terms with unknowns of their own alone."""
+    return KeptFactors()

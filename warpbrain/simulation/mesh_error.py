@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Floats
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.errors import SolveError
@@ -103,16 +103,6 @@ def prolongation(ends: NDArray[np.integer], count: int) -> Any:
 
     rows = np.repeat(np.arange(len(ends)), 2)
     return csr_matrix((np.full(2 * len(ends), 0.5), (rows, ends.ravel())), shape=(len(ends), count))
-
-
-def free_prolongation(prolong: Any, free: Bools, constrained: Bools) -> Any:
-    """From free components (3 n,) of a mesh to all of the finer one: SciPy CSR (3 n', k), zero where these (n', 3) are
-    constrained; for `prolong` see `prolongation`.
-    """
-    from scipy.sparse import diags_array, eye_array, kron
-
-    by_component = kron(prolong, eye_array(3), format="csr")[:, free]
-    return (diags_array((~constrained.ravel()).astype(np.float64)) @ by_component).tocsr()
 
 
 def restricted(prolong: Any, u: Floats, reactions: Floats) -> tuple[Floats, Floats]:

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
+from warpbrain.kernels.linear import LinearSolver
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.sensitivity import (
@@ -33,11 +34,12 @@ from warpbrain.simulation.sensitivity import (
     Corrections,
     ModelOf,
     ParameterStencil,
-    SeveralSolver,
     lengths,
     refine,
-    several_solver,
 )
+
+#: Iterations of a linear solve.
+_MAX_CG = 10_000
 
 
 class MotionSensitivity:
@@ -66,9 +68,9 @@ class MotionSensitivity:
         simulator.set_time_step(simulator.time_step)
         self._stencil = ParameterStencil(system, models, theta, scales)
         count = len(self._stencil)
-        self._solver: SeveralSolver | None = None
+        self._solver: LinearSolver | None = None
         if count:
-            self._solver = several_solver(system, count, self._tolerance)
+            self._solver = system.linear_solver(tolerance=self._tolerance, max_iterations=_MAX_CG, watch_curvature=True)
         self.u, self.v = (np.zeros((count, system.size, 3)) for _ in range(2))
 
     def step(self) -> None:
@@ -93,7 +95,7 @@ class MotionSensitivity:
 
                 stencil.remember(advance)
 
-    def _by_parameters(self, solver: SeveralSolver, u_start: Floats, v_start: Floats, u_end: Floats) -> Floats:
+    def _by_parameters(self, solver: LinearSolver, u_start: Floats, v_start: Floats, u_end: Floats) -> Floats:
         """Derivatives (p, n, 3) of the velocity at the end of the step."""
         simulator, system, stencil = self.simulator, self.simulator.system, self._stencil
         h, damping = simulator.time_step, system.model.damping

@@ -21,9 +21,9 @@ each of the four places beside each parameter, and goes on there along a way of 
 A constraint that is met by augmentation (contact) is met beside `theta` too: the multipliers there are augmented along
 the same way, and all is balanced again, until nothing changes.
 
-Every parameter is one more right-hand side of one matrix, and conjugate gradients solve for all of them at once
-(`warpbrain.kernels.block_linear`). SciPy's sparse LU takes 1.1 s for its factors on the phantom's 4187 nodes (2-core
-CPU, 2026-11), longer than two parameters take so to 1e-10; it has no device, and its fill grows faster than the mesh.
+Every parameter is one more right-hand side of one matrix. SciPy's sparse LU takes 1.1 s for its factors on the
+phantom's 4187 nodes (2-core CPU, 2026-11), longer than two parameters take by conjugate gradients to 1e-10; it has no
+device, and its fill grows faster than the mesh.
 
 Contact that is stuck, slides or lifts off, a falx or a resection that is there or not: nothing lies between two such
 states, and so there is no derivative. The whole difference stands where a derivative would (`secant`).
@@ -32,7 +32,7 @@ states, and so there is no derivative. The whole difference stands where a deriv
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -44,8 +44,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
-from warpbrain.kernels.block_linear import BlockConjugateGradient
-from warpbrain.kernels.linear import LinearResult
+from warpbrain.kernels.linear import LinearSolver
 from warpbrain.physics.term import Term
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.model import Model
@@ -242,39 +241,6 @@ def _best(
     )
 
 
-class InTurn:
-    """Solves the system's linear systems for several right-hand sides, one after the other; the tolerance is relative,
-    of each.
-    """
-
-    def __init__(self, system: System, tolerance: float, max_iterations: int) -> None:
-        self._system, self._tolerance = system, tolerance
-        self._solver = system.linear_solver(tolerance=tolerance, max_iterations=max_iterations, watch_curvature=True)
-        self._results: list[LinearResult] = []
-
-    def prepare(self) -> None:
-        """Take notice of new values of the matrix, and of what terms keep of their own."""
-        self._solver.prepare()
-
-    def solve(self, right_hand_sides: Sequence[Floats], tolerance: float | None = None) -> Floats:
-        """Solve from zero for right-hand sides (n, 3), which are zero on constrained components: (count, n, 3)."""
-        solutions, self._results = [], []
-        for b in right_hand_sides:
-            self._system.load.assign(b)
-            self._system.solution.zero_()
-            self._solver.solve(tolerance)
-            self._results.append(self._solver.result())
-            solutions.append(self._system.solution.numpy().astype(np.float64))
-        return np.array(solutions)
-
-    def results(self) -> list[LinearResult]:
-        """How the last solve ended, for each right-hand side."""
-        return self._results
-
-
-#: What solves for several right-hand sides: at once, or in turn where terms have unknowns of their own.
-SeveralSolver = BlockConjugateGradient | InTurn
-
 #: Of each correction but the first: it is not exact anyway.
 _ROUGH = 1e-3
 #: Rounding errors in the forces of a law.
@@ -305,8 +271,9 @@ class SensitivitySolver:
     def __init__(self, system: System, tolerance: float = 1e-10, max_cg: int = 10_000) -> None:
         self.system = system
         self._tolerance = max(tolerance, 20.0 * system.precision.epsilon)
-        self._max_cg = max_cg
-        self._solvers: dict[int, SeveralSolver] = {}
+        self._solver = system.linear_solver(
+            tolerance=self._tolerance, max_iterations=max_cg, watch_curvature=True, at_rest=True
+        )
 
     def solve(self, u: ArrayLike, models: ModelOf, theta: ArrayLike, scales: ArrayLike | None = None) -> Sensitivities:
         """Derivatives by each parameter.
@@ -337,10 +304,7 @@ class SensitivitySolver:
         if not len(stencil):
             none = np.zeros((0, system.size, 3))
             return Sensitivities(none, none, ())
-        count = len(stencil)
-        if count not in self._solvers:
-            self._solvers[count] = several_solver(system, count, self._tolerance, self._max_cg)
-        corrections = Corrections(self._solvers[count], system, self._tolerance)
+        corrections = Corrections(self._solver, system, self._tolerance)
         with stencil.away():
             moved, residual = self._balance(stencil, state, corrections)
         constrained = system.model.constrained
@@ -399,8 +363,8 @@ class Corrections:
     roughly.
     """
 
-    def __init__(self, solver: SeveralSolver, system: System, tolerance: float) -> None:
-        self._solver, self._constrained = solver, system.model.constrained
+    def __init__(self, solver: LinearSolver, system: System, tolerance: float) -> None:
+        self._solver, self._system = solver, system
         self._tolerance, self._rough = tolerance, max(tolerance, _ROUGH)
         self._first = True
         self.cg_iterations: tuple[int, ...] = ()
@@ -408,9 +372,13 @@ class Corrections:
 
     def correct(self, residual: Floats) -> Floats:
         """Solve for p right-hand sides (p, n, 3); zero on constrained components."""
-        solved = self._solver.solve(list(residual), self._tolerance if self._first else self._rough)
-        results = self._solver.results()
-        for k, linear in enumerate(results):
+        system, before = self._system, self.cg_iterations or (0,) * len(residual)
+        solved, iterations = [], []
+        for k, b in enumerate(residual):
+            system.load.assign(b)
+            system.solution.zero_()
+            self._solver.solve(self._tolerance if self._first else self._rough)
+            linear = self._solver.result()
             if linear.indefinite:
                 raise SolveError(
                     f"sensitivity to parameter {k}: the tangent stiffness is indefinite (curvature "
@@ -422,19 +390,10 @@ class Corrections:
                     f"sensitivity to parameter {k}: conjugate gradients did not converge in {linear.iterations} "
                     f"iterations (residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
                 )
-        before = self.cg_iterations or (0,) * len(results)
-        self.cg_iterations = tuple(n + linear.iterations for n, linear in zip(before, results, strict=True))
-        self._first = False
-        return np.where(self._constrained, 0.0, solved)
-
-
-def several_solver(system: System, count: int, tolerance: float, max_cg: int = 10_000) -> SeveralSolver:
-    """A solver for a system's matrix, with what terms add to it of their own, and several right-hand sides."""
-    if system.coupled or not system.assembled:
-        return InTurn(system, tolerance, max_cg)
-    return BlockConjugateGradient(
-        system.matrix, system.diagonal, count, system.precision, tolerance=tolerance, max_iterations=max_cg
-    )
+            solved.append(system.solution.numpy().astype(np.float64))
+            iterations.append(before[k] + linear.iterations)
+        self.cg_iterations, self._first = tuple(iterations), False
+        return np.where(system.model.constrained, 0.0, solved)
 
 
 @dataclass(frozen=True, eq=False)

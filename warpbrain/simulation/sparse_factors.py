@@ -26,8 +26,6 @@ class SparseFactors:
     def __init__(self, matrix: Any, symmetric: bool = True) -> None:
         from scipy.sparse import tril
 
-        #: Whether the matrix is positive definite; known of symmetric ones.
-        self.is_definite = False
         if _is_fork:
             self._solve = self._by_superlu(matrix, symmetric)
             return
@@ -39,7 +37,6 @@ class SparseFactors:
         pattern.sum_duplicates()
         if symmetric:
             factors = _analysed(pattern).factor(pattern.data)
-            self.is_definite = factors.inertia[0] == matrix.shape[0]
             self._solve = factors.solve_many
         else:
             self._solve = rslab.lu(pattern, threads=thread_count()).solve_many
@@ -51,9 +48,6 @@ class SparseFactors:
         factors = splu(
             matrix.tocsc().astype(np.float64), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
         )
-        # with pivots on the diagonal their signs are those of the eigenvalues (Sylvester)
-        on_diagonal = symmetric and np.array_equal(factors.perm_r, factors.perm_c)
-        self.is_definite = bool(on_diagonal and factors.U.diagonal().min() > 0.0)
         return factors.solve
 
     def solve(self, columns: Floats) -> Floats:

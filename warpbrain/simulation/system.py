@@ -32,8 +32,7 @@ from warpbrain.physics.term import T, Term
 from warpbrain.simulation.assembly import Assembly
 from warpbrain.simulation.averaged import PART, AveragedTerm, Patches, averaged_modulus, own_modulus, patches_of
 from warpbrain.simulation.coupled import CoupledSolver
-from warpbrain.simulation.factored import FactoredSolver, KeptFactors
-from warpbrain.simulation.kept_inverse import InvertedSolver, KeptInverse
+from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
 
@@ -111,8 +110,8 @@ class System:
         Part of each element that is left.
     growth_stretches : (m,) array
         Stretch of each element without stress.
-    coupling_root : wp.array, shape (1,)
-        Root of the factor in the matrix of what of the stiffness is not in blocks.
+    coupling_factor : float
+        How many times what unknowns of a term's own do to the stiffness counts in the matrix.
     seconds : float
         Wall time that the pre-processing took [s].
     """
@@ -358,7 +357,7 @@ class System:
 
         self.u, self.internal, self.external = vectors(), vectors(), vectors()
         self.load, self.solution, self.increment = vectors(), vectors(), vectors()
-        self.coupling_root = wp.ones(1, dtype=p.scalar, device=self.device)
+        self.coupling_factor = 1.0
         self._stiffness_factor = wp.ones(1, dtype=p.scalar, device=self.device)
         self.free = self._array(1.0 - self.model.constrained, p.vec3)
         self._all_components = self._array(np.ones((n, 3)), p.vec3)
@@ -438,8 +437,7 @@ class System:
         scalar = self.precision.scalar
         if self._beyond_blocks is not None:
             self._stiffness_factor.fill_(k)
-        if self._coupled:
-            self.coupling_root.fill_(math.sqrt(k if coupling is None else coupling))
+        self.coupling_factor = k if coupling is None else coupling
         self._launch(
             self._kernels.gather_matrix, len(self.pairs), self.pairs, self.pair_first, self.contributions,
             self.pair_positions, self._flat_blocks, self.mass, self.free, scalar(k), scalar(m), self.matrix.values,
@@ -527,10 +525,8 @@ class System:
         """A solver for ``matrix solution = load``; all are chosen here.
 
         - Conjugate gradients (`warpbrain.kernels.linear.conjugate_gradient`) for one system after the other.
-        - MINRES (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is indefinite.
-        - With what is kept from state to state (`kept_for`), which needs all of the matrix, the gradients of
-          `warpbrain.simulation.factored`, or on a GPU in double precision of `warpbrain.simulation.kept_inverse`: a
-          factorisation of one state nearly solves those that are near.
+        - GMRES on the host (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is
+          indefinite.
 
         Parameters
         ----------
@@ -544,6 +540,7 @@ class System:
         at_rest : bool
             The matrix is without inertia, so that a coarse space is worth its making.
         factors : KeptFactors, optional
+            Of states nearby, for an indefinite matrix.
         """
         kind = conjugate_gradient(self.device, preconditioner, only_blocks=self.assembled)
         plain = kind(
@@ -559,18 +556,9 @@ class System:
             beyond=None if self.assembled else self._add_beyond_blocks,
             nodes=(self.model.node_mesh.points, self.free) if at_rest else None,
         )
-        captured: LinearSolver = plain
         if self._coupled:
-            # MINRES takes some times the iterations of CG
-            most = 4 * max_iterations
-            captured = CoupledSolver(self, self._coupled, plain, tolerance=tolerance, max_iterations=most)
-        if factors is None or not self.assembled:
-            return captured
-        if not isinstance(factors, KeptInverse):
-            return FactoredSolver(self, captured, factors, tolerance)
-        if self._coupled or self.precision.name != "double":
-            return captured
-        return InvertedSolver(self, captured, factors, tolerance)
+            return CoupledSolver(self, self._coupled, plain, factors or KeptFactors(), tolerance)
+        return plain
 
     def load_kernels(self) -> float:
         """Compile what a run needs, or find it in Warp's cache, at the present state; returns the seconds it took."""

@@ -28,13 +28,12 @@ follow the pressure there, which overshoots (Vermeer and Verruijt 1981).
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
 
 from warpbrain.arrays import Bools, Floats
-from warpbrain.kernels.minimal_residual import MinimalResidual
 from warpbrain.kernels.pore import pore_kernels
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Expectation
@@ -44,8 +43,6 @@ from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_of
 from warpbrain.physics.term import Body, Coupling, Term
 
-#: Iterations of a solve for the pressure.
-_MAX_ITERATIONS = 20_000
 #: Relative change of a steady pressure that is worth another solve.
 _STEADY = 1e-7
 #: Permeabilities that are looked for: so many equally probable ones, at most a factor of 4 apart but for the outermost.
@@ -186,14 +183,14 @@ class DrainageTerm(Term):
     """
 
     memory = ("_held", "_shape", "_beyond")
-    lasting = ("coupling", "_solver", "_change")
+    lasting = ("coupling", "_pores")
     coupling: Coupling
 
     def __init__(self, body: Body, mechanism: Drainage) -> None:
         elements = elements_of(body.mesh, mechanism.elements)
         super().__init__(body, body.tetrahedra[elements], mechanism.factor)
         self.mechanism = mechanism
-        self._kernels = pore_kernels(body.precision)
+        made, self._kernels = pore_kernels(body.precision)
         scalar, vec3 = body.precision.scalar, body.precision.vec3
         size, count = len(body.mesh.points), len(elements)
         volumes = body.mesh.volumes[elements]
@@ -206,22 +203,24 @@ class DrainageTerm(Term):
         self._place_rows(size)
         self.softness, self._storage, self._entries = self.zeros(count), self.zeros(count, 10), self.zeros(count, 10)
         self._element_coupling = self.zeros(count, 4, dtype=vec3)
-        self._taken, self._held, self._diagonal = self.zeros(count), self.zeros(size), self.zeros(size)
+        self._taken, self._held, self._change = self.zeros(count), self.zeros(size), self.zeros(size)
+        self._supply, self._beyond = self.zeros(size), self.zeros(size)
         self._shape = self.zeros(size, dtype=vec3)
         compliance, yielding = (self.zeros(len(self._rows)) for _ in range(2))
         own, others = (self.zeros(len(self._rows), dtype=vec3) for _ in range(2))
-        self.coupling = Coupling(self._offsets, self._columns, compliance, yielding, own, others, self._held)
+        self.coupling = Coupling(self._offsets, self._columns, compliance, yielding, own, self._held)
         self._h = np.inf
-        # of the pressure, which begins with the last one, and of changes of it
-        self._solver, self._change = (
-            MinimalResidual(
-                size, scalar, body.precision, body.device, operator=self._multiply, preconditioner=self._precondition,
-                max_iterations=_MAX_ITERATIONS,
-            )
-            for _ in range(2)
-        )  # fmt: skip
-        self._beyond = self._solver.x
-        self._tolerance = max(1e-12, 20.0 * body.precision.epsilon)
+        # of `A`, made where they are needed
+        self._factors: Any = None
+        self._pores = made()
+        self._pores.nodes, self._pores.inverse_edges = body.nodes, body.inverse_edges
+        self._pores.softness, self._pores.scale = self.softness, self.scale
+        self._pores.own, self._pores.others = own, others
+        for name in (
+            *("elements", "volume", "taken", "corner_first", "corners", "closed", "lumped", "held", "beyond"),
+            *("rows", "offsets", "columns", "first", "contributions", "numbers"),
+        ):
+            setattr(self._pores, name, getattr(self, f"_{name}"))
         self.take_moduli()
 
     def _place_rows(self, size: int) -> None:
@@ -242,23 +241,27 @@ class DrainageTerm(Term):
 
     # -- the pressure's system ------------------------------------------------------------------------------------
 
-    @property
-    def _geometry(self) -> tuple[wp.array, ...]:
-        return (self._elements, self.body.nodes, self.body.inverse_edges, self._volume)
+    def _over_compliance(self, given: wp.array) -> Floats:
+        """`A^-1` times numbers of the nodes, on the host: fewer than a third of those of a displacement."""
+        from scipy.sparse import csr_matrix, diags
+        from scipy.sparse.linalg import splu
 
-    def _multiply(self, x: wp.array, y: wp.array) -> None:
-        coupling = self.coupling
-        inputs = (coupling.offsets, coupling.columns, coupling.compliance)
-        self.launch(self._kernels.multiply, len(x), *inputs, x, y)
-
-    def _precondition(self, x: wp.array, y: wp.array) -> None:
-        self.launch(self._kernels.apply_diagonal, len(x), self._diagonal, x, y)
+        if self._factors is None:
+            c, size = self.coupling, len(self._held)
+            A = csr_matrix(
+                (c.compliance.numpy().astype(np.float64), c.columns.numpy(), c.offsets.numpy()), (size, size)
+            )
+            # a node outside the pores has no row, and no pressure
+            A = (A + diags((A.diagonal() == 0.0).astype(np.float64))).tocsc()
+            options = {"SymmetricMode": True}
+            self._factors = splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        return np.asarray(self._factors.solve(given.numpy().astype(np.float64)))
 
     def _element_compliance(self, mass: float, stabilisation: float, flow: float, out: wp.array) -> None:
         scalar = self.body.precision.scalar
         self.launch(
-            self._kernels.compliance, len(self.stencils), *self._geometry, self.softness,
-            scalar(self.mechanism.permeability), scalar(mass), scalar(stabilisation), scalar(flow), self._shape, out,
+            self._kernels.compliance, len(self.stencils), self._pores, scalar(mass), scalar(stabilisation),
+            scalar(flow * self.mechanism.permeability), self._shape, out,
         )  # fmt: skip
 
     def take_moduli(self) -> None:
@@ -282,24 +285,17 @@ class DrainageTerm(Term):
         mass = m.exchange if steady else m.storage + self._h * m.exchange
         self._element_compliance(mass, 0.0 if steady else 1.0, 1.0 if steady else self._h, self._entries)
         self._gather(self.coupling.compliance)
-        inputs = (self.coupling.offsets, self.coupling.columns, self.coupling.compliance)
-        self.launch(self._kernels.invert_diagonal, len(self._diagonal), *inputs, self._diagonal)
+        self._factors = None
 
     def _gather(self, out: wp.array) -> None:
         """Sum entries of elements into sparse rows."""
-        self.launch(
-            self._kernels.gather_compliance, len(self._rows), self._rows, self._columns, self._first,
-            self._contributions, self._entries, self._closed, out,
-        )  # fmt: skip
+        self.launch(self._kernels.gather_compliance, len(self._rows), self._pores, self._entries, out)
 
     def _solve(self, u: wp.array) -> None:
         """The pressure at a displacement."""
-        self.launch(self._kernels.volumes, len(self.stencils), *self._geometry, u, self._taken)
-        self.launch(
-            self._kernels.supply, len(self._held), self._corner_first, self._corners, self._taken, self._held,
-            self._lumped, self._closed, self._numbers, self.scale, self._solver.b,
-        )  # fmt: skip
-        self._solver.solve(self._tolerance)
+        self.launch(self._kernels.volumes, len(self.stencils), self._pores, u)
+        self.launch(self._kernels.supply, len(self._held), self._pores, self._supply)
+        self._beyond.assign(self._over_compliance(self._supply))
 
     def pressures(self) -> Floats:
         """Pressure of the fluid at the nodes (n,) [Pa], at the displacement of the last evaluation.
@@ -326,10 +322,7 @@ class DrainageTerm(Term):
 
     def advance(self, u: wp.array) -> None:
         self._solve(u)
-        self.launch(
-            self._kernels.content, len(self._held), self._corner_first, self._corners, self._elements,
-            self.body.nodes, self._taken, self._storage, self._beyond, self._numbers, self.scale, self._held,
-        )  # fmt: skip
+        self.launch(self._kernels.content, len(self._held), self._pores, self._storage)
         wp.copy(self._shape, u)
         self._renew()
 
@@ -361,40 +354,30 @@ class DrainageTerm(Term):
 
     # -- forces ---------------------------------------------------------------------------------------------------
 
-    def _act(self, kernel: object, u: wp.array, *outputs: wp.array) -> None:
-        inputs = (self._beyond, self._numbers, self.scale, u)
-        self.launch(kernel, len(self.stencils), *self._geometry, *inputs, *outputs)
-
     def evaluate_forces(self, u: wp.array) -> None:
         self._solve(u)
-        self._act(self._kernels.forces, u, self.forces)
+        self.launch(self._kernels.forces, len(self.stencils), self._pores, u, self.forces)
 
     def evaluate_tangents(self, u: wp.array) -> None:
         self._solve(u)
-        self._act(self._kernels.tangents, u, self.forces, self.blocks, self._element_coupling)
-        coupling = self.coupling
-        self.launch(
-            self._kernels.gather_coupling, len(self._rows), self._rows, self._columns, self._first,
-            self._contributions, self._element_coupling, self._closed, coupling.own, coupling.others,
-        )  # fmt: skip
+        outputs = (self.forces, self.blocks, self._element_coupling)
+        self.launch(self._kernels.tangents, len(self.stencils), self._pores, u, *outputs)
+        self.launch(self._kernels.gather_coupling, len(self._rows), self._pores, self._element_coupling)
 
     def add_stiffness(self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array) -> None:
         if not self.coupled:
             return
-        coupling, n = self.coupling, len(self._held)
-        sparse = (coupling.offsets, coupling.columns)
-        self.launch(self._kernels.taken_up, n, *sparse, coupling.own, columns, x, self._change.b)
-        self._change.x.zero_()
-        self._change.solve(self._tolerance)
+        self.launch(self._kernels.taken_up, len(self._held), self._pores, columns, x, self._change)
+        self._change.assign(self._over_compliance(self._change))
         number = self.body.precision.scalar(factor)
-        self.launch(self._kernels.push, n, *sparse, coupling.others, self._change.x, number, rows, y)
+        self.launch(self._kernels.push, len(self._held), self._pores, self._change, number, rows, y)
 
     def energy(self, u: wp.array) -> float:
         self._solve(u)
         beyond, taken = self._beyond.numpy().astype(np.float64), self._taken.numpy().astype(np.float64)
         base = self.mechanism.pressure * float(self.scale.numpy()[0])
         if self.coupled:
-            stored = 0.5 * float(beyond @ self._solver.b.numpy().astype(np.float64))
+            stored = 0.5 * float(beyond @ self._supply.numpy().astype(np.float64))
         else:
             stored = -float(taken @ beyond[self.stencils].sum(axis=1))
         return stored - 4.0 * base * float(taken.sum())

@@ -121,12 +121,15 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
     module = compiled_module(f"falx_{precision.name}")
 
     @wp.func
-    def columns(points: wp.array[vec3], u: wp.array[vec3], i: wp.vec3i, data: wp.array2d[scalar], t: int):
+    def columns(points: wp.array[vec3], u: wp.array[vec3], nodes: wp.array2d[int], data: wp.array2d[scalar], t: int):
         """The two columns of `F`; of displacements, so that small strains keep their digits."""
         g1 = vec2(data[t, 1], data[t, 2])
         g2 = vec2(data[t, 3], data[t, 4])
-        e1 = points[i[1]] - points[i[0]] + (u[i[1]] - u[i[0]])
-        e2 = points[i[2]] - points[i[0]] + (u[i[2]] - u[i[0]])
+        a = nodes[t, 0]
+        b = nodes[t, 1]
+        c = nodes[t, 2]
+        e1 = points[b] - points[a] + (u[b] - u[a])
+        e2 = points[c] - points[a] + (u[c] - u[a])
         return g1[0] * e1 + g2[0] * e2, g1[1] * e1 + g2[1] * e2
 
     @wp.func
@@ -135,7 +138,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
 
     @wp.kernel(module=module)
     def forces(
-        nodes: wp.array[wp.vec3i],
+        nodes: wp.array2d[int],
         points: wp.array[vec3],
         data: wp.array2d[scalar],
         scale: wp.array[scalar],
@@ -143,7 +146,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         out: wp.array2d[vec3],
     ):
         t = wp.tid()
-        F1, F2 = columns(points, u, nodes[t], data, t)
+        F1, F2 = columns(points, u, nodes, data, t)
         C = metric(F1, F2)
         S = scale[0] * data[t, 0] * (wp.identity(n=2, dtype=scalar) - wp.inverse(C) / wp.determinant(C))
         P1 = S[0, 0] * F1 + S[1, 0] * F2
@@ -175,7 +178,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
 
     @wp.kernel(module=module)
     def tangents(
-        nodes: wp.array[wp.vec3i],
+        nodes: wp.array2d[int],
         points: wp.array[vec3],
         data: wp.array2d[scalar],
         scale: wp.array[scalar],
@@ -183,7 +186,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         out: wp.array2d[mat33],
     ):
         t = wp.tid()
-        F1, F2 = columns(points, u, nodes[t], data, t)
+        F1, F2 = columns(points, u, nodes, data, t)
         C = metric(F1, F2)
         inverse = wp.inverse(C)
         over = scale[0] * data[t, 0] / wp.determinant(C)
@@ -204,7 +207,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
 
     @wp.kernel(module=module)
     def energies(
-        nodes: wp.array[wp.vec3i],
+        nodes: wp.array2d[int],
         points: wp.array[vec3],
         data: wp.array2d[scalar],
         scale: wp.array[scalar],
@@ -212,7 +215,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         out: wp.array[scalar],
     ):
         t = wp.tid()
-        F1, F2 = columns(points, u, nodes[t], data, t)
+        F1, F2 = columns(points, u, nodes, data, t)
         C = metric(F1, F2)
         unit = scalar(1.0)
         W = wp.trace(C) + unit / wp.determinant(C) - scalar(3.0)

@@ -1,16 +1,9 @@
 """Pressure on faces of the surface, which follows them as they move and turn.
 
-On a triangle with the deformed nodes `x_a` and outward area vector `n = 1/2 sum_a x_a x x_(a+1)` (reference Bonet and
-Wood, Nonlinear Continuum Mechanics, 2nd ed., section 8.5)
-
-    f_a = p n / 3                                       internal force: a pressure pushes inwards, against `n`
-    K_ab = p/12 ([d_b] - [d_a]),   d_a = x_(a-1) - x_(a+1),   [d] v = d x v
-
-`K_ab` is the symmetric part of `df_a/dx_b`. Triangles of six nodes: `warpbrain.kernels.curved_pressure`.
-
-On a closed surface, and on an open one whose rim is held, that is all of it: the sum is the second derivative of `p V`,
-`V` the volume that the surface encloses. Where a rim moves, the load has no energy, and the rest of `df/dx` is skew and
-acts along the rim alone:
+The internal force of a triangle is `p` times its outward area vector: a pressure pushes inwards. Of the tangent there
+is the symmetric part (`warpbrain.kernels.following_pressure`). On a closed surface, and on an open one whose rim is
+held, that is all of it: the sum is the second derivative of `p V`, `V` the volume that the surface encloses. Where a
+rim moves, the load has no energy, and the rest of `df/dx` is skew and acts along the rim alone:
 
     K_ab = -p/2 int N_a N_b [dx]                        along the rim, as the triangles run along it
 
@@ -28,17 +21,13 @@ are no part of it.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats
-from warpbrain.kernels.curved_pressure import curved_pressure_kernels
-from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.following_pressure import pressure_kernels
 from warpbrain.mesh import TetMesh, faces_of, rim_edges
 from warpbrain.mesh.integrals import triangle_rule
 from warpbrain.physics.expectation import Expectation
@@ -128,13 +117,11 @@ class PressureTerm(TriangleTerm):
         even = (order[:, 1] - order[:, 0]) % 3 == 1
         ascending = np.take_along_axis(faces, order, axis=1)
         rim = rim_edges(faces)
-        if body.quadratic is None:
-            triangles, kernels = ascending, _kernels(body.precision)
-        else:
-            rule = np.column_stack(triangle_rule())
-            triangles = body.quadratic.six_nodes(ascending)
+        triangles, rule = ascending, np.array([[1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0, 1.0]])
+        if body.quadratic is not None:
+            triangles, rule = body.quadratic.six_nodes(ascending), np.column_stack(triangle_rule())
             rim = np.concatenate([rim, body.quadratic.middles(rim)[:, None]], axis=1)
-            kernels = curved_pressure_kernels(body.precision, tuple(map(tuple, rule.tolist())))
+        kernels = pressure_kernels(body.precision, triangles.shape[1], tuple(map(tuple, rule.tolist())))
         super().__init__(
             body,
             triangles,
@@ -166,68 +153,3 @@ class PressureTerm(TriangleTerm):
         skew = 0.5 * (np.column_stack(columns) - np.array(columns))
         rows, others = np.meshgrid(components, components, indexing="ij")
         return coo_matrix((skew.ravel(), (rows.ravel(), others.ravel())), shape=(u.size, u.size)).tocsr()
-
-
-@cache
-def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
-    """Kernels for forces, tangent blocks and energies, with one thread for a triangle."""
-    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"pressure_{precision.name}")
-
-    @wp.kernel(module=module)
-    def forces(
-        nodes: wp.array[wp.vec3i],
-        points: wp.array[vec3],
-        value: wp.array[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array2d[vec3],
-    ):
-        t = wp.tid()
-        i = nodes[t]
-        x0 = points[i[0]] + u[i[0]]
-        normal = wp.cross(points[i[1]] + u[i[1]] - x0, points[i[2]] + u[i[2]] - x0)
-        f = value[t] * scale[0] / scalar(6.0) * normal
-        for a in range(3):
-            out[t, a] = f
-
-    @wp.kernel(module=module)
-    def tangents(
-        nodes: wp.array[wp.vec3i],
-        points: wp.array[vec3],
-        value: wp.array[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array2d[mat33],
-    ):
-        t = wp.tid()
-        i = nodes[t]
-        p = value[t] * scale[0] / scalar(12.0)
-        x0 = points[i[0]] + u[i[0]]
-        x1 = points[i[1]] + u[i[1]]
-        x2 = points[i[2]] + u[i[2]]
-        # blocks (0,0), (0,1), (0,2), (1,1), (1,2), (2,2); those of a node with itself are zero
-        out[t, 0] = mat33()
-        out[t, 1] = p * wp.skew(x0 + x1 - x2 - x2)
-        out[t, 2] = p * wp.skew(x1 + x1 - x0 - x2)
-        out[t, 3] = mat33()
-        out[t, 4] = p * wp.skew(x1 + x2 - x0 - x0)
-        out[t, 5] = mat33()
-
-    @wp.kernel(module=module)
-    def energies(
-        nodes: wp.array[wp.vec3i],
-        points: wp.array[vec3],
-        value: wp.array[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array[scalar],
-    ):
-        t = wp.tid()
-        i = nodes[t]
-        x0 = points[i[0]] + u[i[0]]
-        out[t] = (
-            value[t] * scale[0] / scalar(6.0) * wp.dot(x0, wp.cross(points[i[1]] + u[i[1]], points[i[2]] + u[i[2]]))
-        )
-
-    return forces, tangents, energies

@@ -1,0 +1,127 @@
+"""Pressure on triangles of three or six nodes, which follows them as they move, turn and bend.
+
+With the deformed surface `x(r, s) = sum_a N_a x_a`, oriented outwards (Bonet and Wood, Nonlinear Continuum Mechanics,
+2nd ed., section 8.5),
+
+    f_a  = p int N_a x_r x x_s dr ds
+    K_ab = p/2 int (N_b N_a,r - N_a N_b,r) [x_s] + (N_a N_b,s - N_b N_a,s) [x_r] dr ds,    [d] v = d x v
+
+`K_ab` is the symmetric part of `df_a/dx_b`, which on a closed surface is all of it. Integrands are polynomials of
+degree 1 or 4: the rules are exact.
+"""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.ten_nodes import UNROLL
+
+
+@cache
+def pressure_kernels(precision: Precision, nodes: int, rule: tuple[tuple[float, ...], ...]) -> tuple[Any, Any, Any]:
+    """Make (once) kernels for forces, tangent blocks and energies, with one thread for a triangle of so many nodes.
+
+    `rule` has the barycentric coordinates of points and their weights, which add up to one.
+    """
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    module = compiled_module(f"pressure_{nodes}_{precision.name}", unroll=UNROLL)
+    points, last = len(rule), 2 * nodes - 1
+    table = wp.types.matrix((points, nodes), scalar)
+    values, along_r, along_s = _linear(rule) if nodes == 3 else _quadratic(rule)
+    N = wp.constant(table(*values.ravel()))
+    Nr = wp.constant(table(*along_r.ravel()))
+    Ns = wp.constant(table(*along_s.ravel()))
+    w = wp.constant(wp.types.vector(points, scalar)(*(0.5 * np.array(rule)[:, 3])))
+
+    @wp.func
+    def place(i: wp.array2d[int], points_at: wp.array[vec3], u: wp.array[vec3], t: int, q: int, shapes: table):
+        """Sum of deformed positions, weighted by row q of a table."""
+        x = vec3()
+        for a in range(nodes):
+            x += shapes[q, a] * (points_at[i[t, a]] + u[i[t, a]])
+        return x
+
+    @wp.kernel(module=module)
+    def forces(
+        members: wp.array2d[int],
+        points_at: wp.array[vec3],
+        value: wp.array[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array2d[vec3],
+    ):
+        t = wp.tid()
+        p = value[t] * scale[0]
+        for a in range(nodes):
+            out[t, a] = vec3()
+        for q in range(points):
+            normal = wp.cross(place(members, points_at, u, t, q, Nr), place(members, points_at, u, t, q, Ns))
+            for a in range(nodes):
+                out[t, a] = out[t, a] + (p * w[q] * N[q, a]) * normal
+
+    @wp.kernel(module=module)
+    def tangents(
+        members: wp.array2d[int],
+        points_at: wp.array[vec3],
+        value: wp.array[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array2d[mat33],
+    ):
+        t = wp.tid()
+        p = scalar(0.5) * value[t] * scale[0]
+        for block in range(out.shape[1]):
+            out[t, block] = mat33()
+        for q in range(points):
+            x_r = place(members, points_at, u, t, q, Nr)
+            x_s = place(members, points_at, u, t, q, Ns)
+            for a in range(nodes):
+                for b in range(a, nodes):
+                    d = (N[q, b] * Nr[q, a] - N[q, a] * Nr[q, b]) * x_s
+                    d += (N[q, a] * Ns[q, b] - N[q, b] * Ns[q, a]) * x_r
+                    block = a * (last - a) // 2 + b
+                    out[t, block] = out[t, block] + wp.skew(p * w[q] * d)
+
+    @wp.kernel(module=module)
+    def energies(
+        members: wp.array2d[int],
+        points_at: wp.array[vec3],
+        value: wp.array[scalar],
+        scale: wp.array[scalar],
+        u: wp.array[vec3],
+        out: wp.array[scalar],
+    ):
+        t = wp.tid()
+        enclosed = scalar(0.0)
+        for q in range(points):
+            normal = wp.cross(place(members, points_at, u, t, q, Nr), place(members, points_at, u, t, q, Ns))
+            enclosed += w[q] * wp.dot(place(members, points_at, u, t, q, N), normal)
+        out[t] = value[t] * scale[0] / scalar(3.0) * enclosed
+
+    return forces, tangents, energies
+
+
+#: Shape functions and their derivatives by `r = L_1` and `s = L_2` at each point.
+Tables = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+
+
+def _linear(rule: tuple[tuple[float, ...], ...]) -> Tables:
+    """Of the corners 0, 1 and 2."""
+    count = (len(rule), 1)
+    return np.array(rule)[:, :3], np.tile([-1.0, 1.0, 0.0], count), np.tile([-1.0, 0.0, 1.0], count)
+
+
+def _quadratic(rule: tuple[tuple[float, ...], ...]) -> Tables:
+    """Of the corners 0, 1, 2 and the middles of 01, 02 and 12."""
+    L0, L1, L2 = np.array(rule)[:, :3].T
+    zero = np.zeros(len(rule))
+    corners = [L * (2.0 * L - 1.0) for L in (L0, L1, L2)]
+    values = [*corners, 4.0 * L0 * L1, 4.0 * L0 * L2, 4.0 * L1 * L2]
+    along_r = [1.0 - 4.0 * L0, 4.0 * L1 - 1.0, zero, 4.0 * (L0 - L1), -4.0 * L2, 4.0 * L2]
+    along_s = [1.0 - 4.0 * L0, zero, 4.0 * L2 - 1.0, -4.0 * L1, 4.0 * (L0 - L2), 4.0 * L1]
+    return np.stack(values, 1), np.stack(along_r, 1), np.stack(along_s, 1)
