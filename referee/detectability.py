@@ -34,12 +34,11 @@ def covariance(sight: Sight, unknown: Floats) -> Floats:
 
 def without(others: Floats, precision: Floats) -> Floats:
     """Precision (rows, rows) where amounts of others (k, rows) are not known either, by Woodbury's identity."""
-    stand = np.sqrt(np.einsum("kr,rs,ks->k", others, precision, others))
+    stand: Floats = np.sqrt(np.asarray(np.einsum("kr,rs,ks->k", others, precision, others)))
     columns = others[stand > 0.0] / stand[stand > 0.0, None]
     weighted = columns @ precision
     gram = weighted @ columns.T + np.eye(len(columns)) / WIDE**2
-    left: Floats = precision - weighted.T @ np.linalg.solve(gram, weighted)
-    return left
+    return np.asarray(precision - weighted.T @ np.linalg.solve(gram, weighted))
 
 
 def conditional(delta: Floats, others: Floats, precision: Floats) -> float:

@@ -61,7 +61,7 @@ def log_density(x: Floats, covariance: Floats) -> Floats:
     shell = logsumexp(logs, b=0.5 * _WEIGHTS, axis=1) - 1.5 * (_LOG_2_PI + np.log(square))
     wide = np.linalg.eigvalsh(covariance)[:, -1] > _BLURRED**2
     if wide.any():
-        shell[wide] = _normal(x[wide], np.linalg.inv(covariance[wide] + _VARIANCE * np.eye(3)))
+        shell[wide] = _normal(x[wide], np.asarray(np.linalg.inv(covariance[wide] + _VARIANCE * np.eye(3))))
     return np.asarray(shell)
 
 
@@ -139,7 +139,7 @@ class Mixture:
         covariance[~wrong] = np.linalg.inv(blocks[~wrong])
         x[~wrong] = np.einsum("kij,kj->ki", covariance[~wrong], v[~wrong])
         mistaken = log_density(x, covariance)
-        odds = log_odds + mistaken - _normal(x, np.linalg.inv(covariance))
+        odds: Floats = log_odds + mistaken - _normal(x, np.asarray(np.linalg.inv(covariance)))
         if wrong.any():
             log += float((log_share - sound / len(wrong) + mistaken[wrong]).sum())
         return log, odds

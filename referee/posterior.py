@@ -86,8 +86,10 @@ class Analyst:
         self._none, self._trap = prior["none"], prior["trap"] / max(len(traps), 1)
 
     def _add(self, causes: Causes, prior: float, *draws: Draws) -> None:
-        weigh = single if len(draws) == 1 else pair
-        self._causes[causes] = float(np.log(prior)), lambda w, lost: weigh(w, *draws, lost), draws
+        def weigh(w: Floats, lost: Lost) -> Evidence:
+            return single(w, draws[0], lost) if len(draws) == 1 else pair(w, draws[0], draws[1], lost)
+
+        self._causes[causes] = float(np.log(prior)), weigh, draws
 
     def posterior(self, w: Floats) -> tuple[dict[Causes, float], float]:
         """Probabilities of sets of causes of rows (rows,), and the p-value of nothing."""
