@@ -129,7 +129,7 @@ def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:
         for columns in base.unknown.values()
         for factor in factors
     ]
-    strains = [Place(noise * factors[0][:, :1] * columns) for columns in base.strains]
+    strains = [Place(noise * factors[0][:, :1] * columns) for columns in base.strains.columns]
     share = belief("unknown.in_one_place")
     shares = np.repeat([(1.0 - share) / len(fields), share / max(len(strains), 1)], [len(fields), len(strains)])
     log_prior = math.log(belief("causes.unknown"))

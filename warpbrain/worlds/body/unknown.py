@@ -93,26 +93,42 @@ def eigenstresses(at: Linearisation, length: float) -> Floats:
     return _visible_modes(columns, at.sensors.is_displacement)
 
 
-def strains_in_one_place(at: Linearisation, length: float, spacing: float) -> tuple[Floats, ...]:
-    """Columns (n, 6) of a strain in one place, for each of several a spacing [m] apart; Gaussian, of a length [m].
+class Strains:
+    """A strain in one place, at each of several a spacing [m] apart; Gaussian, of a length [m].
 
     Five components are deviatoric stresses, the sixth is a growth. As strains they are alike: hardly compressible
     tissue turns a pressure into next to no strain, and a stress whose six components are alike never swells. So each
     moves what was recorded as much as the others, in the mean over all places. Of 1 m root mean square over these.
     """
-    mesh = at.system.model.mesh
-    sites = mesh.centres[spread_points(mesh.centres, spacing, 700)]
-    stresses = _stress_patches(at, sites, length).reshape(len(at.sensors), len(_PAIRS), len(sites))
-    # without their trace
-    basis = np.linalg.svd(np.ones((1, 3)))[2][1:]
-    deviatoric = np.concatenate([np.einsum("ij,njs->nis", basis, stresses[:, :3]), stresses[:, 3:]], axis=1)
-    growth = at.answers_of_elements(at.growth_forces, _gaussians(mesh.centres, sites, length))[:, None]
-    rows = at.sensors.is_displacement
-    rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
-    parts = [part / max(_size(part[rows]), 1e-300) * np.sqrt(part.shape[1]) for part in (deviatoric, growth)]
-    columns = np.concatenate(parts, axis=1)
-    columns /= max(_size(columns[rows]), 1e-300)
-    return tuple(np.ascontiguousarray(columns[:, :, k]) for k in range(len(sites)))
+
+    def __init__(self, at: Linearisation, length: float, spacing: float) -> None:
+        mesh = at.system.model.mesh
+        self._at, self._length = at, length
+        self.centres = mesh.centres[spread_points(mesh.centres, spacing, 700)]  # (s, 3) [m]
+        parts = self._parts(self.centres)
+        rows = at.sensors.is_displacement
+        rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
+        sizes = [max(_size(part[rows]), 1e-300) for part in parts]
+        count = sum(part.shape[1] for part in parts)
+        self._units = [np.sqrt(part.shape[1] / count) / size for part, size in zip(parts, sizes, strict=True)]
+        self.columns = self._joined(parts)  # (n, 6) of each place
+
+    def at_centres(self, centres: Floats) -> tuple[Floats, ...]:
+        """Columns (n, 6) of the same strain at each of other centres (k, 3) [m]."""
+        return self._joined(self._parts(centres))
+
+    def _joined(self, parts: Sequence[Floats]) -> tuple[Floats, ...]:
+        columns = np.concatenate([unit * part for unit, part in zip(self._units, parts, strict=True)], axis=1)
+        return tuple(np.ascontiguousarray(columns[:, :, k]) for k in range(columns.shape[2]))
+
+    def _parts(self, centres: Floats) -> list[Floats]:
+        """Columns (n, 5, k) of stresses without a trace, and (n, 1, k) of growth."""
+        at = self._at
+        stresses = _stress_patches(at, centres, self._length).reshape(len(at.sensors), len(_PAIRS), len(centres))
+        basis = np.linalg.svd(np.ones((1, 3)))[2][1:]
+        deviatoric = np.concatenate([np.einsum("ij,njs->nis", basis, stresses[:, :3]), stresses[:, 3:]], axis=1)
+        weights = _gaussians(at.system.model.mesh.centres, centres, self._length)
+        return [deviatoric, at.answers_of_elements(at.growth_forces, weights)[:, None]]
 
 
 def _size(columns: Floats) -> float:
