@@ -2,16 +2,16 @@
 
 Of each label its body without effects is solved again, all that is not known of it and a few hundred draws of each
 cause are linearised about that state, and residuals like those of the case are drawn anew: the true change, to first
-order and as large as it is, noise, registration, tissue. Of each the posterior over sets of causes follows, with the
-shares of a scored set as prior. Since the true place is among the draws, it is a ceiling: nobody is right more often.
+order and as large as it is, noise, mistakes, registration, tissue. Of each the posterior over sets of causes follows,
+with the shares of a scored set as prior. Since the true place is among the draws, it is a ceiling: nobody is right more
+often.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -21,19 +21,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
-from scipy.special import softmax
-from scipy.stats import chi2
 
-from referee.detectability import conditional, covariance
-from referee.diagnoses import NOT_PHYSICS, UNKNOWN
-from referee.draw import MECHANISMS, NOISY, OUTSIDE, RIGID_SHIFT, RIGID_TURN, UNEVEN
+from referee.detectability import Spread, covariance
+from referee.diagnoses import NOT_PHYSICS
+from referee.draw import NOISY, OUTSIDE, RIGID_SHIFT, RIGID_TURN, UNEVEN
 from referee.effects.effect import unit
 from referee.equilibrium import Balance, balance
-from referee.evidence import normal, pair, scaled, single
 from referee.labels import effects_of, setting_of
 from referee.library import Draws, Forces, draws_of, library
 from referee.linear_response import LinearResponse
-from referee.plan import BOTH, SHARES
+from referee.mistakes import draw
+from referee.posterior import Analyst
 from referee.problem import Problem
 from referee.sensing import place_sensors
 from referee.setting import EACH, FIELD, NOISE, OVERALL, mean_square
@@ -60,8 +58,8 @@ class Known:
     Attributes
     ----------
     sight : Sight
-    whiten : callable
-        From rows (k, rows) to units of all that is not known.
+    lower : (rows, rows) array
+        Factor of the covariance of all that is not known: rows are its products with rows in units of that.
     noise : (rows, rows) array
         Covariance of noise alone in these units.
     field : (modes, rows) array
@@ -71,11 +69,15 @@ class Known:
     """
 
     sight: Sight
-    whiten: Callable[[Floats], Floats]
+    lower: Floats
     noise: Floats
     field: Floats
     named: dict[str, Draws]
     nameless: Draws
+
+    def whiten(self, rows: Floats) -> Floats:
+        """From rows (k, rows) to units of all that is not known."""
+        return np.asarray(solve_triangular(self.lower, rows.T, lower=True)).T
 
 
 def analyse(labels: Mapping[str, Mapping[str, Any]], out: Path, workers: int) -> None:
@@ -125,7 +127,8 @@ def _known(
     response = LinearResponse(sight, base, problem.body.nodes("superior"))
     tissues, others = (response.rows(np.stack(forces)) for forces in unknown_forces(problem, base))
     unknown = np.concatenate([OVERALL * tissues.sum(axis=0, keepdims=True), EACH * tissues, others])
-    lower = np.linalg.cholesky(covariance(sight, unknown))
+    whole = covariance(sight, unknown)
+    lower = np.linalg.cholesky(whole)
 
     def whiten(rows: Floats) -> Floats:
         return np.asarray(solve_triangular(lower, rows.T, lower=True)).T
@@ -133,16 +136,15 @@ def _known(
     named, nameless = library(random, setting, Forces(problem, base), response, whiten)
     effects = effects_of(label)
     changes = [first_order(effect, problem, base, setting.times) for effect in effects]
-    true = whiten(np.stack([sight.rows(change) for change in changes])) if changes else np.zeros((0, len(lower)))
+    rows = np.stack([sight.rows(change) for change in changes]) if changes else np.zeros((0, len(lower)))
+    true = whiten(rows)
     wide = [
-        whiten(np.stack([sight.rows(part) for part in spanning(effect, change, problem, base, setting.times)]))
+        np.stack([sight.rows(part) for part in spanning(effect, change, problem, base, setting.times)])
         for effect, change in zip(effects, changes, strict=True)
         if len(effects) > 1
     ]
-    given = [
-        conditional(own, np.concatenate([true[:0], *wide[:k], *wide[k + 1 :]]), np.eye(true.shape[1]))
-        for k, own in enumerate(true)
-    ]
+    spread = Spread(sight, whole)
+    given = [spread.d(own, np.concatenate([rows[:0], *wide[:k], *wide[k + 1 :]])) for k, own in enumerate(rows)]
     for row, effect in zip(true, effects, strict=True):
         own = draws_of(row[None], np.array([np.inf]), fixed=False, both=True)
         if effect.kind in named:
@@ -154,13 +156,25 @@ def _known(
     modes = whiten(others[:MODES])
     noise = whiten(whiten(sight.noise).T)
     if len(true) == 1:
-        true *= float(label["detectability"]) / float(np.linalg.norm(true))
-    return Known(sight, whiten, noise, modes, named, nameless), true.sum(axis=0), given
+        # as large as it is, of which these are the first order
+        true *= float(np.linalg.norm(whiten(_recorded(label, sight)[None]))) / float(np.linalg.norm(true))
+    return Known(sight, lower, noise, modes, named, nameless), true.sum(axis=0), given
+
+
+def _recorded(label: Mapping[str, Any], sight: Sight) -> Floats:
+    """Rows (rows,) of all that the effects of a label change, in full."""
+    points, wall = np.array(label["clean_effect_m"]), np.array(label["clean_effect_on_wall_m"]).reshape(-1, 3)
+    return sight.stacked(points, wall, np.array(label["clean_effect_n"]))
 
 
 def _residuals(label: Mapping[str, Any], random: Random, known: Known, true: Floats) -> Floats:
     """Residuals (k, rows) like those of the case."""
-    w = true + random.normal(size=(RESIDUALS, len(true)))
+    wrong = np.zeros((RESIDUALS, len(true)))
+    numbers = known.sight.numbers
+    chosen = random.random((RESIDUALS, len(numbers))) < known.sight.setting.gross
+    wrong[:, numbers] = chosen[..., None] * draw(random, chosen.shape)
+    mistakes = known.whiten(wrong)
+    w = true + random.normal(size=(RESIDUALS, len(true))) + mistakes
     if label["kind"] != "trap":
         return w
     trap = label["names"][0]
@@ -168,7 +182,7 @@ def _residuals(label: Mapping[str, Any], random: Random, known: Known, true: Flo
         shift, turn = (np.array(label["setting"][name]) for name in ("shift", "turn"))
         return w + known.whiten(known.sight.moved_rigidly(shift, turn)[None])
     if trap == "noise":
-        return np.asarray(random.normal(size=w.shape) @ np.linalg.cholesky(_noisy(known)).T)
+        return mistakes + random.normal(size=w.shape) @ np.linalg.cholesky(_noisy(known)).T
     return w + random.normal(size=(len(w), len(known.field))) @ _uneven(known)
 
 
@@ -180,19 +194,8 @@ def _uneven(known: Known) -> Floats:
     return np.sqrt(UNEVEN**2 / mean_square(FIELD) - 1.0) * known.field
 
 
-def posteriors(w: Floats, known: Known, random: Random) -> list[dict[str, Any]]:
+def posteriors(residuals: Floats, known: Known, random: Random) -> list[dict[str, Any]]:
     """Of each residual (k, rows) the p-value of nothing, and sets of causes with their probabilities."""
-    prior = SHARES["scored"]
-    rest = 1.0 - sum(prior.values())
-    logs: dict[tuple[str, ...], Floats] = {(): np.full(len(w), np.log(prior["none"]))}
-    for name, draws in known.named.items():
-        logs[(name,)] = single(w, draws) + np.log(rest / len(MECHANISMS))
-    couples = list(itertools.combinations(MECHANISMS, 2))
-    for one, other in couples:
-        if one in known.named and other in known.named:
-            both = pair(w, known.named[one], known.named[other], BOTH)
-            logs[one, other] = both + np.log(prior["two"] / len(couples))
-    logs[(UNKNOWN,)] = single(w, known.nameless) + np.log(prior["outside"])
     motions = [
         known.sight.moved_rigidly(
             random.uniform(*RIGID_SHIFT) * unit(random.normal(size=3)),
@@ -200,24 +203,20 @@ def posteriors(w: Floats, known: Known, random: Random) -> list[dict[str, Any]]:
         )
         for _ in range(MOTIONS)
     ]
+    moved, uneven = known.whiten(np.stack(motions)) / np.sqrt(MOTIONS), _uneven(known)
+    plain = np.eye(residuals.shape[1])
     # in the order of `MODELLED`
-    traps = [
-        normal(w, known.whiten(np.stack(motions)) / np.sqrt(MOTIONS)),
-        scaled(w, _noisy(known)),
-        normal(w, _uneven(known)),
-    ]
-    for k, log in enumerate(traps):
-        logs[NOT_PHYSICS, str(k)] = log + np.log(prior["trap"] / len(traps))
-    p = softmax(np.stack(list(logs.values())), axis=0)
-    p_values = chi2.sf((w**2).sum(axis=1), w.shape[1])
+    traps = [plain + moved.T @ moved, _noisy(known), plain + uneven.T @ uneven]
+    analyst = Analyst(known.lower, known.sight.numbers, known.sight.setting.gross, known.named, known.nameless, traps)
     told = []
-    for k in range(len(w)):
+    for w in residuals:
+        p, p_value = analyst.posterior(w)
         sets: dict[tuple[str, ...], float] = {}
-        for causes, value in zip(logs, p[:, k].tolist(), strict=True):
+        for causes, value in p.items():
             short = (NOT_PHYSICS,) if NOT_PHYSICS in causes else causes
             sets[short] = sets.get(short, 0.0) + value
         kept = [[list(causes), round(value, 4)] for causes, value in sets.items() if value > LEAST]
-        told.append({"p_value": float(p_values[k]), "sets": sorted(kept, key=_by_probability)})
+        told.append({"p_value": p_value, "sets": sorted(kept, key=_by_probability)})
     return told
 
 

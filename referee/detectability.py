@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from referee.mistakes import Bools, Mixture, draw
 from referee.setting import SHARED, SHARED_LENGTH, SHIFT, TURN
 from referee.sight import Change, Sight
 from referee.unknowns import Unknowns
@@ -19,6 +20,8 @@ UPPER_SHIFT, UPPER_TURN, UPPER_STIFFNESS = 2e-3, float(np.deg2rad(2.0)), 0.5
 
 #: Standard deviation of what another effect may be as well, in parts of the size at which it stands out by 1.
 WIDE = 100.0
+#: Draws of what is recorded without a change, each with its opposite, and how often its size is corrected at most.
+_DRAWS, _CORRECTIONS = 12, 3
 
 
 def covariance(sight: Sight, unknown: Floats) -> Floats:
@@ -29,29 +32,69 @@ def covariance(sight: Sight, unknown: Floats) -> Floats:
     return whole
 
 
+def without(others: Floats, precision: Floats) -> Floats:
+    """Precision (rows, rows) where amounts of others (k, rows) are not known either, by Woodbury's identity."""
+    stand: Floats = np.sqrt(np.asarray(np.einsum("kr,rs,ks->k", others, precision, others)))
+    columns = others[stand > 0.0] / stand[stand > 0.0, None]
+    weighted = columns @ precision
+    gram = weighted @ columns.T + np.eye(len(columns)) / WIDE**2
+    return np.asarray(precision - weighted.T @ np.linalg.solve(gram, weighted))
+
+
 def conditional(delta: Floats, others: Floats, precision: Floats) -> float:
-    """``d`` of a change (rows,) where amounts of others (k, rows) are not known, by Woodbury's identity.
+    """``d`` of a change (rows,) where amounts of others (k, rows) are not known, without gross errors."""
+    return float(np.sqrt(max(delta @ without(others, precision) @ delta, 0.0)))
+
+
+class Spread:
+    """What is recorded without a change, as it is drawn with all that is not known, and how far from it a change is.
 
     Parameters
     ----------
-    delta, others : arrays
-    precision : (rows, rows) array
-        Inverse of the covariance without the others.
+    sight : Sight
+    whole : (rows, rows) array
+        Covariance of all that is not known, if no point is mistaken.
     """
-    own = precision @ delta
-    stand = np.sqrt(np.einsum("kr,rs,ks->k", others, precision, others))
-    columns = others[stand > 0.0] / stand[stand > 0.0, None]
-    gram = columns @ precision @ columns.T + np.eye(len(columns)) / WIDE**2
-    seen = columns @ own
-    return float(np.sqrt(max(delta @ own - seen @ np.linalg.solve(gram, seen), 0.0)))
+
+    def __init__(self, sight: Sight, whole: Floats) -> None:
+        self.precision: Floats = np.linalg.inv(whole)
+        self._sight = sight
+        share = sight.setting.gross
+        random = np.random.default_rng([sight.setting.seed, 12])
+        normal = random.normal(size=(_DRAWS, len(whole))) @ np.linalg.cholesky(whole).T
+        self._wrong: Bools = random.random((_DRAWS, len(sight.numbers))) < share
+        normal[:, sight.numbers] += self._wrong[..., None] * draw(random, self._wrong.shape)
+        self._drawn = normal
+
+    def plain(self, delta: Floats) -> float:
+        """How much a change (rows,) would stand out without gross errors."""
+        return float(np.sqrt(delta @ self.precision @ delta))
+
+    def d(self, delta: Floats, others: Floats | None = None) -> float:
+        """How much a change (rows,) stands out, where amounts of others (k, rows) are not known.
+
+        Half its square is by how much what is recorded with the change is more probable with it than without, as
+        logarithms and in the mean. Without gross errors that is ``D^T S^-1 D / 2``; with them it is no more, since they
+        are the same with and without the change.
+        """
+        precision = self.precision if others is None else without(others, self.precision)
+        mixture = Mixture(precision, self._sight.numbers, self._sight.setting.gross)
+        # of each draw its opposite, too: what is linear in it is no matter of chance then
+        found = [
+            mixture.log_density(sign * e, wrong)[0] - mixture.log_density(sign * e + delta, wrong)[0]
+            for e, wrong in zip(self._drawn, self._wrong, strict=True)
+            for sign in (1.0, -1.0)
+        ]
+        square = min(2.0 * float(np.mean(found)), float(delta @ precision @ delta))
+        return float(np.sqrt(max(square, 0.0)))
 
 
 class Detectability:
-    """``d = sqrt(D^T S^-1 D)`` of what a change shows, in units of all that is not known.
+    """``d`` of what a change shows, in units of all that is not known.
 
     `S` holds everything that is drawn and not told, each with a normal prior of the spread that it is drawn with: noise
-    (its mean scale; gross errors as points that are lost), registration, the stiffness of all tissue, of each tissue
-    and its field, Poisson's ratio and the shape of the law. Only that is left of a change which these cannot explain.
+    (its mean scale), registration, the stiffness of all tissue, of each tissue and its field, Poisson's ratio and the
+    shape of the law. Beside that any point may be mistaken. Only that is left of a change which these cannot explain.
 
     Parameters
     ----------
@@ -61,19 +104,24 @@ class Detectability:
 
     def __init__(self, sight: Sight, unknowns: Unknowns) -> None:
         self._sight = sight
-        self._factor = cho_factor(covariance(sight, np.stack([sight.rows(change) for change in unknowns.drawn])))
+        self._spread = Spread(sight, covariance(sight, np.stack([sight.rows(change) for change in unknowns.drawn])))
         self._upper = cho_factor(_upper(sight, unknowns))
 
     def d(self, change: Change) -> float:
         """Of all recordings."""
-        delta = self._sight.rows(change)
-        return float(np.sqrt(delta @ cho_solve(self._factor, delta)))
+        return self._spread.d(self._sight.rows(change))
 
     def given(self, change: Change, others: Sequence[Change]) -> float:
         """Of all recordings, where the amounts of other changes are not known."""
-        rows = np.stack([self._sight.rows(other) for other in others])
-        precision = cho_solve(self._factor, np.eye(rows.shape[1]))
-        return conditional(self._sight.rows(change), rows, precision)
+        return self._spread.d(self._sight.rows(change), np.stack([self._sight.rows(other) for other in others]))
+
+    def factor(self, change: Change, wanted: float) -> float:
+        """How many times larger a change stands out by as much as is wanted, about."""
+        delta = self._sight.rows(change)
+        factor = wanted / max(self._spread.plain(delta), 1e-9)
+        for _ in range(_CORRECTIONS):
+            factor *= wanted / max(self._spread.d(factor * delta), 1e-9)
+        return factor
 
     def upper(self, change: Change) -> float:
         """The old measure, which run 1 was drawn and scored by: of points alone.

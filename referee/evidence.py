@@ -1,98 +1,111 @@
-"""Log evidence of draws of one cause or of two, against nothing, in units of all that is not known."""
+"""Log evidence of draws of one cause or of two, against nothing, in units of all that is not known.
+
+Some points may be mistaken: rows and draws are then without them, and what each draw leaves at them has the density of
+a mistake. Where it acts as it most probably does is told, too.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from referee.library import Draws
+from referee.lost import Lost
 
 Floats = NDArray[np.float64]
 
-#: Sizes between the ends of each draw.
-_SIZES = 24
+#: Sizes between the ends of each draw, and by how much less probable ones are left out where points are mistaken.
+_SIZES, _NEGLIGIBLE = 24, 25.0
 
 
-def single(w: Floats, draws: Draws) -> Floats:
-    """Log evidence (k,) of residuals (k, rows) under one cause: the mean over its draws, sizes and signs."""
-    z = w @ draws.directions.T
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Of one cause or two.
+
+    Attributes
+    ----------
+    log : float
+        Against nothing and no mistakes beside.
+    members : list of (int, float)
+        Most probable draw of each cause, by number, and its size with its sign in units of what it would stand out by
+        if no point were mistaken.
+    """
+
+    log: float
+    members: list[tuple[int, float]]
+
+
+def single(w: Floats, draws: Draws, lost: Lost) -> Evidence:
+    """Evidence of rows (rows,) under one cause: the mean over its draws, sizes and signs."""
+    seen, moved = lost.of(draws)
+    at = lost.at(w[None])[0]
     parts = (np.arange(_SIZES) + 0.5) / _SIZES
-    sizes = draws.low[:, None] * (draws.high / draws.low)[:, None] ** parts
-    x = z[:, :, None] * sizes
-    both = np.logaddexp(x, -x) - np.log(2.0)
-    logs = np.where(draws.both[:, None], both, x) - 0.5 * sizes**2
-    found: Floats = logsumexp(logs, axis=(1, 2)) - np.log(logs.shape[1] * _SIZES)
-    return found
+    sizes = seen.low[:, None] * (seen.high / seen.low)[:, None] ** parts
+    sizes = np.stack([sizes, -sizes], axis=-1)
+    logs = (seen.directions @ lost.left(w[None])[0])[:, None, None] * sizes - 0.5 * sizes**2
+    logs += lost.log_density(at - sizes[..., None, None] * moved[:, None, None])
+    # of a cause that has one sign the other has no weight
+    shares = np.where(seen.both[:, None, None], 0.5, np.array([1.0, 0.0]))
+    log = float(logsumexp(logs, b=np.broadcast_to(shares, logs.shape))) - np.log(len(logs) * _SIZES)
+    best = np.unravel_index(np.where(shares > 0.0, logs, -np.inf).argmax(), logs.shape)
+    return Evidence(log, [_member(int(best[0]), float(sizes[best]), draws, seen)])
 
 
-def pair(w: Floats, first: Draws, second: Draws, least: float) -> Floats:
-    """Log evidence (k,) under two causes at once, each of which alone stands out by `least` or more.
+def _member(number: int, size: float, draws: Draws, seen: Draws) -> tuple[int, float]:
+    return number, size * float(draws.high[number] / seen.high[number])
+
+
+def pair(w: Floats, first: Draws, second: Draws, lost: Lost) -> Evidence:
+    """Evidence of rows (rows,) under two causes at once.
 
     Sizes are integrated by Laplace's method about the best ones within their ends.
     """
-    rho = np.clip(first.directions @ second.directions.T, -0.999, 0.999)
-    ends = [_ends(draws, least) for draws in (first, second)]
-    if any((low >= high).all() for low, high in ends):
-        return np.full(len(w), -np.inf)
-    (low_a, high_a), (low_b, high_b) = ((low[:, None], high[:, None]) for low, high in ends)
-    low_b, high_b = low_b.T, high_b.T
-    log_prior = -_spread(low_a, high_a, first.both[:, None]) - _spread(low_b, high_b, second.both[None])
+    (one, moved_one), (other, moved_other) = lost.of(first), lost.of(second)
+    if (one.low >= one.high).all() or (other.low >= other.high).all():
+        return Evidence(-np.inf, [])
+    rho = np.clip(one.directions @ other.directions.T, -0.999, 0.999)
+    low_a, high_a, low_b, high_b = one.low[:, None], one.high[:, None], other.low[None], other.high[None]
+    log_prior = -_spread(low_a, high_a, one.both[:, None]) - _spread(low_b, high_b, other.both[None])
     log_prior = np.where((low_a < high_a) & (low_b < high_b), log_prior, -np.inf)
-    volume = np.log(2.0 * np.pi) - 0.5 * np.log1p(-(rho**2))
-    each = (_one(z, rho, (low_a, high_a), (low_b, high_b), first, second) for z in _projections(w, first, second))
+    left = lost.left(w[None])[0]
+    z = (one.directions @ left)[:, None], (other.directions @ left)[None]
+    log, a, b = _at_best(z, rho, (low_a, high_a), (low_b, high_b), one, other)
+    log = log + log_prior + np.log(2.0 * np.pi) - 0.5 * np.log1p(-(rho**2))
+    k, j = np.nonzero(log > log.max() - _NEGLIGIBLE)
+    shift = a[k, j][:, None, None] * moved_one[k] + b[k, j][:, None, None] * moved_other[j]
+    chosen = log[k, j] + lost.log_density(lost.at(w[None])[0] - shift)
     used = max(int(np.isfinite(log_prior).sum()), 1)
-    return np.array([logsumexp(log + log_prior + volume) - np.log(used) for log in each])
-
-
-def _projections(w: Floats, first: Draws, second: Draws) -> Iterator[tuple[Floats, Floats]]:
-    for row in w:
-        yield (first.directions @ row)[:, None], (second.directions @ row)[None]
-
-
-def _ends(draws: Draws, least: float) -> tuple[Floats, Floats]:
-    return np.maximum(draws.low, min(least, float(draws.high.max()) * 0.5)), draws.high
+    best = int(np.argmax(chosen))
+    ends = (k[best], a[k[best], j[best]], first, one), (j[best], b[k[best], j[best]], second, other)
+    members = [_member(int(number), float(size), draws, seen) for number, size, draws, seen in ends]
+    return Evidence(float(logsumexp(chosen)) - np.log(used), members)
 
 
 def _spread(low: Floats, high: Floats, both: NDArray[np.bool_]) -> Floats:
     return np.log(np.maximum(np.log(np.maximum(high / low, 1.0 + 1e-9)), 1e-9)) + np.log(2.0) * both
 
 
-def _one(
+def _at_best(
     z: tuple[Floats, Floats],
     rho: Floats,
     ends_a: tuple[Floats, Floats],
     ends_b: tuple[Floats, Floats],
     first: Draws,
     second: Draws,
-) -> Floats:
-    """Log density at the best sizes and of the prior there, (k, l), by alternating between both."""
+) -> tuple[Floats, Floats, Floats]:
+    """Log density at the best sizes and of the prior there, and both sizes, (k, l), by alternating between these."""
     za, zb = z
     a = _within((za - rho * zb) / (1.0 - rho**2), ends_a, first.both[:, None])
     for _ in range(3):
         b = _within(zb - rho * a, ends_b, second.both[None])
         a = _within(za - rho * b, ends_a, first.both[:, None])
-    return a * za + b * zb - 0.5 * (a**2 + b**2 + 2.0 * rho * a * b) - np.log(np.abs(a * b))
+    return a * za + b * zb - 0.5 * (a**2 + b**2 + 2.0 * rho * a * b) - np.log(np.abs(a * b)), a, b
 
 
 def _within(size: Floats, ends: tuple[Floats, Floats], both: NDArray[np.bool_]) -> Floats:
     sign = np.where(both & (size < 0.0), -1.0, 1.0)
     found: Floats = sign * np.clip(sign * size, *ends)
-    return found
-
-
-def normal(w: Floats, columns: Floats) -> Floats:
-    """Log evidence (k,) where amounts of mean 0 and variance 1 of columns (c, rows) act besides, by Woodbury."""
-    gram = np.eye(len(columns)) + columns @ columns.T
-    b = columns @ w.T
-    found: Floats = 0.5 * (b * np.linalg.solve(gram, b)).sum(axis=0) - 0.5 * np.linalg.slogdet(gram)[1]
-    return found
-
-
-def scaled(w: Floats, covariance: Floats) -> Floats:
-    """Log evidence (k,) of another covariance (rows, rows) than 1."""
-    square = (w.T * np.linalg.solve(covariance, w.T)).sum(axis=0)
-    found: Floats = 0.5 * ((w**2).sum(axis=1) - square - np.linalg.slogdet(covariance)[1])
     return found

@@ -46,6 +46,10 @@ class Draws:
     high: Floats
     both: NDArray[np.bool_]
 
+    def above(self, least: float) -> Draws:
+        """Those that stand out by so much or more, if any can by twice that."""
+        return replace(self, low=np.maximum(self.low, min(least, 0.5 * float(self.high.max()))))
+
     def and_also(self, other: Draws) -> Draws:
         """These and others."""
         pairs = ((getattr(self, name), getattr(other, name)) for name in ("directions", "low", "high", "both"))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from referee.mistakes import draw
 from referee.sensing import FORCE_ERROR
 from referee.truth import Truth
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
@@ -14,8 +15,6 @@ from warpbrain.recordings.recording import ForceRecording, PointsRecording, Reco
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Gross errors are as long as this [m].
-GROSS = (0.002, 0.004)
 #: Name of the declared load.
 CAP = "superior cap"
 
@@ -60,9 +59,7 @@ def _points(truth: Truth, name: str, role: str, nodes: Ints, mistakes: bool) -> 
     moved = seen(truth, nodes, 1 if mistakes else 2)
     if mistakes:
         wrong = random.random(moved.shape[:2]) < setting.gross
-        errors = random.normal(size=moved.shape)
-        errors *= (random.uniform(*GROSS, size=wrong.shape) / np.linalg.norm(errors, axis=2))[..., None]
-        moved = moved + wrong[..., None] * errors
+        moved = moved + wrong[..., None] * draw(random, wrong.shape)
         for k in random.permutation(len(nodes))[: round(0.5 * setting.mispaired * len(nodes))]:
             # with its nearest neighbour
             other = np.argsort(np.linalg.norm(points - points[k], axis=1))[1]

@@ -15,6 +15,7 @@ from referee.sensing import FORCE_ERROR, Sensors
 from referee.setting import NOISE, SHARED, SHARED_LENGTH, Setting, mean_square
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +77,11 @@ class Sight:
         """How many of the rows are of points."""
         return 3 * self.often * len(self._nodes)
 
+    @cached_property
+    def numbers(self) -> Ints:
+        """Rows (points, 3) of each point, at each time."""
+        return np.arange(self.count).reshape(-1, 3)
+
     @property
     def often(self) -> int:
         """How many times points are recorded at."""
@@ -83,12 +89,14 @@ class Sight:
 
     def rows(self, change: Change) -> Floats:
         """What is recorded of a change (rows,) [m], forces [N]."""
-        points = change.move[:, self._nodes]
+        return self.stacked(change.move[:, self._nodes], self._sensors.on_wall(change.move[-1]), change.force)
+
+    def stacked(self, points: Floats, wall: Floats, force: Floats) -> Floats:
+        """The same of points (times or 1, k, 3), of places on the wall (p, 3) [m], and of a force (3,) [N]."""
         # what does not change with time is seen at each of them
-        parts = [np.repeat(points, self.often // len(points), axis=0).ravel()]
-        parts.append((self._sensors.on_wall(change.move[-1]) * self._normals).sum(axis=1))
+        parts = [np.repeat(points, self.often // len(points), axis=0).ravel(), (wall * self._normals).sum(axis=1)]
         if self._force is not None:
-            parts.append(change.force)
+            parts.append(force)
         return np.concatenate(parts)
 
     @property
@@ -123,20 +131,20 @@ class Sight:
 
     @cached_property
     def noise(self) -> Floats:
-        """Covariance (rows, rows) of noise as it is drawn, gross errors counted as points that are lost."""
+        """Covariance (rows, rows) of noise as it is drawn, without gross errors."""
         setting = self.setting
         # mean square of its scale, which nobody declares
         square = mean_square(NOISE) * setting.sigma**2
-        points = _noise(self.points, square, square / (1.0 - setting.gross))
+        points = _noise(self.points, square)
         points = np.kron(np.eye(self.often), np.kron(points, np.eye(3)))
         aligned = self._normals @ self._normals.T
-        wall = _noise(self._places, square, square) * aligned
+        wall = _noise(self._places, square) * aligned
         blocks = [points, wall]
         if self._force is not None:
             blocks.append(self._force**2 * square / setting.sigma**2 * np.eye(3))
         return block_diag(*blocks)
 
 
-def _noise(points: Floats, square: float, alone: float) -> Floats:
+def _noise(points: Floats, square: float) -> Floats:
     apart = np.linalg.norm(points[:, None] - points[None], axis=2)
-    return alone * np.eye(len(points)) + SHARED**2 * square * np.exp(-apart / SHARED_LENGTH)
+    return square * (np.eye(len(points)) + SHARED**2 * np.exp(-apart / SHARED_LENGTH))

@@ -111,7 +111,7 @@ def _sized(
             continue
         good = effect, change
         most = effect.size * (FARTHEST / np.abs(change.move).max()) ** (1.0 / effect.power)
-        size = effect.size * (wanted / seen.d(change)) ** (1.0 / effect.power)
+        size = effect.size * seen.factor(change, wanted) ** (1.0 / effect.power)
         fresh = effect.resized(min(size, most, stable))
         ratio = fresh.size / effect.size
         if abs(ratio - 1.0) < _NEAR or (effect.forces and effect.power == 1.0):

@@ -31,7 +31,7 @@ def some_causes(random: np.random.Generator) -> list[Cause]:
     return [
         Cause("patch", places(4, 3), -2.0, sizes),
         Cause("level", places(3, 1, mean=True), -2.5, sizes / 3.0),
-        Cause("field", places(2, 5), -3.0, sizes),
+        Cause("field", places(2, 5), -3.0, sizes, shares=np.array([0.9, 0.1])),
         Cause("switch", places(2, 1), -3.5, sizes),
     ]
 
@@ -44,10 +44,11 @@ def by_hand(one: GaussianModel, residual: np.ndarray, causes: list[Cause], membe
         choices = [[]]
         for c in members:
             cause = causes[c]
+            shares = [1.0 / len(cause.places)] * len(cause.places) if cause.shares is None else cause.shares
             choices = [
-                [*chosen, (place, size, -np.log(len(cause.places) * len(cause.sizes)))]
+                [*chosen, (place, size, np.log(share / len(cause.sizes)))]
                 for chosen in choices
-                for place in cause.places
+                for place, share in zip(cause.places, shares, strict=True)
                 for size in cause.sizes
             ]
         for chosen in choices:
@@ -86,9 +87,10 @@ def test_a_place_has_its_share_of_the_evidence() -> None:
             assert hypothesis.best.log_share == 0.0
             continue
         [cause] = [cause for cause in causes if cause.name == hypothesis.causes[0]]
-        place = cause.places[hypothesis.best.members[0].place]
-        alone = by_hand(one, residual, [replace(cause, places=(place,))], (0,))
-        share = alone - np.log(len(cause.places)) - hypothesis.log_evidence
+        number = hypothesis.best.members[0].place
+        alone = by_hand(one, residual, [replace(cause, places=(cause.places[number],), shares=None)], (0,))
+        prior = 1.0 / len(cause.places) if cause.shares is None else cause.shares[number]
+        share = alone + np.log(prior) - hypothesis.log_evidence
         np.testing.assert_allclose(hypothesis.best.log_share, share, atol=1e-8)
 
 
@@ -175,5 +177,6 @@ def test_a_single_cause_keeps_its_next_best_places():
             only = Cause(cause.name, (cause.places[member.place],), cause.log_prior, cause.sizes)
             alone = posterior(given, residual, [only], SCALES)
             best = next(h.best for h in alone if h.causes)
-            weight = -np.log(len(cause.places))
+            count = len(cause.places)
+            weight = np.log(1.0 / count if cause.shares is None else cause.shares[member.place])
             assert configuration.log_density == pytest.approx(best.log_density + weight)

@@ -62,12 +62,13 @@ def test_what_is_not_known_does_not_stand_out(known):
     assert len(sight.rows(unknowns.drawn[0])) == 3 * 40 + 150 + (3 if setting.total is None else 0)
     # a patch of its own is seen by noise, though less than by noise alone
     move = np.zeros((1, *setting.body.points.shape))
-    move[0, place_sensors(setting).fitted[:5]] = [0.0, 0.0, 2e-3]
+    move[0, place_sensors(setting).fitted[:5]] = [0.0, 0.0, 1e-3]
     patch = Change(move, np.zeros(3))
     rows = sight.rows(patch)
     alone = np.sqrt(rows @ np.linalg.solve(sight.noise, rows))
     assert 1.0 < seen.d(patch) < alone
-    assert seen.d(patch.times(2.0)) == pytest.approx(2.0 * seen.d(patch))
+    # a size by which it stands out as much as is wanted
+    assert seen.d(patch.times(seen.factor(patch, 4.0))) == pytest.approx(4.0, rel=0.1)
 
 
 def test_noise_is_as_it_is_drawn(known):
@@ -80,11 +81,9 @@ def test_noise_is_as_it_is_drawn(known):
         draws.append(scale * blur.noise(sight.points)[:, 0])
     drawn = np.array(draws)
     count = len(drawn)
-    # gross errors are lost points, not noise: of a point's own noise, 1 of 1.16, a share of 0.04 / 0.96 is added
     square = np.mean(drawn**2, axis=1)
-    added = np.diag(sight.noise)[0] - square.mean()
     # beyond four standard errors once in 16,000
-    assert abs(added - square.mean() * 0.04 / 0.96 / 1.16) < 4.0 * square.std() / np.sqrt(count)
+    assert abs(np.diag(sight.noise)[0] - square.mean()) < 4.0 * square.std() / np.sqrt(count)
     expected = sight.noise[: 3 * 40 : 3, : 3 * 40 : 3]
     i, j = np.triu_indices(40, 1)
     products = drawn[:, i] * drawn[:, j]

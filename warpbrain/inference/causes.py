@@ -42,11 +42,14 @@ class Cause:
     #: (s,): standard deviations of the coefficients, in units of the columns.
     sizes: Floats = field(default_factory=lambda: np.ones(1))
     kind: Kind = Kind.PHYSICS
+    shares: Floats | None = None  # (p,), probability of each place; all are equally probable if not given
 
     @property
     def log_weights(self) -> Floats:
-        """Logarithm of the probability of each place and size, (p, s): all are equally probable."""
-        return np.full((len(self.places), len(self.sizes)), -np.log(len(self.places)) - np.log(len(self.sizes)))
+        """Logarithm of the probability of each place and size, (p, s)."""
+        count = len(self.places)
+        shares = np.full(count, 1.0 / count) if self.shares is None else self.shares
+        return np.repeat(np.log(shares)[:, None], len(self.sizes), axis=1) - np.log(len(self.sizes))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.unknown import _unit_stresses, body_forces, fields, pressures
+from warpbrain.worlds.body.unknown import Strains, _unit_stresses, body_forces, fields, pressures
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +69,26 @@ def test_fields_are_of_one_metre(at):
     assert {name.split(",")[0] for name in every} == {"body force", "eigenstress", "pressure", "traction"}
     for columns in every.values():
         np.testing.assert_allclose(np.mean(np.sum(columns[rows] ** 2, axis=1)), 1.0)
+
+
+def test_a_strain_in_one_place_is_one_that_swells_too(at):
+    """What a growth about a site moves is what one of its components does, as far as any other component alone."""
+    mesh = at.system.model.mesh
+    length, spacing = 0.18 * mesh.radius, 0.3 * mesh.radius
+    strains = Strains(at, length, spacing)
+    assert len(strains.columns) == len(strains.centres) > 5
+    distance = np.linalg.norm(mesh.centres[:, None] - strains.centres, axis=2)
+    growth = at.answers_of_elements(at.growth_forces, np.exp(-0.5 * (distance / length) ** 2)).T
+    swells = np.array([columns[:, 5] for columns in strains.columns])
+    cosines = np.sum(growth * swells, axis=1) / np.linalg.norm(growth, axis=1) / np.linalg.norm(swells, axis=1)
+    np.testing.assert_allclose(cosines, 1.0, atol=1e-9)
+    rows = at.sensors.is_displacement
+    squares = np.mean([np.mean(columns[rows] ** 2, axis=0) for columns in strains.columns], axis=0)
+    assert squares[5] == pytest.approx(squares[:5].mean())
+    assert squares.sum() == pytest.approx(1.0)
+
+
+def test_a_strain_elsewhere_is_in_the_same_unit(at):
+    strains = Strains(at, 0.18 * at.system.model.mesh.radius, 0.3 * at.system.model.mesh.radius)
+    again = strains.at_centres(strains.centres[2:4])
+    np.testing.assert_allclose(again, strains.columns[2:4], atol=1e-9 * np.abs(strains.columns[2]).max())

@@ -30,7 +30,7 @@ from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
 from warpbrain.worlds.body.sensors import Sensors, noise_of, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
-from warpbrain.worlds.body.unknown import body_forces, fields
+from warpbrain.worlds.body.unknown import Strains, body_forces, fields
 
 #: Gauss-Newton steps at most; the last one moves tissue and field by less than this [standard deviations].
 _STEPS, _CONVERGED = 6, 0.5
@@ -52,6 +52,7 @@ class Base:
     effects: Effects
     nuisances: Nuisances
     unknown: dict[str, Floats]  # (n, k), columns of unknown fields, of 1 m
+    strains: Strains  # unknown, in one place
     #: Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
     model: GaussianModel
     #: The same noise without columns, and with what the mesh does not resolve, of each size of `mesh.unresolved`; of
@@ -146,6 +147,7 @@ class BaseFinder:
     def _base(self, declared: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
         linear = _LinearModel(self, state, errors)
         unknown = fields(linear.at, linear.lengths, linear.body_forces)
+        strains = Strains(linear.at, self._spacing * belief("unknown.place"), self._spacing)
         nuisances, factor = linear.nuisances, linear.noise_factor
         if errors is not None and not self._without_nuisances:
             smooth = unknown[next(iter(unknown))]
@@ -159,6 +161,7 @@ class BaseFinder:
             linear.effects,
             nuisances,
             unknown,
+            strains,
             GaussianModel(factor, nuisances.columns),
             _noises(linear, resolved=errors is None or self._without_nuisances),
             linear.noise,

@@ -119,14 +119,21 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
 
 
 def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:
-    """Unknown fields of every kind and length, with each of some courses: factors (n, r) of its modes on the rows."""
+    """Unknown fields of every kind and length, or a strain in one place, each with some courses.
+
+    `factors` (n, r): of the modes of each course on the rows. In one place there is only the first.
+    """
     noise = base.typical_noise
-    places = tuple(
+    fields = [
         Place(noise * (columns[:, :, None] * factor[:, None]).reshape(len(columns), -1))
         for columns in base.unknown.values()
         for factor in factors
-    )
-    return Cause(UNKNOWN, places, math.log(belief("causes.unknown")), beliefs("unknown.sizes"), Kind.UNKNOWN)
+    ]
+    strains = [Place(noise * factors[0][:, :1] * columns) for columns in base.strains.columns]
+    share = belief("unknown.in_one_place")
+    shares = np.repeat([(1.0 - share) / len(fields), share / max(len(strains), 1)], [len(fields), len(strains)])
+    log_prior = math.log(belief("causes.unknown"))
+    return Cause(UNKNOWN, (*fields, *strains), log_prior, beliefs("unknown.sizes"), Kind.UNKNOWN, shares)
 
 
 def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]:

@@ -30,12 +30,12 @@ from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads, one_thread_of_blas
 from warpbrain.worlds.body.base import Base, BaseFinder
-from warpbrain.worlds.body.causes import BodyCauses, causes_of, not_physics_at, visible
+from warpbrain.worlds.body.causes import UNKNOWN, BodyCauses, causes_of, not_physics_at, visible
 from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit, candidates_at, dictionary_of
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
-from warpbrain.worlds.body.placing import moved_about_fit, weigh, with_refined_places
+from warpbrain.worlds.body.placing import moved_about_fit, weigh, with_refined_places, with_refined_strain
 from warpbrain.worlds.body.states import States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
@@ -129,6 +129,8 @@ class HypothesisSearch:
         refine = partial(with_refined_places, base, spacing=self.spacing, source=base.effects)
         for candidate in in_threads(refine, singles):
             self._sets[candidate.names] = candidate
+        if (unknown := self._sets.get(frozenset((UNKNOWN,)))) is not None:
+            self._sets[unknown.names] = with_refined_strain(self.base, unknown, self._visible, self.spacing)
 
     def fit(self, alone: bool = False) -> None:
         """Fit sets, and weigh supersets of those that are fitted, until no fit can be expected to change the verdict.

@@ -255,6 +255,43 @@ def with_refined_places(
     return replace(candidate, refined=True)
 
 
+def with_refined_strain(base: Base, candidate: WeightedSet, causes: BodyCauses, spacing: float) -> WeightedSet:
+    """The set of the unknown alone with its strain, if it is one in one place, at the best place in its cell.
+
+    As mechanisms are: what has none of its own would otherwise lose to a name that may be anywhere.
+
+    `causes`: those that were weighed. `spacing`: between the places of the scan [m].
+    """
+    [member] = candidate.hypothesis.best.members
+    unknown, strains = causes.causes[member.cause], base.strains
+    number = member.place - (len(unknown.places) - len(strains.centres))
+    if number < 0:
+        return candidate
+    columns = causes.columns(member)
+    # how many times a column of 1 m it is, on each row: its size and its course in time
+    own = strains.columns[number]
+    factor = np.divide((columns * own).sum(axis=1), (own**2).sum(axis=1), where=own.any(axis=1), out=np.zeros(len(own)))
+    axes = principal_axes(base.at.system.model.mesh.points)
+    offsets = 0.5 * spacing * np.array(list(itertools.product((0.0, -1.0, 1.0), repeat=3)))[1:] @ axes
+    tried = [columns, *(factor[:, None] * each for each in strains.at_centres(strains.centres[number] + offsets))]
+    without = GaussianModel(
+        candidate.marginal.model.noise_factor, candidate.columns[:, : -columns.shape[1]], candidate.marginal.scale
+    )
+    rows = PointRows(without, candidate.residual, base.points)
+    logs = np.array(
+        in_threads(
+            lambda each: rows.with_gross_errors(outliers(), further=FurtherColumns(rows, each)).log_density, tried
+        )
+    )
+    gain = float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs[0])
+    moved = np.column_stack([candidate.columns[:, : -columns.shape[1]], tried[int(np.argmax(logs))]])
+    moved, refined = evidence_of(base, moved, candidate.residual, candidate.marginal.scale)
+    log_share = candidate.log_share + float(logs.max() - np.logaddexp.reduce(logs))
+    return replace(candidate, columns=moved, marginal=refined, log_share=log_share, refined=True).with_evidence(
+        candidate.hypothesis.log_evidence + gain
+    )
+
+
 def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:
     """A fitted set, fitted again where its mechanisms are better placed.
 

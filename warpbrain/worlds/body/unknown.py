@@ -1,4 +1,5 @@
-"""Unknown causes: smooth random fields of body force, eigenstress, traction and pressure, as columns over sensors.
+"""Unknown causes as columns over sensors: smooth random fields of body force, eigenstress, traction and pressure, or a
+strain in one place.
 
 Each field is a sum of Gaussian patches with independent coefficients, a Gaussian process of that length. An eigenstress
 `s` acts within the body: its nodal forces `-V s grad N` have no net force and no moment. Fluids, and what slides along
@@ -43,11 +44,9 @@ def _weights(
     at: Linearisation, places: Floats, shares: Floats, length: float, spacing: float | None = None
 ) -> tuple[Floats, Floats]:
     """Sites (s, 3) [m], and Gaussians (N, s) about them at the nodes, of height 1, times the shares of nodes (N,)."""
-    from scipy.spatial.distance import cdist
-
     points = at.system.model.mesh.points
     sites = places[spread_points(places, length if spacing is None else spacing, 700)]
-    return sites, shares[:, None] * np.exp(-0.5 * (cdist(points, sites) / length) ** 2)
+    return sites, shares[:, None] * _gaussians(points, sites, length)
 
 
 def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ...]:
@@ -94,6 +93,56 @@ def eigenstresses(at: Linearisation, length: float) -> Floats:
     return _visible_modes(columns, at.sensors.is_displacement)
 
 
+class Strains:
+    """A strain in one place, at each of several a spacing [m] apart; Gaussian, of a length [m].
+
+    Five components are deviatoric stresses, the sixth is a growth. As strains they are alike: hardly compressible
+    tissue turns a pressure into next to no strain, and a stress whose six components are alike never swells. So each
+    moves what was recorded as much as the others, in the mean over all places. Of 1 m root mean square over these.
+    """
+
+    def __init__(self, at: Linearisation, length: float, spacing: float) -> None:
+        mesh = at.system.model.mesh
+        self._at, self._length = at, length
+        self.centres = mesh.centres[spread_points(mesh.centres, spacing, 700)]  # (s, 3) [m]
+        parts = self._parts(self.centres)
+        rows = at.sensors.is_displacement
+        rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
+        sizes = [max(_size(part[rows]), 1e-300) for part in parts]
+        count = sum(part.shape[1] for part in parts)
+        self._units = [np.sqrt(part.shape[1] / count) / size for part, size in zip(parts, sizes, strict=True)]
+        self.columns = self._joined(parts)  # (n, 6) of each place
+
+    def at_centres(self, centres: Floats) -> tuple[Floats, ...]:
+        """Columns (n, 6) of the same strain at each of other centres (k, 3) [m]."""
+        return self._joined(self._parts(centres))
+
+    def _joined(self, parts: Sequence[Floats]) -> tuple[Floats, ...]:
+        columns = np.concatenate([unit * part for unit, part in zip(self._units, parts, strict=True)], axis=1)
+        return tuple(np.ascontiguousarray(columns[:, :, k]) for k in range(columns.shape[2]))
+
+    def _parts(self, centres: Floats) -> list[Floats]:
+        """Columns (n, 5, k) of stresses without a trace, and (n, 1, k) of growth."""
+        at = self._at
+        stresses = _stress_patches(at, centres, self._length).reshape(len(at.sensors), len(_PAIRS), len(centres))
+        basis = np.linalg.svd(np.ones((1, 3)))[2][1:]
+        deviatoric = np.concatenate([np.einsum("ij,njs->nis", basis, stresses[:, :3]), stresses[:, 3:]], axis=1)
+        weights = _gaussians(at.system.model.mesh.centres, centres, self._length)
+        return [deviatoric, at.answers_of_elements(at.growth_forces, weights)[:, None]]
+
+
+def _size(columns: Floats) -> float:
+    """Root mean square over rows and places (n, k, s) of what all components (k) together move."""
+    return float(np.sqrt(np.mean(np.sum(columns**2, axis=1))))
+
+
+def _gaussians(points: Floats, sites: Floats, length: float) -> Floats:
+    """Gaussians (m, s) of a length [m] about sites (s, 3) at points (m, 3) [m]."""
+    from scipy.spatial.distance import cdist
+
+    return np.asarray(np.exp(-0.5 * (cdist(points, sites) / length) ** 2))
+
+
 def stress_beside_held(at: Linearisation, length: float) -> Floats:
     """Columns (n, k) of patches of an eigenstress of a length [m] which what is held is a part of.
 
@@ -115,10 +164,8 @@ def stress_beside_held(at: Linearisation, length: float) -> Floats:
 
 def _stress_patches(at: Linearisation, sites: Floats, length: float) -> Floats:
     """Response (n, 6 s) to each component of a stress of 1 Pa, spread about sites (s, 3) with a Gaussian."""
-    from scipy.spatial.distance import cdist
-
     mesh = at.system.model.mesh
-    weights = np.exp(-0.5 * (cdist(mesh.centres, sites) / length) ** 2)
+    weights = _gaussians(mesh.centres, sites, length)
     # on deformed elements, where a symmetric stress has no moment
     forces = _unit_stresses((mesh.points + at.u)[at.system.tetrahedra])
     columns = [at.answers_of_elements(forces[component], weights) for component in range(len(_PAIRS))]
