@@ -43,7 +43,7 @@ def without(others: Floats, precision: Floats) -> Floats:
 
 def conditional(delta: Floats, others: Floats, precision: Floats) -> float:
     """``d`` of a change (rows,) where amounts of others (k, rows) are not known, without gross errors."""
-    return float(np.sqrt(max(delta @ without(others, precision) @ delta, 0.0)))
+    return float(np.sqrt(max(float(delta @ without(others, precision) @ delta), 0.0)))
 
 
 class Spread:
@@ -57,7 +57,7 @@ class Spread:
     """
 
     def __init__(self, sight: Sight, whole: Floats) -> None:
-        self.precision: Floats = np.linalg.inv(whole)
+        self.precision: Floats = np.asarray(np.linalg.inv(whole))
         self._sight = sight
         share = sight.setting.gross
         random = np.random.default_rng([sight.setting.seed, 12])
