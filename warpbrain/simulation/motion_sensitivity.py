@@ -35,7 +35,6 @@ from warpbrain.simulation.sensitivity import (
     ModelOf,
     ParameterStencil,
     lengths,
-    refine,
 )
 
 #: Iterations of a linear solve.
@@ -127,25 +126,24 @@ class MotionSensitivity:
             system.u.assign(u_start if linearised else u_end)
             system.evaluate_tangents()
 
-        def correct(residual: Floats) -> Floats:
+        def stand_again() -> None:
             if system.coupled:
                 # what terms have of their own is in no matrix, and a look beside changes it
                 with stencil.here():
                     stand()
-            return corrections.correct(residual)
 
         with stencil.here():
             stand()
             system.assemble(h * damping.stiffness + h * h, 1.0 + h * damping.mass, coupling=h * h)
             inertia = float(np.linalg.norm(_host(system.mass)[:, None] * v_end))
-            corrections = Corrections(solver, system, self._tolerance)
+            corrections = Corrections(solver, system, self._tolerance, len(stencil), stand_again)
         start = np.zeros_like(self.v)
         residual = np.array([left_of(k, dv) for k, dv in enumerate(start)])
         free = ~system.model.constrained
         # differences are exact to the rounding of what is summed over the step of a parameter
         rounding = ROUNDINGS * system.precision.epsilon * (h * system.size_of_forces() + inertia)
         goals = 2.0 * self._tolerance * lengths(residual, free) + rounding / stencil.steps
-        return refine(left_of, correct, start, residual, goals, free)[0]
+        return corrections.refine(left_of, start, residual, goals)[0]
 
 
 def follow(

@@ -180,67 +180,6 @@ def lengths(values: Floats, free: Bools) -> Floats:
     return np.asarray(np.linalg.norm(values[:, free], axis=1))
 
 
-def refine(
-    left_of: Callable[[int, Floats], Floats],
-    correct: Callable[[Floats], Floats],
-    solution: Floats,
-    residual: Floats,
-    goals: Floats,
-    free: Bools,
-) -> tuple[Floats, Floats]:
-    """Solve for p right-hand sides at once, from a solution and what is left there, both (p, n, 3).
-
-    A tangent is stored symmetric: of forces without a potential (a pressure on an open surface, friction) a part of it
-    is missing. What is left of a right-hand side at a trial solution, a directional difference of forces, is known
-    exactly all the same. So this is GMRES with the stored matrix as preconditioner, in the form of Eisenstat, Elman and
-    Schultz (1983, GCR), which allows inexact solves.
-
-    `left_of` says what is left (n, 3) of a right-hand side, by its number, at a trial solution of that shape: an affine
-    function. `correct` solves with the known part of the matrix, for right-hand sides (p, n, 3). `goals` (p,) are norms
-    of what may be left on the `free` components (n, 3). Returns the solution, and what is left on every component;
-    `SolveError` if the known part of the matrix is too far from the whole.
-    """
-    solution, residual = solution.copy(), residual.copy()
-    tried: list[list[Floats]] = [[] for _ in goals]
-    gained: list[list[Floats]] = [[] for _ in goals]
-    for _ in range(_MOST):
-        open_ = np.flatnonzero(lengths(residual, free) > goals)
-        if not len(open_):
-            return solution, residual
-        wanted = np.zeros_like(residual)
-        wanted[open_] = np.where(free, residual[open_], 0.0)
-        steps = correct(wanted)
-        for k in open_:
-            now = left_of(int(k), solution[k] + steps[k])
-            tried[k].append(steps[k])
-            gained[k].append(residual[k] - now)
-            solution[k], residual[k] = solution[k] + steps[k], now
-            if np.linalg.norm(now[free]) > goals[k]:
-                solution[k], residual[k] = _best(solution[k], now, tried[k], gained[k], free)
-    sizes = lengths(residual, free)
-    worst = int(np.argmax(sizes / goals))
-    if sizes[worst] <= goals[worst]:
-        return solution, residual
-    raise SolveError(
-        f"sensitivity to parameter {worst}: out of balance by {sizes[worst]:.1e} after {_MOST} corrections, goal "
-        f"{goals[worst]:.1e}: the tangent that is stored is far from the true one, or what acts is not smooth here"
-    )
-
-
-def _best(
-    solution: Floats, residual: Floats, tried: list[Floats], gained: list[Floats], free: Bools
-) -> tuple[Floats, Floats]:
-    """Add the combination of all directions of a right-hand side after which least is left."""
-    columns = np.stack([gain[free] for gain in gained], axis=1)
-    sizes = np.linalg.norm(columns, axis=0)
-    sizes[sizes == 0.0] = 1.0
-    shares = np.linalg.lstsq(columns / sizes, residual[free], rcond=1e-12)[0] / sizes
-    return (
-        solution + np.tensordot(shares, np.array(tried), axes=1),
-        residual - np.tensordot(shares, np.array(gained), axes=1),
-    )
-
-
 #: Of each correction but the first: it is not exact anyway.
 _ROUGH = 1e-3
 #: Rounding errors in the forces of a law.
@@ -304,11 +243,11 @@ class SensitivitySolver:
         if not len(stencil):
             none = np.zeros((0, system.size, 3))
             return Sensitivities(none, none, ())
-        corrections = Corrections(self._solver, system, self._tolerance)
+        corrections = Corrections(self._solver, system, self._tolerance, len(stencil))
         with stencil.away():
             moved, residual = self._balance(stencil, state, corrections)
         constrained = system.model.constrained
-        return Sensitivities(moved, np.where(constrained, -residual, 0.0), corrections.cg_iterations)
+        return Sensitivities(moved, np.where(constrained, -residual, 0.0), tuple(corrections.iterations))
 
     def _balance(self, stencil: ParameterStencil, state: Floats, corrections: Corrections) -> tuple[Floats, Floats]:
         """Derivatives of the displacement, and what is out of balance then on every component."""
@@ -332,7 +271,7 @@ class SensitivitySolver:
         met = 2.0 * goals + _MET * lengths(residual, free)
         moved = start
         for _ in range(_AUGMENTATIONS):
-            moved, residual = refine(left_of, corrections.correct, moved, residual, goals, free)
+            moved, residual = corrections.refine(left_of, moved, residual, goals)
             if not stencil.remembers:
                 return moved, residual
             self._meet_constraints(stencil, state, moved)
@@ -359,41 +298,95 @@ class SensitivitySolver:
 
 
 class Corrections:
-    """Solves with the system's matrix as it is now, and counts what they take; the first to the tolerance, later ones
-    roughly.
+    """Solves for `count` parameters with the system's matrix as it is now, which is a part of the whole one.
+
+    A tangent is stored symmetric: of forces without a potential (a pressure on an open surface, friction) a part of it
+    is missing. What is left of a right-hand side at a trial solution, a directional difference of forces, is known
+    exactly all the same. So this is GMRES with the stored matrix as preconditioner, in the form of Eisenstat, Elman and
+    Schultz (1983, GCR), which allows inexact solves. `stand` brings the system back to the state of its matrix, where
+    looking beside it changes what solves need.
     """
 
-    def __init__(self, solver: LinearSolver, system: System, tolerance: float) -> None:
-        self._solver, self._system = solver, system
-        self._tolerance, self._rough = tolerance, max(tolerance, _ROUGH)
-        self._first = True
-        self.cg_iterations: tuple[int, ...] = ()
+    def __init__(
+        self,
+        solver: LinearSolver,
+        system: System,
+        tolerance: float,
+        count: int,
+        stand: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._solver, self._system, self._stand = solver, system, stand
+        self._tolerance, self._free = tolerance, ~system.model.constrained
+        #: Of conjugate gradients, for each parameter.
+        self.iterations = [0] * count
         solver.prepare()
 
-    def correct(self, residual: Floats) -> Floats:
-        """Solve for p right-hand sides (p, n, 3); zero on constrained components."""
-        system, before = self._system, self.cg_iterations or (0,) * len(residual)
-        solved, iterations = [], []
-        for k, b in enumerate(residual):
-            system.load.assign(b)
-            system.solution.zero_()
-            self._solver.solve(self._tolerance if self._first else self._rough)
-            linear = self._solver.result()
-            if linear.indefinite:
+    def refine(
+        self, left_of: Callable[[int, Floats], Floats], solution: Floats, residual: Floats, goals: Floats
+    ) -> tuple[Floats, Floats]:
+        """Go on from solutions and what is left there, both (p, n, 3), of the right-hand side of each parameter.
+
+        `left_of` says what is left (n, 3) of a right-hand side, by its number, at a trial solution of that shape: an
+        affine function. `goals` (p,) are norms of what may be left on the free components. Returns the solutions, and
+        what is left on every component; `SolveError` if the known part of the matrix is too far from the whole.
+        """
+        pairs = [
+            self._refine(k, partial(left_of, k), solution[k], residual[k], goal)
+            for k, goal in enumerate(goals.tolist())
+        ]
+        return np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
+
+    def _refine(
+        self, k: int, left_of: Callable[[Floats], Floats], solution: Floats, residual: Floats, goal: float
+    ) -> tuple[Floats, Floats]:
+        free = self._free
+        tried: list[Floats] = []
+        gained: list[Floats] = []
+        while (size := float(np.linalg.norm(residual[free]))) > goal:
+            if len(tried) == _MOST:
                 raise SolveError(
-                    f"sensitivity to parameter {k}: the tangent stiffness is indefinite (curvature "
-                    f"{linear.curvature:.2e} N/m): the equilibrium is unstable, and does not change smoothly with what "
-                    "it is of"
+                    f"sensitivity to parameter {k}: out of balance by {size:.1e} after {_MOST} corrections, goal "
+                    f"{goal:.1e}: the tangent that is stored is far from the true one, or what acts is not smooth here"
                 )
-            if not linear.converged:
-                raise SolveError(
-                    f"sensitivity to parameter {k}: conjugate gradients did not converge in {linear.iterations} "
-                    f"iterations (residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
-                )
-            solved.append(system.solution.numpy().astype(np.float64))
-            iterations.append(before[k] + linear.iterations)
-        self.cg_iterations, self._first = tuple(iterations), False
-        return np.where(system.model.constrained, 0.0, solved)
+            tried.append(self._solve(k, residual))
+            now = left_of(solution + tried[-1])
+            gained.append(residual - now)
+            solution, residual = solution + tried[-1], now
+            if np.linalg.norm(now[free]) > goal:
+                # and the combination of all directions after which least is left
+                shares = _least(np.stack([gain[free] for gain in gained], axis=1), now[free])
+                solution = solution + np.tensordot(shares, np.array(tried), axes=1)
+                residual = residual - np.tensordot(shares, np.array(gained), axes=1)
+        return solution, residual
+
+    def _solve(self, k: int, residual: Floats) -> Floats:
+        """Correct the solution for a parameter: the first time to the tolerance, later roughly."""
+        system, constrained = self._system, self._system.model.constrained
+        self._stand()
+        system.load.assign(np.where(constrained, 0.0, residual))
+        system.solution.zero_()
+        self._solver.solve(max(self._tolerance, _ROUGH) if self.iterations[k] else self._tolerance)
+        linear = self._solver.result()
+        self.iterations[k] += linear.iterations
+        if linear.indefinite:
+            raise SolveError(
+                f"sensitivity to parameter {k}: the tangent stiffness is indefinite (curvature "
+                f"{linear.curvature:.2e} N/m): the equilibrium is unstable, and does not change smoothly with what "
+                "it is of"
+            )
+        if not linear.converged:
+            raise SolveError(
+                f"sensitivity to parameter {k}: conjugate gradients did not converge in {linear.iterations} "
+                f"iterations (residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
+            )
+        return np.where(constrained, 0.0, system.solution.numpy().astype(np.float64))
+
+
+def _least(columns: Floats, values: Floats) -> Floats:
+    """The combination (m,) of columns (n, m) that comes nearest to values (n,)."""
+    sizes = np.linalg.norm(columns, axis=0)
+    sizes[sizes == 0.0] = 1.0
+    return np.asarray(np.linalg.lstsq(columns / sizes, values, rcond=1e-12)[0] / sizes)
 
 
 @dataclass(frozen=True, eq=False)
