@@ -62,7 +62,7 @@ def test_it_is_said_whose_they_are_and_that_the_mesh_is_not(name):
         assert "10.1002/mp.12268" in notice and "10.11582/2017.00004" in notice and "What was changed" in notice
 
 
-@pytest.mark.slow(150)
+@pytest.mark.slow(65)
 @pytest.mark.parametrize("name", ["resect-01", "resect-02", "resect-04", "resect-14"])
 def test_a_wrong_registration_is_no_missing_physics(name):
     found = Diagnosing(find_case(name), device="cpu").run()

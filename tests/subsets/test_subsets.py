@@ -46,8 +46,10 @@ _TRIED = (
 )
 
 
-@pytest.mark.slow(100)
-@pytest.mark.parametrize(("name", "tissue", "names"), _TRIED)
+@pytest.mark.parametrize(
+    ("name", "tissue", "names"),
+    [pytest.param(*tried, marks=pytest.mark.slow(16 if "beam" in tried[0] else 100)) for tried in _TRIED],
+)
 def test_a_verdict_or_a_sentence(name, tissue, names):
     every = case_of(name, tissue).recordings
     some = tuple(recording for recording in every if recording.name in names)
