@@ -10,14 +10,13 @@ stays on the host.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
-from warpbrain.simulation.kept_inverse import has_cupy, require_memory
 from warpbrain.simulation.sparse_factors import SparseFactors
 
 #: Matrices of the size of the dense one for which there has to be memory, and columns that are solved together.
@@ -38,7 +37,7 @@ class DenseFactors:
         import cupyx
         from cupyx.scipy.sparse import csr_matrix
 
-        require_memory(device, _MATRICES * 8 * matrix.shape[0] ** 2)
+        _require_memory(device, _MATRICES * 8 * matrix.shape[0] ** 2)
         self._device = cupy.cuda.Device(device.ordinal)
         with self._device, cupyx.errstate(linalg="raise"):
             self._L = cupy.linalg.cholesky(csr_matrix(matrix.tocsr().astype(np.float64)).toarray())
@@ -80,12 +79,41 @@ def dense_factors(matrix: Any, device: Any) -> DenseFactors | None:
 
     `matrix` SciPy sparse matrix (n, n): symmetric.
     """
-    if not has_cupy(device):
+    if not _has_cupy(device):
         return None
     try:
         return DenseFactors(matrix, device)
     except (MemoryError, np.linalg.LinAlgError):
         return None
+
+
+def _has_cupy(device: Any) -> bool:
+    """Whether a Warp device is a GPU for which CuPy is installed, and finds the libraries that it calls."""
+    return bool(device.is_cuda) and _cupy_works()
+
+
+@cache
+def _cupy_works() -> bool:
+    try:
+        import cupy
+        import cupyx.scipy.linalg  # noqa: F401
+
+        cupy.linalg.cholesky(cupy.eye(2))
+    except Exception:
+        # whatever keeps an extra from working is no reason to stop: the same is done without it
+        return False
+    return True
+
+
+def _require_memory(device: Any, needed: int) -> None:
+    """Raise `MemoryError` if a GPU has fewer bytes than these that are free, or that CuPy holds and does not use."""
+    import cupy
+
+    with cupy.cuda.Device(device.ordinal) as gpu:
+        pool = cupy.get_default_memory_pool()
+        free = gpu.mem_info[0] + pool.total_bytes() - pool.used_bytes()
+    if needed > free:
+        raise MemoryError(f"{needed / 1e9:.1f} GB of memory of {device.alias} are needed, {free / 1e9:.1f} GB are free")
 
 
 def _on_gpu(columns: Any) -> Any:

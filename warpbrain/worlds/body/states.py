@@ -30,7 +30,6 @@ from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.proposal import Patch
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.factored import KeptFactors
-from warpbrain.simulation.kept_inverse import kept_for
 from warpbrain.simulation.locking import elements_of_fits
 from warpbrain.simulation.model import Material, all_substituted
 from warpbrain.simulation.of_case import model_of
@@ -129,7 +128,7 @@ class States:
         self.realign(self.motion)
         self.modes = stiffness_modes(case.remaining[0], case.heterogeneity or belief("tissue.field"))
         self.solves = 0
-        self._factors: dict[tuple[str, ...], KeptFactors | None] = {}
+        self._factors: dict[tuple[str, ...], KeptFactors] = {}
 
     def realign(self, motion: Floats) -> None:
         """Move recordings back by a rigid motion (6,); see `realigned`."""
@@ -312,15 +311,11 @@ class States:
             return sensors
         return replace(sensors, share=shares[sensors.after] - np.where(sensors.before < 0, 0.0, shares[sensors.before]))
 
-    def _factors_of(self, system: System) -> KeptFactors | None:
-        """Kept while the same mechanisms act: a fit has many states of those, one after the other.
-
-        On a GPU whatever acts: there an inverse is made anew as soon as it helps less.
-        """
-        same = system.model.mechanisms if system.device.is_cpu else ()
-        acting = tuple(type(mechanism).__name__ for mechanism in same)
+    def _factors_of(self, system: System) -> KeptFactors:
+        """Kept while the same mechanisms act: a fit has many states of those, one after the other."""
+        acting = tuple(type(mechanism).__name__ for mechanism in system.model.mechanisms)
         if acting not in self._factors:
-            self._factors = {acting: kept_for(system.device)}
+            self._factors = {acting: KeptFactors()}
         return self._factors[acting]
 
     def _system(self, hypothesis: Hypothesis, case: Case | None = None) -> System:
