@@ -131,8 +131,9 @@ class CoupledSolver:
             x, iterations = x + step, iterations + taken
             system.solution.assign(x[:size].reshape(-1, 3))
             result = self._look(iterations, wanted)
-            if result.converged or taken == 0 or iterations >= _MOST or not np.isfinite(result.residual):
+            if result.converged or iterations >= _MOST or not np.isfinite(result.residual):
                 break
+            # of the whole system less may be left than was asked for, so that no iteration is taken
             tighter *= 0.3 * result.tolerance / result.residual
         self._factors.count(iterations)
         return result
