@@ -9,7 +9,7 @@ from slow_block import CAUSES, PERMEABILITY, TIMES, write_slow
 from warpbrain.arrays import Floats
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, onset_of
-from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.diagnosis.result import EXPLAINED, Diagnosis
 from warpbrain.estimation.parameters import declared
 from warpbrain.physics.mechanisms.drainage import Drainage
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
@@ -59,8 +59,14 @@ def test_what_relaxes_is_found_with_its_times(diagnosed: tuple[str, Diagnosis]) 
     assert found.explained is not None
     [acting] = found.explained.mechanisms
     assert isinstance(acting, Viscoelasticity)
-    # they tell what has not relaxed at the recorded times, and next to nothing of what did before: 0.05 off
-    assert [_left(acting, time) for time in TIMES] == pytest.approx([_left(expected, time) for time in TIMES], abs=0.15)
+    # they tell what has not relaxed at the recorded times, as well as they say
+    best = found.weighted_sets[EXPLAINED]
+    [effect], [(mean, covariance)] = best.effects, best.coefficients
+    draws = np.random.default_rng(5).multivariate_normal(mean, covariance, 400)
+    drawn = [effect.proposed.make(effect.coefficients(z)) for z in draws]
+    for time in TIMES:
+        deviation = np.std([_left(each, time) for each in drawn])
+        assert abs(_left(acting, time) - _left(expected, time)) < 2.5 * deviation < 0.6
     values = {value.name: value for value in found.ranking[0].values}
     together = values["moduli"]
     assert abs(together.value - sum(expected.moduli)) < 2.0 * together.sd
