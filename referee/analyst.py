@@ -14,6 +14,7 @@ import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,12 @@ class Known:
 
     def whiten(self, rows: Floats) -> Floats:
         """From rows (k, rows) to units of all that is not known."""
-        return np.asarray(solve_triangular(self.lower, rows.T, lower=True)).T
+        return whitened(self.lower, rows)
+
+
+def whitened(lower: Floats, rows: Floats) -> Floats:
+    """Rows (k, rows) in units in which noise with this factor (rows, rows) of its covariance is `N(0, I)`."""
+    return np.asarray(solve_triangular(lower, rows.T, lower=True)).T
 
 
 def analyse(labels: Mapping[str, Mapping[str, Any]], out: Path, workers: int) -> None:
@@ -129,10 +135,7 @@ def _known(
     unknown = np.concatenate([OVERALL * tissues.sum(axis=0, keepdims=True), EACH * tissues, others])
     whole = covariance(sight, unknown)
     lower = np.linalg.cholesky(whole)
-
-    def whiten(rows: Floats) -> Floats:
-        return np.asarray(solve_triangular(lower, rows.T, lower=True)).T
-
+    whiten = partial(whitened, lower)
     named, nameless = library(random, setting, Forces(problem, base), response, whiten)
     effects = effects_of(label)
     changes = [first_order(effect, problem, base, setting.times) for effect in effects]

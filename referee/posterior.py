@@ -35,13 +35,10 @@ _TRIED, _NEGLIGIBLE = 8, 25.0
 
 @dataclass(frozen=True, eq=False)
 class _Weighed:
-    """Log density of rows with causes and any mistakes, and the most probable of these (g,).
+    """A set of causes, weighed with some mistakes."""
 
-    It is known exactly if these are the ones with which the causes were weighed.
-    """
-
-    summed: float
-    mistakes: Bools
+    summed: float  # log density of the rows, summed over which points are mistaken, and log prior
+    mistakes: Bools  # (g,), the most probable ones beside these causes
 
 
 class Analyst:
@@ -96,7 +93,7 @@ class Analyst:
         rows = self._lower @ w
         log, wrong = self._mixture.log_density(rows)
         logs: dict[Causes, float] = {(): log + float(np.log(self._none))}
-        logs |= {causes: found.summed for causes, found in self._weighed(w, wrong).items()}
+        logs |= {causes: weighed.summed for causes, weighed in self._weighed(w, wrong).items()}
         for k, (mixture, volume) in enumerate(self._traps):
             logs[NOT_PHYSICS, str(k)] = mixture.log_density(rows, wrong)[0] + volume + float(np.log(self._trap))
         p = dict(zip(logs, softmax(list(logs.values())).tolist(), strict=True))
@@ -105,37 +102,37 @@ class Analyst:
 
     def _weighed(self, w: Floats, wrong: Bools) -> dict[Causes, _Weighed]:
         """Every set of causes with the best of the mistakes that were tried."""
-        found: dict[Causes, _Weighed] = {}
+        best: dict[Causes, _Weighed] = {}
         waiting, tried = [wrong, np.zeros_like(wrong)], set[bytes]()
         while waiting and len(tried) < _TRIED:
             mistakes = waiting.pop(0)
             if mistakes.tobytes() in tried:
                 continue
             tried.add(mistakes.tobytes())
-            least = max((each.summed for each in found.values()), default=-np.inf) - _NEGLIGIBLE
+            least = max((each.summed for each in best.values()), default=-np.inf) - _NEGLIGIBLE
             for causes in self._causes:
                 # all of them with the first two
-                if len(tried) < 3 or found[causes].summed > least:
-                    told = self._try(w, causes, mistakes)
-                    if causes not in found or told.summed > found[causes].summed:
-                        found[causes] = told
+                if len(tried) < 3 or best[causes].summed > least:
+                    weighed = self._try(w, causes, mistakes)
+                    if causes not in best or weighed.summed > best[causes].summed:
+                        best[causes] = weighed
             if not waiting:
-                likely = sorted(found.values(), key=lambda each: -each.summed)
+                likely = sorted(best.values(), key=lambda each: -each.summed)
                 waiting = [each.mistakes for each in likely if each.mistakes.tobytes() not in tried]
-        return found
+        return best
 
     def _try(self, w: Floats, causes: Causes, wrong: Bools) -> _Weighed:
         """Weigh a set of causes with some mistakes."""
         log_prior, weigh, draws = self._causes[causes]
         lost, rows = self._lost(wrong), self._lower @ w
-        told = weigh(w, lost)
-        if not told.members:
+        evidence = weigh(w, lost)
+        if not evidence.members:
             return _Weighed(-np.inf, wrong)
         # with no cause, but for where it leaves the mistaken points
         log = self._mixture.log_joint(rows, wrong) - float(lost.log_density(lost.at(w[None]))[0])
-        log += told.log + log_prior
+        log += evidence.log + log_prior
         change = np.zeros_like(w)
-        for each, (k, size) in zip(draws, told.members, strict=True):
+        for each, (k, size) in zip(draws, evidence.members, strict=True):
             change += size * each.directions[k]
         left = rows - self._lower @ change
         summed, mistakes = self._mixture.log_density(left, wrong)

@@ -102,10 +102,8 @@ class FitSearch:
         # of the last state of this fit that was followed over time
         self._course: tuple[Floats, ...] = ()
         self.columns = columns
-        # the linear model about the last state that had one, the coefficients of effects there, and whether the
-        # columns of the shape of laws are of that
+        # the linear model about a state, and the coefficients of effects there, until columns of laws are made of it
         self._about: tuple[Linearisation, tuple[Floats, ...]] | None = None
-        self._laws_are_about = True
         # where the error of the mesh was computed last
         self._mesh_error_at: Floats | None = None
         self.state, self.converged = base.state, False
@@ -305,12 +303,12 @@ class FitSearch:
 
         While an optimum is looked for they are fixed: renewed on the way, they would change the objective.
         """
-        if self._about is None or self._laws_are_about:
+        if self._about is None:
             return
         law, (at, coefficients) = self._layout.law, self._about
         before = self._U[:, law]
         columns = law_columns_about(at, self.effects, coefficients, self._base.states, self.mesh_errors)
-        self._laws_are_about = True
+        self._about = None
         residual = self.residual + (before - columns) @ self.z[law]
         self._U, self.columns = self._U.copy(), self.columns.copy()
         self._U[:, law] = self.columns[:, law] = columns
@@ -434,7 +432,7 @@ class FitSearch:
             )
         except SolveError:
             return
-        self.columns, self._nearby, self._laws_are_about = columns, at, False
+        self.columns, self._nearby = columns, at
         self._about = at, tuple(self.z[part] for part in self._layout.effects)
 
     def _difference_columns(self) -> Floats:

@@ -67,13 +67,21 @@ def best_in_cell(
 
     best = effect
     tried, logs = logs_of(_cell(base, effect, spacing))
-    total = float(np.logaddexp.reduce(logs))
-    gain, log_share = total - float(np.log(len(logs)) + logs[0]), float(logs.max()) - total
+    gain, log_share = _summed_over_cell(logs)
     best = tried[int(np.argmax(logs))]
     if not effect.proposed.on_surface:
         tried, logs = logs_of(_around(base, best.proposed, 0.25 * spacing))
         best = tried[int(np.argmax(logs))]
     return best, gain, log_share
+
+
+def _summed_over_cell(logs: Floats) -> tuple[float, float]:
+    """By how much [nats] the mean over the places of a cell exceeds the first, and the log of the best one's share.
+
+    `logs` (k,): log density with the cause at each place, the middle of the cell first.
+    """
+    total = float(np.logaddexp.reduce(logs))
+    return total - float(np.log(len(logs)) + logs[0]), float(logs.max()) - total
 
 
 def _effects_of(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect]:
@@ -111,9 +119,13 @@ def _cell(base: Base, effect: Effect, spacing: float) -> list[Proposal]:
 def _around(base: Base, proposed: Proposal, step: float) -> list[Proposal]:
     """Proposals a step from another one along each principal axis of the body, corners of that cube among them."""
     assert proposed.centre is not None
+    return _with_radii(proposed, proposed.centre + _cube(base, step))
+
+
+def _cube(base: Base, step: float) -> Floats:
+    """Offsets (27, 3) [m] of none and of a step to either side along each principal axis of the body, none first."""
     axes = principal_axes(base.at.system.model.mesh.points)
-    offsets = step * np.array(list(itertools.product((0.0, -1.0, 1.0), repeat=3))) @ axes
-    return _with_radii(proposed, proposed.centre + offsets)
+    return np.asarray(step * np.array(list(itertools.product((0.0, -1.0, 1.0), repeat=3))) @ axes)
 
 
 def _with_radii(proposed: Proposal, centres: Floats) -> list[Proposal]:
@@ -256,9 +268,10 @@ def with_refined_places(
 
 
 def with_refined_strain(base: Base, candidate: WeightedSet, causes: BodyCauses, spacing: float) -> WeightedSet:
-    """The set of the unknown alone with its strain, if it is one in one place, at the best place in its cell.
+    """The set of the unknown alone, with a strain in one place moved to the best place in its cell of the scan.
 
-    As mechanisms are: what has none of its own would otherwise lose to a name that may be anywhere.
+    Unchanged if the unknown is a field throughout the body. Mechanisms are placed as finely (`with_refined_places`),
+    and would otherwise be preferred for their places alone.
 
     `causes`: those that were weighed. `spacing`: between the places of the scan [m].
     """
@@ -268,28 +281,26 @@ def with_refined_strain(base: Base, candidate: WeightedSet, causes: BodyCauses, 
     if number < 0:
         return candidate
     columns = causes.columns(member)
+    others = candidate.columns[:, : -columns.shape[1]]
     # how many times a column of 1 m it is, on each row: its size and its course in time
     own = strains.columns[number]
     factor = np.divide((columns * own).sum(axis=1), (own**2).sum(axis=1), where=own.any(axis=1), out=np.zeros(len(own)))
-    axes = principal_axes(base.at.system.model.mesh.points)
-    offsets = 0.5 * spacing * np.array(list(itertools.product((0.0, -1.0, 1.0), repeat=3)))[1:] @ axes
-    tried = [columns, *(factor[:, None] * each for each in strains.at_centres(strains.centres[number] + offsets))]
-    without = GaussianModel(
-        candidate.marginal.model.noise_factor, candidate.columns[:, : -columns.shape[1]], candidate.marginal.scale
-    )
+    elsewhere = strains.at_centres(strains.centres[number] + _cube(base, 0.5 * spacing)[1:])
+    tried = [columns, *(factor[:, None] * each for each in elsewhere)]
+    without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
     rows = PointRows(without, candidate.residual, base.points)
-    logs = np.array(
-        in_threads(
-            lambda each: rows.with_gross_errors(outliers(), further=FurtherColumns(rows, each)).log_density, tried
-        )
-    )
-    gain = float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs[0])
-    moved = np.column_stack([candidate.columns[:, : -columns.shape[1]], tried[int(np.argmax(logs))]])
+
+    def log_density(each: Floats) -> float:
+        return rows.with_gross_errors(outliers(), further=FurtherColumns(rows, each)).log_density
+
+    logs = np.array(in_threads(log_density, tried))
+    gain, log_share = _summed_over_cell(logs)
+    moved = np.column_stack([others, tried[int(np.argmax(logs))]])
     moved, refined = evidence_of(base, moved, candidate.residual, candidate.marginal.scale)
-    log_share = candidate.log_share + float(logs.max() - np.logaddexp.reduce(logs))
-    return replace(candidate, columns=moved, marginal=refined, log_share=log_share, refined=True).with_evidence(
-        candidate.hypothesis.log_evidence + gain
+    candidate = replace(
+        candidate, columns=moved, marginal=refined, log_share=candidate.log_share + log_share, refined=True
     )
+    return candidate.with_evidence(candidate.hypothesis.log_evidence + gain)
 
 
 def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:

@@ -108,7 +108,7 @@ class Strains:
         parts = self._parts(self.centres)
         rows = at.sensors.is_displacement
         rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
-        sizes = [max(_size(part[rows]), 1e-300) for part in parts]
+        sizes = [max(_root_mean_square(part[rows]), 1e-300) for part in parts]
         count = sum(part.shape[1] for part in parts)
         self._units = [np.sqrt(part.shape[1] / count) / size for part, size in zip(parts, sizes, strict=True)]
         self.columns = self._joined(parts)  # (n, 6) of each place
@@ -131,8 +131,8 @@ class Strains:
         return [deviatoric, at.answers_of_elements(at.growth_forces, weights)[:, None]]
 
 
-def _size(columns: Floats) -> float:
-    """Root mean square over rows and places (n, k, s) of what all components (k) together move."""
+def _root_mean_square(columns: Floats) -> float:
+    """Of what all components (k) together move, over rows and places: of columns (n, k) or (n, k, s)."""
     return float(np.sqrt(np.mean(np.sum(columns**2, axis=1))))
 
 
@@ -213,4 +213,4 @@ def _visible_modes(columns: Floats, rows: Bools) -> Floats:
     total = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
     kept = min(int(np.searchsorted(total, 1.0 - belief("unknown.cut"))) + 1, int(belief("unknown.modes")))
     modes = columns @ (columns[rows].T @ (vectors[:, :kept] / np.maximum(sizes[:kept], 1e-300)))
-    return np.asarray(modes / max(float(np.sqrt(np.mean(np.sum(modes[rows] ** 2, axis=1)))), 1e-300))
+    return np.asarray(modes / max(_root_mean_square(modes[rows]), 1e-300))
