@@ -18,43 +18,37 @@ from warpbrain.threads import thread_count
 
 
 class SparseFactors:
-    """Factors `L D L^T` of a symmetric matrix, or `L U` of another, SciPy sparse (n, n).
+    """Factors `L D L^T` of a symmetric matrix, SciPy sparse (n, n), whose lower triangle is read.
 
-    Of a symmetric one the lower triangle is read. `RuntimeError` if it is singular.
+    `RuntimeError` if it is singular.
     """
 
-    def __init__(self, matrix: Any, symmetric: bool = True) -> None:
+    def __init__(self, matrix: Any) -> None:
         from scipy.sparse import tril
 
         if _is_fork:
-            self._solve = self._by_superlu(matrix, symmetric)
+            self._solve = _by_superlu(matrix)
             return
-        import rslab
 
         global _is_used
         _is_used = True
-        pattern = (tril(matrix) if symmetric else matrix).tocsc().astype(np.float64)
+        pattern = tril(matrix).tocsc().astype(np.float64)
         pattern.sum_duplicates()
-        if symmetric:
-            factors = _analysed(pattern).factor(pattern.data)
-            self._solve = factors.solve_many
-        else:
-            self._solve = rslab.lu(pattern, threads=thread_count()).solve_many
-
-    def _by_superlu(self, matrix: Any, symmetric: bool) -> Callable[[Floats], Floats]:
-        from scipy.sparse.linalg import splu
-
-        options = {"SymmetricMode": True}
-        factors = splu(
-            matrix.tocsc().astype(np.float64), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
-        )
-        return factors.solve
+        self._solve = _analysed(pattern).factor(pattern.data).solve_many
 
     def solve(self, columns: Floats) -> Floats:
         """Solution (n,) or (n, k) for right-hand sides (n,) or (n, k), an array of which Fortran order is faster."""
         columns = np.asarray(columns, dtype=np.float64)
         solution = np.asarray(self._solve(np.asfortranarray(columns.reshape(len(columns), -1))))
         return solution.reshape(columns.shape)
+
+
+def _by_superlu(matrix: Any) -> Callable[[Floats], Floats]:
+    from scipy.sparse.linalg import splu
+
+    options = {"SymmetricMode": True}
+    A = matrix.tocsc().astype(np.float64)
+    return splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).solve
 
 
 #: Symbolic analyses of the last symmetric patterns, a quarter of the work each: a body has one for all of its states.

@@ -36,10 +36,16 @@ def test_a_singular_matrix_is_said():
         Factors(csr_array(np.ones((3, 3))))
 
 
-def test_the_transposed_of_a_matrix_that_is_not_symmetric():
+@pytest.mark.parametrize("transposed", [False, True])
+def test_a_skew_part_of_few_rows(transposed):
     dense, rng = _matrix()
-    dense[3, 5:9] += 0.5
-    columns = rng.normal(size=(60, 20))
-    factors = Factors(csr_array(dense), symmetric=False)
-    np.testing.assert_allclose(dense @ factors.solve(columns), columns, atol=1e-10)
-    np.testing.assert_allclose(dense.T @ factors.solve(columns, transposed=True), columns, atol=1e-10)
+    skew = np.zeros((60, 60))
+    some = rng.choice(60, 9, replace=False)
+    half = rng.normal(size=(9, 9))
+    skew[np.ix_(some, some)] = half - half.T
+    columns = rng.normal(size=(60, 300))
+    factors = Factors(csr_array(dense), skew=csr_array(skew))
+    A = dense - skew if transposed else dense + skew
+    np.testing.assert_allclose(A @ factors.solve(columns, transposed), columns, atol=1e-10)
+    between = factors.between(csr_array(columns.T), csr_array(columns))
+    np.testing.assert_allclose(between, columns.T @ np.linalg.solve(dense + skew, columns), atol=1e-8)

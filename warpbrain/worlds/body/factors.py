@@ -5,17 +5,24 @@ On a host forces that are sparse are taken in blocks of columns, which are dense
 for which CuPy, an extra, is installed has the Cholesky factor of all 15,000 rows, zeros included, by cuSOLVER in a
 twentieth of that, and a thousand right-hand sides as soon. It takes memory of three such matrices, so what is larger
 stays on the host.
+
+A pressure on a surface whose rim moves has a skew part `N` of the nodes of the rim alone. With the few rows `R` of it,
+`Y = S^-1 E_R` and `x = S^-1 b` (Sherman, Morrison and Woodbury; Golub and Van Loan 2013, section 2.1.4)
+
+    (S + N)^-1 b = x - Y (I + N_RR Y_R)^-1 N_RR x_R
+
+and of the transposed the same with `-N`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache, cached_property
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import SolveError
 from warpbrain.simulation.sparse_factors import SparseFactors
 
@@ -127,56 +134,67 @@ def _on_gpu(columns: Any) -> Any:
 
 
 class Factors:
-    """Factors of a positive definite matrix, symmetric if they are on a GPU, all but symmetric on the host.
+    """Factors of a symmetric positive definite matrix, to which a skew one of few rows may be added.
 
-    `matrix` SciPy sparse matrix (n, n). `device`: a GPU that may hold them; the host unless given. `symmetric`: whether
-    the matrix is exactly that. `SolveError` if it is singular.
+    `matrix` SciPy sparse (n, n). `device`: a GPU that may hold them; the host unless given. `skew` SciPy sparse (n, n):
+    `N`. `SolveError` if the matrix is singular.
     """
 
-    def __init__(self, matrix: Any, device: Any = None, symmetric: bool = True) -> None:
-        self._skew = None if symmetric else matrix
-        self._dense = None if device is None else dense_factors(matrix, device)
-        if self._dense is not None:
-            return
-        try:
-            self._factors = SparseFactors(matrix, symmetric)
-        except RuntimeError as error:
-            raise SolveError(f"the state is unstable: its tangent stiffness cannot be factorised ({error})") from None
+    def __init__(self, matrix: Any, device: Any = None, skew: Any = None) -> None:
+        self._factors: DenseFactors | SparseFactors | None = None if device is None else dense_factors(matrix, device)
+        if self._factors is None:
+            try:
+                self._factors = SparseFactors(matrix)
+            except RuntimeError as error:
+                why = f"the state is unstable: its tangent stiffness cannot be factorised ({error})"
+                raise SolveError(why) from None
+        self._skew = None
+        if skew is not None and skew.count_nonzero():
+            rows = np.unique(skew.tocoo().row)
+            units = np.zeros((matrix.shape[0], len(rows)), order="F")
+            units[rows, np.arange(len(rows))] = 1.0
+            self._skew = _SkewPart(rows, skew.tocsr()[rows][:, rows].toarray(), self._factors.solve(units))
 
     def solve(self, columns: Any, transposed: bool = False) -> Floats:
         """Solution (n, k) for right-hand sides (n, k), an array or SciPy sparse, in Fortran order.
 
         `transposed`: with the transposed matrix.
         """
-        if transposed and self._skew is not None:
-            return self._transposed.solve(columns)
-        if self._dense is not None:
-            return self._dense.solve(columns)
-        return self._filled(columns, columns.shape[0], lambda solution: solution)
-
-    @cached_property
-    def _transposed(self) -> Factors:
-        """Factors of the transposed: by those of the matrix one column after the other would be answered.
-
-        That takes longer than new factors for as many columns as there are sensors.
-        """
-        assert self._skew is not None
-        return Factors(self._skew.T, symmetric=False)
+        return self._filled(columns, columns.shape[0], None, transposed)
 
     def between(self, left: Any, columns: Any) -> Floats:
         """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k), dense a block at a time only."""
-        if self._dense is not None:
-            return self._dense.between(left, columns)
-        return self._filled(columns, left.shape[0], lambda solution: left @ solution)
+        return self._filled(columns, left.shape[0], left, False)
 
-    def _filled(self, columns: Any, rows: int, of: Callable[[Floats], Floats]) -> Floats:
-        """A function of the solution for each block of columns, side by side."""
+    def _filled(self, columns: Any, rows: int, left: Any, transposed: bool) -> Floats:
+        """Solutions, or their product with a matrix on the left, for one block of columns after the other."""
         from scipy.sparse import issparse
 
+        if isinstance(self._factors, DenseFactors) and self._skew is None:
+            return self._factors.solve(columns) if left is None else self._factors.between(left, columns)
         columns = columns.tocsc() if issparse(columns) else columns
         result = np.empty((rows, columns.shape[1]), order="F")
+        assert self._factors is not None
         for first in range(0, columns.shape[1], _TOGETHER):
             part = slice(first, first + _TOGETHER)
             block = columns[:, part].toarray() if issparse(columns) else columns[:, part]
-            result[:, part] = of(self._factors.solve(block))
+            solution = self._factors.solve(block)
+            if self._skew is not None:
+                solution -= self._skew.correction(solution, transposed)
+            result[:, part] = solution if left is None else left @ solution
         return result
+
+
+@dataclass(frozen=True, eq=False)
+class _SkewPart:
+    """`N_RR` (r, r), the numbers of its rows (r,), and `Y` (n, r)."""
+
+    rows: Ints
+    matrix: Floats
+    of_rows: Floats
+
+    def correction(self, solution: Floats, transposed: bool) -> Floats:
+        """What is taken off a solution (n, k) with the symmetric part alone."""
+        N = -self.matrix if transposed else self.matrix
+        inner = np.eye(len(N)) + N @ self.of_rows[self.rows]
+        return np.asarray(self.of_rows @ np.linalg.solve(inner, N @ solution[self.rows]))
