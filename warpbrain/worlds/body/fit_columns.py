@@ -14,7 +14,15 @@ from warpbrain.worlds.body.dictionary import is_linear
 from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, parts_of, width_of
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
-from warpbrain.worlds.body.nuisances import LAW, Nuisances, field_columns, law_columns, mesh_by_tissue, tissue_columns
+from warpbrain.worlds.body.nuisances import (
+    LAW,
+    Nuisances,
+    field_columns,
+    law_column,
+    law_columns,
+    mesh_by_tissue,
+    tissue_columns,
+)
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState, States
 from warpbrain.worlds.body.weighted_set import MeshShare, Refit
@@ -32,6 +40,9 @@ class Layout:
     effects: tuple[slice, ...]  # coefficients of each effect
     linear: Bools  # (q + e,), which of the first act linearly: all but tissue and field
     nonlinear: Bools  # (q + e + k,), which act through an equilibrium
+    #: Coordinates of the law's shape that an effect says, too: each with that of the effect, and how many times the
+    #: column of the effect its own is.
+    shared: tuple[tuple[int, int, float], ...]
 
     @classmethod
     def of(cls, nuisances: Nuisances, count: int, effects: Sequence[Effect]) -> Layout:
@@ -40,8 +51,18 @@ class Layout:
         linear = np.ones(count, dtype=bool)
         linear[tissue] = linear[field] = False
         nonlinear = np.concatenate([~linear, np.ones(width_of(effects), dtype=bool)])
-        law = nuisances.part(LAW)
-        return cls(tissue, field, law, slice(count, None), column_slices(effects, count), linear, nonlinear)
+        law, parts = nuisances.part(LAW), column_slices(effects, count)
+        known = ((law_column(effect), part.start) for effect, part in zip(effects, parts, strict=True))
+        shared = tuple((law.start + number[0], at, number[1]) for number, at in known if number is not None)
+        return cls(tissue, field, law, slice(count, None), parts, linear, nonlinear, shared)
+
+    def without_shared(self, z: Floats) -> Floats:
+        """Coordinates (q + e + k,) where what an effect says as well is said by the effect alone."""
+        z = z.copy()
+        for law, effect, ratio in self.shared:
+            z[effect] += ratio * z[law]
+            z[law] = 0.0
+        return z
 
 
 def columns_about(
@@ -108,10 +129,15 @@ def law_columns_about(
     """Columns (n, k) of the shape of laws about a state with effects that have these coefficients.
 
     What that does is next to nothing where strains are small: about the base, which nothing but declared loads deforms.
-    It is not where a mechanism strains tissue by half, and would be taken for a cause.
+    It is not where a mechanism strains tissue by half, and would be taken for a cause. Of a number of the law that
+    an effect says the column is zero.
     """
     relaxed = _relaxation_factor(effects, coefficients, at.sensors)
-    return relaxed * law_columns(Effects(at, mesh_errors=mesh_errors), states)
+    columns = relaxed * law_columns(Effects(at, mesh_errors=mesh_errors), states)
+    for effect in effects:
+        if (law := law_column(effect)) is not None:
+            columns[:, law[0]] = 0.0
+    return columns
 
 
 def _relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats], sensors: Sensors) -> Floats:

@@ -18,7 +18,6 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.inference.beliefs import belief
-from warpbrain.inference.gross_errors import Marginal
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.multisecant import extrapolated
@@ -29,7 +28,7 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
-from warpbrain.worlds.body.weighted_set import MeshShare, Refit, evidence_of, excess_error, mesh_share_of
+from warpbrain.worlds.body.weighted_set import MeshShare, Refit, SetMarginal, evidence_of, excess_error, mesh_share_of
 
 _ITERATIONS = 20
 #: Trials along a step; along one from columns that were made elsewhere, which may point uphill.
@@ -77,13 +76,16 @@ class FitSearch:
         mesh_errors: MeshErrors | None,
         effects: tuple[Effect, ...],
         columns: Floats,
-        screened: Marginal,
+        screened: SetMarginal,
     ) -> None:
         self._base, self.mesh_errors, self.effects = base, mesh_errors, effects
         self._marginal, self._noise = screened, screened.noise
         nuisances = base.nuisances
-        self._U = columns[:, : columns.shape[1] - width_of(effects)]
-        self._layout = Layout.of(nuisances, self._U.shape[1], effects)
+        count = columns.shape[1] - width_of(effects)
+        self._layout = Layout.of(nuisances, count, effects)
+        columns = columns.copy()
+        columns[:, [law for law, _, _ in self._layout.shared]] = 0.0
+        self._U = columns[:, :count]
         # recordings were realigned by a rigid motion already, which keeps its prior cost as coordinates; another one is
         # no linear change of what moved far
         self._rigid = RigidMotion(base.states, nuisances)
@@ -113,7 +115,7 @@ class FitSearch:
         """Take the best of some coordinates, within limits."""
         self._best = np.inf
         for number, start in enumerate(starts, 1):
-            z = self._clipped(start)
+            z = self._clipped(self._layout.without_shared(start))
             try:
                 self._accept_if_better(z, *self._evaluate(z, nearby))
             except (SolveError, InputError):
@@ -276,7 +278,7 @@ class FitSearch:
         """The fit at its best point."""
         q = self._U.shape[1]
         linear = self.residual + self.columns @ self.z
-        columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.scale)
+        columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.scale, self._marginal.sizes)
         part, z = self._base.nuisances.part(UNKNOWN_MESH), self.z.copy()
         z[part] = evidence.coordinates(linear)[part]
         W = self._noise.whitened(columns)
@@ -464,7 +466,7 @@ class Fitter:
         effects: tuple[Effect, ...],
         columns: Floats,
         starts: Sequence[Floats],
-        screened: Marginal,
+        screened: SetMarginal,
         nearby: SolvedState | None = None,
         subset: Refit | None = None,
     ) -> Refit:

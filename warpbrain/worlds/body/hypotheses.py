@@ -119,7 +119,7 @@ class HypothesisSearch:
             models.append(GaussianModel(noise_factor, base.nuisances.columns))
         for model in models:
             screened = posterior(model, base.residual, self._visible.causes, _search(most=2))
-            work = partial(weigh, base, causes=self._visible, screened=model)
+            work = partial(weigh, base, causes=self._visible, screened=model, sizes=nothing.sizes)
             for candidate in in_threads(work, _most_probable(screened)):
                 _keep_better(self._sets, candidate)
         # a local cause that has been missed by half a cell seems to do nothing
@@ -247,7 +247,7 @@ class HypothesisSearch:
         begun, reduced = superset.refit, superset
         assert begun is not None
         for mechanism in mechanisms:
-            begun = begun.without(reduced.mechanisms.index(mechanism))
+            begun = begun.without(reduced.mechanisms.index(mechanism), self.base)
             reduced = reduced.without(mechanism, self.base)
         screened = reduced.marginal
         try:
@@ -330,7 +330,7 @@ class HypothesisSearch:
         hypotheses = [hypothesis for hypothesis in _most_probable(screened, singles=False) if hypothesis.causes]
 
         def work(hypothesis: Hypothesis) -> WeightedSet:
-            candidate = weigh(self.base, hypothesis, causes, unscaled, fitted)
+            candidate = weigh(self.base, hypothesis, causes, unscaled, fitted.marginal.sizes, fitted)
             return with_refined_places(self.base, candidate, self.spacing, source, len(fitted.effects))
 
         for hypothesis, candidate in zip(hypotheses, in_threads(work, hypotheses), strict=True):

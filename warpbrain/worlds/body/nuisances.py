@@ -23,7 +23,7 @@ from warpbrain.physics.laws.ogden import NEO_HOOKEAN, Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import Proposal
-from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
@@ -31,6 +31,8 @@ from warpbrain.worlds.body.states import Hypothesis, States
 
 #: The family of what is not known of the shape of tissues' laws.
 LAW = "shape of the law"
+#: Beliefs of its first columns, each of which is a mechanism that every tissue has to a degree.
+_ALWAYS = ("tissue.volume", "tissue.exponent")
 #: The family of what is not known of the mesh's error, and that of mechanisms' shares of it, which only fits have.
 UNKNOWN_MESH, MESH_SHARE = "mesh, unknown", "mesh, of mechanisms"
 #: Exponent of what stiffens in both directions.
@@ -167,14 +169,26 @@ def field_columns(at: Linearisation, states: States) -> Floats:
 def law_columns(effects: Effects, states: States) -> Floats:
     """What another Poisson ratio, exponent, share of the second invariant and stiffening change: (n, 4)."""
     proposals = [
-        other_volume(states),
-        _always(states, "tissue.exponent"),
+        *(_always(states, key) for key in _ALWAYS),
         Proposal.of_one(
             lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
         ),
         Proposal.of_one(lambda share: _Stiffening(share=share), 0.5, belief("tissue.stiffening"), "smooth", 0.5),
     ]
     return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
+
+
+def law_column(effect: Effect) -> tuple[int, float] | None:
+    """Number of the column of the shape of laws that an effect says, too, and how many times its own that is.
+
+    A cause that is a number of the law is that number with a wider prior, not another one beside it: both at once would
+    be a number twice, once linear and once not. None if no column is.
+    """
+    proposal = effect.proposed
+    key = proposal.make(proposal.mean).always if len(proposal.mean) == 1 else ""
+    if key not in _ALWAYS or proposal.over_time is not None:
+        return None
+    return _ALWAYS.index(key), belief(key) / float(proposal.sd[0])
 
 
 def other_volume(states: States) -> Proposal:

@@ -170,6 +170,7 @@ def weigh(
     hypothesis: Hypothesis,
     causes: BodyCauses,
     screened: GaussianModel,
+    sizes: tuple[int, int],
     about: WeightedSet | None = None,
 ) -> WeightedSet:
     """A hypothesis of screening in the linear model about the base, or about a fit, with gross errors of its own.
@@ -178,12 +179,12 @@ def weigh(
     log evidence: the mean over its likeliest places, since points that a local cause moves far are gross errors where
     it is thought to be elsewhere.
 
-    `causes`: those that were screened. `screened`: of the rows without them. `about`: a fitted set, whose causes act
-    beside those of the hypothesis; the base, where no cause acts, unless given.
+    `causes`: those that were screened. `screened`: of the rows without them. `sizes`: see `evidence_of`. `about`: a
+    fitted set, whose causes act beside those of the hypothesis; the base, where no cause acts, unless given.
     """
     configurations = (hypothesis.best, *hypothesis.elsewhere)
     weighed = [
-        _weigh_at(base, replace(hypothesis, best=configuration), causes, screened, about)
+        _weigh_at(base, replace(hypothesis, best=configuration), causes, screened, sizes, about)
         for configuration in configurations
     ]
     shares = np.array([configuration.log_density for configuration in configurations])
@@ -196,7 +197,12 @@ def weigh(
 
 
 def _weigh_at(
-    base: Base, hypothesis: Hypothesis, causes: BodyCauses, screened: GaussianModel, about: WeightedSet | None
+    base: Base,
+    hypothesis: Hypothesis,
+    causes: BodyCauses,
+    screened: GaussianModel,
+    sizes: tuple[int, int],
+    about: WeightedSet | None,
 ) -> WeightedSet:
     """The same as if its best configuration stood for all places."""
     acting: tuple[Effect, ...]
@@ -218,7 +224,7 @@ def _weigh_at(
     columns = np.column_stack(
         [model_columns[:, :split], *linear, model_columns[:, split:], *(effect.columns for effect in added)]
     )
-    columns, result = evidence_of(base, columns, residual, hypothesis.best.scale)
+    columns, result = evidence_of(base, columns, residual, hypothesis.best.scale, sizes)
     return WeightedSet(
         replace(hypothesis, log_evidence=hypothesis.log_evidence + result.log_evidence - log_screened),
         (*acting, *added),
@@ -254,7 +260,7 @@ def with_refined_places(
         columns = candidate.columns.copy()
         columns[:, part] = best.columns
         residual = residual - best.mean
-        columns, refined = evidence_of(base, columns, residual, candidate.marginal.scale)
+        columns, refined = evidence_of(base, columns, residual, candidate.marginal.scale, candidate.marginal.sizes)
         effects[number] = best
         candidate = replace(
             candidate,
@@ -296,7 +302,7 @@ def with_refined_strain(base: Base, candidate: WeightedSet, causes: BodyCauses, 
     logs = np.array(in_threads(log_density, tried))
     gain, log_share = _summed_over_cell(logs)
     moved = np.column_stack([others, tried[int(np.argmax(logs))]])
-    moved, refined = evidence_of(base, moved, candidate.residual, candidate.marginal.scale)
+    moved, refined = evidence_of(base, moved, candidate.residual, candidate.marginal.scale, candidate.marginal.sizes)
     candidate = replace(
         candidate, columns=moved, marginal=refined, log_share=candidate.log_share + log_share, refined=True
     )

@@ -31,7 +31,7 @@ from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, mar
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
-from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
+from warpbrain.worlds.body.nuisances import LAW, UNKNOWN_MESH, law_column
 from warpbrain.worlds.body.states import SolvedState
 
 #: The sum over sizes ends where a term is below this part of the largest.
@@ -115,7 +115,7 @@ class Refit:
     residual: Floats
     linear: Floats  # (n,), residual of the linear model about that point, with all coordinates at zero
     columns: Floats  # (n, q + k), of that model
-    marginal: Marginal  # its Laplace evidence, the scale of the noise and gross errors
+    marginal: SetMarginal  # its Laplace evidence, the scale of the noise and gross errors
     converged: bool
     #: Part of the error of the mesh that belongs to its mechanisms, if that is known.
     mesh_share: MeshShare | None = None
@@ -125,10 +125,12 @@ class Refit:
         """Laplace approximation."""
         return self.marginal.log_evidence
 
-    def without(self, number: int) -> Refit:
+    def without(self, number: int, base: Base) -> Refit:
         """The same point without one of its effects, from which a set without it is fitted."""
         part = column_slices(self.effects, 0)[number]
-        share = self.mesh_share
+        share, nuisances = self.mesh_share, self.nuisances.copy()
+        if (law := law_column(self.effects[number])) is not None:
+            nuisances[base.nuisances.part(LAW).start + law[0]] += float(self.coefficients[number][0]) / law[1]
 
         def others(values: tuple[Any, ...]) -> tuple[Any, ...]:
             return values[:number] + values[number + 1 :]
@@ -136,18 +138,30 @@ class Refit:
         return replace(
             self,
             effects=others(self.effects),
+            nuisances=nuisances,
             coefficients=others(self.coefficients),
             covariances=others(self.covariances),
             mesh_share=None if share is None else share.with_fixed(part, self.coefficients[number]),
         )
 
 
-def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.0) -> tuple[Floats, Marginal]:
+@dataclass(frozen=True, eq=False)
+class SetMarginal(Marginal):
+    """The evidence of a set, and which sizes of what is not known of the mesh's error are the most probable."""
+
+    #: Numbers of the size of the smooth part, and of that which the mesh does not resolve.
+    sizes: tuple[int, int]
+
+
+def evidence_of(
+    base: Base, columns: Floats, residual: Floats, scale: float = 1.0, sizes: tuple[int, int] | None = None
+) -> tuple[Floats, SetMarginal]:
     """Evidence of residuals, and the columns with the most probable size of the smooth part.
 
     `columns` (n, q): of nuisances and causes. `residual` (n,): less what is expected of the causes. `scale`: a factor
-    on the noise near the most probable one. Returns the columns (n, q), and the marginal with these columns and the
-    most probable noise; its log evidence is the mean over all sizes.
+    on the noise near the most probable one. `sizes`: numbers of sizes near the most probable ones, where sums begin;
+    those of `base` unless given. Returns the columns (n, q), and the marginal with these columns and the most probable
+    noise; its log evidence is the mean over all sizes.
     """
     nuisances, fractions = base.nuisances, beliefs("mesh.unknown")
     part = nuisances.part(UNKNOWN_MESH)
@@ -177,12 +191,14 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
             summed[fraction, noise] = rows(noise).summed(float(fractions[fraction]), *near)
         return summed[fraction, noise].log_evidence
 
-    first = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction))))
-    by_fraction = outward(lambda number: log_evidence(number, 0), first, len(fractions), _NEGLIGIBLE)
-    best = int(np.argmax(by_fraction))
-    by_noise = outward(lambda number: log_evidence(best, number), 0, len(base.noises), _NEGLIGIBLE)
+    if sizes is None:
+        sizes = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction)))), 0
+    best, noise = sizes if moving else (0, sizes[1])
+    by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
+    best, first = int(np.argmax(by_fraction)), noise
+    by_noise = outward(lambda number: log_evidence(best, number), first, len(base.noises), _NEGLIGIBLE)
     noise = int(np.argmax(by_noise))
-    if noise > 0:
+    if noise != first:
         by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
         best = int(np.argmax(by_fraction))
     # as if the evidence were a product of what depends on one size, and on the other
@@ -190,7 +206,10 @@ def evidence_of(base: Base, columns: Floats, residual: Floats, scale: float = 1.
         columns = nuisances.with_family(UNKNOWN_MESH, columns, fractions[best] * relative)
     marginal = marginal_of(base.noises[noise].of_noise(columns), base.points, summed[best, noise])
     means = [float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs.max()) for logs in (by_fraction, by_noise)]
-    return columns, replace(marginal, log_evidence=marginal.log_evidence + sum(means))
+    log_evidence_of_all = marginal.log_evidence + sum(means)
+    return columns, SetMarginal(
+        log_evidence_of_all, marginal.scale, marginal.inflation, marginal.model, marginal.count, (best, noise)
+    )
 
 
 def _displacement(base: Base, left: Floats) -> Floats:
@@ -211,7 +230,7 @@ class WeightedSet:
     #: (n, q + e + k): of nuisances, of causes that are no mechanisms (unknown fields, and what is no physics), and of
     #: effects.
     columns: Floats
-    marginal: Marginal
+    marginal: SetMarginal
     refit: Refit | None = None
     failure: str = ""  # why it could not be fitted; empty if it could, or was not tried
     #: Part of its log evidence that the fit of some of its causes (or of none) has gained over the linear model, until
@@ -275,8 +294,11 @@ class WeightedSet:
         """The set less one of its mechanisms, linear about the same point, with an evidence to be compared with its."""
         number = self.mechanisms.index(mechanism)
         columns = np.delete(self.columns, self.slices[number], axis=1)
-        residual = self.residual + self.effects[number].mean
-        columns, reduced = evidence_of(base, columns, residual, self.marginal.scale)
+        residual, law = self.residual + self.effects[number].mean, law_column(self.effects[number])
+        if law is not None and self.refit is not None:
+            own = self.columns[:, self.slices[number].start]
+            columns[:, base.nuisances.part(LAW).start + law[0]] = law[1] * own
+        columns, reduced = evidence_of(base, columns, residual, self.marginal.scale, self.marginal.sizes)
         at = self.hypothesis.causes.index(mechanism)
         hypothesis = replace(
             self.hypothesis,
