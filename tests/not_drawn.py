@@ -6,6 +6,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from types import SimpleNamespace
 from typing import Any, BinaryIO
 from unittest.mock import patch
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from warpbrain.cli import main
 from warpbrain.report.rendering import NAMES
+from warpbrain.report.slices import Cut
 
 
 @contextmanager
@@ -38,7 +40,19 @@ def _empty(view: Any, name: str, _axis: int, _place: float) -> dict[str, object]
     return {"name": name, "points": "", "triangles": "", "moves": None, "values": [""] * len(view.fields)}
 
 
+def _no_cut(_points: object, _cells: object, _values: object, axis: int, _position: float) -> Cut:
+    section = SimpleNamespace(n_cells=0, lines=np.zeros(0, np.int64), points=np.zeros((0, 3)))
+    return Cut(axis, section, [], np.zeros(0, np.int64), np.zeros(0))
+
+
+def _no_outline(*_args: object) -> np.ndarray:
+    return np.zeros((0, 2, 2))
+
+
 _STAND_INS: tuple[tuple[str, Callable[..., object]], ...] = (
+    # before what imports them by name
+    ("warpbrain.report.slices.cut", _no_cut),
+    ("warpbrain.report.slices.outline", _no_outline),
     ("warpbrain.report.picture.render", white),
     ("warpbrain.report.views.write_png", not_drawn),
     ("warpbrain.report.page.scene._cut", _empty),

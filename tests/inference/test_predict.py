@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom, multivariate_normal
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.predict import FieldFactors, predict, predictive_p
+from warpbrain.inference.predict import FieldFactors, along_own_axes, predict, predictive_p
 
 N = 24
 
@@ -53,3 +53,35 @@ def test_the_null_rate_is_what_it_says(model, verify):
     low, high = binom.interval(0.999, cases, 0.05)
     off = max(low - alarms, alarms - high, 0.0)
     verify("predictive p <= 0.05 where nothing is left", f"binomial band of {cases} draws of the model", off, 0.0)
+
+
+@pytest.mark.parametrize("doubled", [False, True])
+def test_random_draws_do_not_depend_on_axes_or_order(model, doubled):
+    """Rows that are mixed by an orthogonal matrix, among them rows in another order, or each twice at twice the
+    variance, and fields mixed likewise."""
+    random = np.random.default_rng(4)
+    fields, residual = [random.normal(size=(N, 5)), random.normal(size=(N, 2))], model.draws(1, random)[:, 0]
+    mixed = np.linalg.qr(random.normal(size=(N, N)))[0]
+    covariance, columns = model.noise_factor @ model.noise_factor.T, model.columns
+    others = [field @ np.linalg.qr(random.normal(size=(field.shape[1],) * 2))[0] for field in fields]
+    if doubled:
+        # each pair has the mean of its rows and a difference that tells nothing
+        mixed = np.concatenate([mixed, mixed])
+        lift = np.linalg.qr(mixed, mode="complete")[0][:, N:]
+        noise = mixed @ covariance @ mixed.T + lift @ lift.T
+    else:
+        noise = mixed @ covariance @ mixed.T
+    other = GaussianModel(np.linalg.cholesky(noise), mixed @ columns, model.scale)
+    ps = [
+        predictive_p(one, given, np.array([0.5, 2.0]), rows, 99, np.random.default_rng(5), levels=[0.5])
+        for one, given, rows in (
+            (model, fields, residual),
+            (other, [mixed @ field for field in others], mixed @ residual),
+        )
+    ]
+    assert ps[0] == ps[1]
+    first, second = (
+        along_own_axes(model, fields[0], residual),
+        along_own_axes(other, mixed @ others[0], mixed @ residual),
+    )
+    np.testing.assert_allclose(mixed @ first, second, atol=1e-9)

@@ -20,6 +20,16 @@ def test_without_recordings_it_is_a_sentence():
     assert "recording" in ended.refused and not ended.defect
 
 
+@pytest.mark.slow(16)
+def test_where_nothing_can_be_rendered_it_is_a_verdict_too(tmp_path, monkeypatch):
+    """As on a compute server, where all subsets are tried."""
+    (tmp_path / "sitecustomize.py").write_text("import sys\nsys.modules['pyvista'] = None\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr("subsets.tries.find_spec", lambda _name: None)
+    ended = one_try("beam-52g", "single", case_of("beam-52g", "single").recordings, ["--no-discretisation"])
+    assert ended.verdict and not ended.defect
+
+
 @pytest.mark.slow(30)
 def test_every_case_without_recordings_is_a_sentence(tmp_path):
     every = every_subset()

@@ -23,7 +23,14 @@ from warpbrain.inference import Cause, GaussianModel, Kind, Place
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import Confirmation
-from warpbrain.inference.predict import Prediction, p_value, predict, predict_with, predictive_p
+from warpbrain.inference.predict import (
+    Prediction,
+    along_own_axes,
+    p_value,
+    predict,
+    predict_with,
+    predictive_p,
+)
 from warpbrain.inference.subsets import Blocks
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.body.base import Base
@@ -128,7 +135,9 @@ class Confirming:
         sensors = search.base.at.sensors
         self._held_out = {local: HeldOut(sensors, local) for local in (False, True)}
         #: Columns (n, m) of a smooth force as large as the noise, of which random patterns are mixtures.
-        self.modes = search.base.typical_noise * next(iter(search.base.unknown.values()))
+        self.modes = search.base.typical_noise * along_own_axes(
+            search.base.model, next(iter(search.base.unknown.values())), search.base.residual
+        )
 
     def p_of_nothing(self, nothing: WeightedSet) -> float:
         """p-value of the hypothesis that no cause acts.

@@ -30,7 +30,7 @@ from warpbrain.recordings.agreement import root_mean_square
 #: An undeclared noise is no smaller [m] or [N]: below this it is rounding of the computation.
 LEAST_SIGMA = 1e-9
 #: Noise is found again this often at most, and until its size changes by less than this part.
-_ROUNDS, _SETTLED = 6, 0.02
+_ROUNDS, _SETTLED = 6, 2e-4
 
 
 def _beginnings(rows: Sensors) -> tuple[Floats, list[Bools], list[Bools]]:
@@ -163,7 +163,7 @@ def _likely_scale(
         return -float(model.with_scale(scale).log_density(rows)) - float(log_prior(np.array(scale)))
 
     bounds = math.log(low), math.log(high)
-    return math.exp(minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-4}).x)
+    return math.exp(minimize_scalar(negative, bounds=bounds, method="bounded", options={"xatol": 1e-5}).x)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ exactly what conditioning the model on the others gives.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,7 +107,29 @@ class FieldFactors:
 
     def of(self, residuals: Floats) -> Floats:
         """Log Bayes factor (d,) of residuals (n, d)."""
-        white = self._model.standardised(residuals)
+        return self._of_standardised(self._model.standardised(residuals))
+
+    def drawn(self, residual: Floats) -> Callable[[int, np.random.Generator], Floats]:
+        """What draws so many log Bayes factors (d,) of rows of the model, the same in whatever axes and order rows are.
+
+        Random numbers are coordinates along the eigenvectors of the mean quadratic form of the fields, each in the
+        direction in which the residual (n,) lies: rows that are turned, mixed or split have these turned alike, and
+        what they lack of these moves no factor.
+        """
+        form = np.zeros((len(residual), len(residual)))
+        for (values, directions), weight in zip(self._principal, self._weights.tolist(), strict=True):
+            ratio = np.mean(self._sizes[:, None] ** 2 / (1.0 + self._sizes[:, None] ** 2 * values), axis=0)
+            half = directions * np.sqrt(np.exp(weight) * ratio)
+            form += half @ half.T
+        vectors = np.linalg.eigh(form)[1][:, ::-1]
+        vectors = vectors * np.where(vectors.T @ self._model.standardised(residual) < 0.0, -1.0, 1.0)
+
+        def draw(count: int, random: np.random.Generator) -> Floats:
+            return self._of_standardised(vectors @ random.normal(size=(len(vectors), count)))
+
+        return draw
+
+    def _of_standardised(self, white: Floats) -> Floats:
         logs = []
         for (values, directions), weight in zip(self._principal, self._weights.tolist(), strict=True):
             squares = (directions.T @ white) ** 2
@@ -115,6 +137,18 @@ class FieldFactors:
                 ratio = size**2 / (1.0 + size**2 * values)
                 logs.append(weight + 0.5 * (ratio @ squares) - 0.5 * float(np.log1p(size**2 * values).sum()))
         return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(self._sizes)))
+
+
+def along_own_axes(model: GaussianModel, columns: Floats, residual: Floats) -> Floats:
+    """Columns (n, k) of independent coefficients with one variance, mixed into ones that are the same in any axes.
+
+    These are orthogonal where the model is `N(0, I)`, the longest first, and in the direction in which the residual
+    (n,) lies.
+    """
+    Z = model.standardised(columns)
+    vectors = np.linalg.eigh(Z.T @ Z)[1][:, ::-1]
+    along = (Z @ vectors).T @ model.standardised(residual)
+    return columns @ (vectors * np.where(along < 0.0, -1.0, 1.0))
 
 
 def predictive_p(
@@ -133,10 +167,11 @@ def predictive_p(
     from each of the `levels` that it will be compared with; `_MOST_DRAWS` times `draws` at most.
     """
     factors = FieldFactors(model, fields, sizes, weights)
-    observed, drawn = factors.of(residual[:, None])[0], np.zeros(0)
+    observed, draw, drawn = factors.of(residual[:, None])[0], factors.drawn(residual), np.zeros(0)
     while True:
-        rows = model.draws(max(draws, len(drawn)), random)
-        drawn = np.concatenate([drawn, factors.of(rows)])
+        # each time with numbers of its own, however many rows there are
+        [child] = random.spawn(1)
+        drawn = np.concatenate([drawn, draw(max(draws, len(drawn)), child)])
         p = p_value(observed, drawn)
         uncertain = _DEVIATIONS * np.sqrt(p * (1.0 - p) / len(drawn))
         if all(abs(p - level) > uncertain for level in levels) or len(drawn) >= _MOST_DRAWS * draws:

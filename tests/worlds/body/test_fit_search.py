@@ -8,7 +8,7 @@ import pytest
 from sinking_block import OPTIONS, write_sinking
 
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.fitting import FitSearch
+from warpbrain.worlds.body.fitting import FitSearch, Fitter
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 
@@ -76,6 +76,46 @@ def test_a_fit_begins_at_that_of_a_subset(sets, base, search):
     weighed = sets.get(("gravity",))
     again = FitSearch(base, None, weighed.effects, fit.columns, fit.marginal)
     z = again.begin_at(fit)
-    again.start([z], fit.state)
     np.testing.assert_allclose(z, np.concatenate([fit.nuisances, *fit.coefficients]))
-    np.testing.assert_allclose(again.residual, fit.residual, atol=1e-3 * base.typical_noise)
+    residual = again._evaluate(z, fit.state)[1]
+    np.testing.assert_allclose(residual, fit.residual, atol=1e-3 * base.typical_noise)
+    again.start([z], fit.state)
+    assert again._objective(again.z, again.residual) <= again._objective(z, residual)
+
+
+def test_linear_coordinates_are_at_their_best(base, search):
+    """No step of these alone gains anything, after the start and after other columns of laws."""
+    for _ in range(2):
+        linear = np.flatnonzero(search._linear)
+        W = search._noise.whitened(search._U[:, linear])
+        gradient = W.T @ search._noise.whitened(search.residual) - search.z[linear]
+        np.testing.assert_allclose(gradient, 0.0, atol=1e-9 * (1.0 + np.abs(search.z[linear]).max()))
+        search._laws = base.noise[:, None] * np.random.default_rng(5).normal(size=(len(W), 4))
+        search.update_laws()
+
+
+def test_a_renewal_of_laws_that_undoes_the_one_before_is_taken_by_half(base, search, monkeypatch):
+    law = search._layout.law
+    first = base.noise[:, None] * np.random.default_rng(4).normal(size=search._U[:, law].shape)
+    search._U[:, law] = first
+    others = [2.0 * first, first, 2.0 * first]
+    monkeypatch.setattr("warpbrain.worlds.body.fitting.law_columns_about", lambda *_: others.pop(0))
+    for taken, expected in ((1.0, 2.0 * first), (0.5, 1.5 * first), (0.25, 1.625 * first)):
+        search._about = search._nearby, ()
+        search.update_laws()
+        assert search.taken == taken
+        np.testing.assert_allclose(search._U[:, law], expected)
+    search.update_laws()
+    # what is left of it is taken in part again, without another linearisation
+    np.testing.assert_allclose(search._U[:, law], 1.625 * first + 0.25 * 0.375 * first)
+
+
+def test_what_a_fit_has_not_reached_is_no_evidence(sets, base, monkeypatch):
+    """A search that never takes a step, though the linear model says that a better point exists."""
+    weighed = sets.get(("gravity",))
+    monkeypatch.setattr(FitSearch, "minimise", lambda *_: None)
+    start = np.zeros(weighed.columns.shape[1])
+    fit = Fitter(sets.base).fit(weighed.effects, weighed.columns, [start], weighed.marginal)
+    assert not fit.converged
+    assert fit.unreached > 1.0
+    assert fit.log_evidence == fit.marginal.log_evidence - fit.unreached

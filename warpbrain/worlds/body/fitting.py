@@ -18,6 +18,7 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.inference.beliefs import belief
+from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.multisecant import extrapolated
@@ -54,6 +55,8 @@ _AGREES = 0.5
 _MATTERS = 0.3
 #: How often at most a search goes on with laws, error of the mesh, gross errors and noise of its result.
 _ROUNDS = 8
+#: After how many in succession it ends, too, that reach nothing better and leave no less: some go back and forth.
+_WORSE = 2
 #: Gain that is expected of a step of which none comes, where that may be rounding.
 _ROUNDING = 0.1
 #: Part of what these have changed of the log posterior density to which the next search is exact.
@@ -106,6 +109,12 @@ class FitSearch:
         self.columns = columns
         # the linear model about a state, and the coefficients of effects there, until columns of laws are made of it
         self._about: tuple[Linearisation, tuple[Floats, ...]] | None = None
+        # columns of the shape of laws about the last linearisation, how they differed from those before, and the part
+        # of such a difference that is taken
+        self._laws: Floats | None = None
+        self._law_change, self.taken = np.zeros((len(self._U), 1)), 1.0
+        # columns and noise at which linear coordinates were put at their best last, and what that needs of these
+        self._projection: tuple[Floats, GaussianModel, Floats, tuple[Floats, bool]] | None = None
         # where the error of the mesh was computed last
         self._mesh_error_at: Floats | None = None
         self.state, self.converged = base.state, False
@@ -117,7 +126,7 @@ class FitSearch:
         for number, start in enumerate(starts, 1):
             z = self._clipped(self._layout.without_shared(start))
             try:
-                self._accept_if_better(z, *self._evaluate(z, nearby))
+                self._accept_if_better(*self._with_best_linear(z, *self._evaluate(z, nearby)))
             except (SolveError, InputError):
                 if number == len(starts) and not np.isfinite(self._best):
                     raise
@@ -164,7 +173,7 @@ class FitSearch:
         far = self.z
         for share in (0.5, 0.0):
             between = base + share * (far - base)
-            if not self._accept_if_better(between, *self._evaluate(between, self.state)):
+            if not self._accept_if_better(*self._with_best_linear(between, *self._evaluate(between, self.state))):
                 return
 
     def minimise(self, enough: float = _ENOUGH) -> None:
@@ -228,8 +237,7 @@ class FitSearch:
             self._U = nuisances.with_family(UNKNOWN_MESH, self._U, unknown)
             self.columns = nuisances.with_family(UNKNOWN_MESH, self.columns, unknown)
         if not same:
-            self._best = np.inf
-            self._accept_if_better(self.z, self.state, self.residual)
+            self._renew(self.residual)
 
     def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> None:
         """Compute the mechanisms' share of the mesh's error at the best point, where a finer mesh tells it.
@@ -254,9 +262,7 @@ class FitSearch:
         if before is not None:
             change, by_coefficients = change - before.at(z), by_coefficients - before.columns()
         self.columns[:, self._layout.coefficients] += by_coefficients
-        self._best = np.inf
-        residual = self.residual - change + (before_U - self._U) @ self.z[: self._U.shape[1]]
-        self._accept_if_better(self.z, self.state, residual)
+        self._renew(self.residual - change + (before_U - self._U) @ self.z[: self._U.shape[1]])
 
     def update_mesh_errors(self, known: MeshErrors, finer: FinerStates) -> MeshErrors:
         """Take the error of the mesh of tissue alone at the best point, unless that is where it was computed last."""
@@ -303,19 +309,26 @@ class FitSearch:
     def update_laws(self) -> None:
         """Replace the columns of the shape of laws by those of the last linearisation.
 
-        While an optimum is looked for they are fixed: renewed on the way, they would change the objective.
+        While an optimum is looked for they are fixed: renewed on the way, they would change the objective. Where a
+        renewal undoes what the one before has done, as between two states that have each other's columns, half of it is
+        taken from then on.
         """
-        if self._about is None:
+        law, before = self._layout.law, self._U[:, self._layout.law]
+        if self._about is not None:
+            at, coefficients = self._about
+            self._laws = law_columns_about(at, self.effects, coefficients, self._base.states, self.mesh_errors)
+            self._about = None
+            change = self._base.model.whitened(self._laws - before)
+            if float(np.sum(change * self._law_change)) < 0.0:
+                self.taken *= 0.5
+            self._law_change = change
+        if self._laws is None or np.array_equal(self._laws, before):
             return
-        law, (at, coefficients) = self._layout.law, self._about
-        before = self._U[:, law]
-        columns = law_columns_about(at, self.effects, coefficients, self._base.states, self.mesh_errors)
-        self._about = None
+        columns = before + self.taken * (self._laws - before)
         residual = self.residual + (before - columns) @ self.z[law]
         self._U, self.columns = self._U.copy(), self.columns.copy()
         self._U[:, law] = self.columns[:, law] = columns
-        self._best = np.inf
-        self._accept_if_better(self.z, self.state, residual)
+        self._renew(residual)
 
     def _gauss_newton_step(self, field_stays: bool) -> tuple[Floats, float]:
         """The step and what it gains in the linear model.
@@ -350,7 +363,7 @@ class FitSearch:
         for _ in range(trials):
             trial, shorter = self._clipped(self.z + length * step), _SHORT
             try:
-                state, residual = self._evaluate(trial, self.state)
+                trial, state, residual = self._with_best_linear(trial, *self._evaluate(trial, self.state))
             except (SolveError, InputError):
                 pass
             else:
@@ -364,6 +377,31 @@ class FitSearch:
     def _objective(self, z: Floats, residual: Floats) -> float:
         white = self._noise.whitened(residual)
         return 0.5 * float(white @ white + z @ z)
+
+    def _renew(self, residual: Floats) -> None:
+        """Take another residual (n,) at the best point, whose objective is another one from now on."""
+        self._best = np.inf
+        self._accept_if_better(*self._with_best_linear(self.z, self.state, residual))
+
+    def _with_best_linear(self, z: Floats, state: SolvedState, residual: Floats) -> tuple[Floats, SolvedState, Floats]:
+        """A point with its linear coordinates at their best, which needs no equilibrium.
+
+        Variable projection (Golub and Pereyra 1973): a step that is shortened for the sake of the state is not so for
+        these, and where columns of laws are made anew these follow at once.
+        """
+        from scipy.linalg import cho_factor, cho_solve
+
+        if self._projection is None or self._projection[0] is not self._U or self._projection[1] is not self._noise:
+            W = self._noise.whitened(self._U[:, self._linear])
+            factor = cho_factor(np.eye(W.shape[1]) + W.T @ W, lower=True, check_finite=False)
+            self._projection = self._U, self._noise, W, factor
+        *_, W, factor = self._projection
+        gradient = W.T @ self._noise.whitened(residual) - z[: len(self._linear)][self._linear]
+        change = np.zeros(len(self._linear))
+        change[self._linear] = cho_solve(factor, gradient, check_finite=False)
+        z = z.copy()
+        z[: len(change)] += change
+        return z, state, residual - self._U @ change
 
     def _accept_if_better(self, z: Floats, state: SolvedState, residual: Floats) -> bool:
         objective = self._objective(z, residual)
@@ -502,18 +540,26 @@ class Fitter:
         search.start(starts, nearby or self.base.state)
         if subset is None:
             search.backtrack_to_base()
-        enough = _ROUGHLY
+        enough, best, least, worse = _ROUGHLY, None, np.inf, 0
         for number in range(_ROUNDS):
             search.minimise(_ENOUGH if number == _ROUNDS - 1 else enough)
-            self._update(search)
-            gain = search.expected_gain()
+            fit = self._update(search)
+            # of all that is left of a renewal that is taken in part
+            gain = search.expected_gain() / search.taken**2
             if enough == _ENOUGH and gain < _ENOUGH:
+                best = fit
+                break
+            fit = replace(fit, unreached=gain, converged=False)
+            better = best is None or fit.log_evidence > best.log_evidence
+            worse = 0 if better or gain < least else worse + 1
+            best, least = fit if better else best, min(gain, least)
+            if worse == _WORSE:
                 break
             enough = min(max(_ENOUGH, _PART * gain), _ROUGHLY)
-        fit = search.result()
-        if not np.isfinite(fit.log_evidence):
+        assert best is not None
+        if not np.isfinite(best.log_evidence):
             raise FloatingPointError("its evidence is not a number")
-        return fit
+        return best
 
     def begin(self, effects: tuple[Effect, ...], refit: Refit, about: Linearisation | None) -> Refit:
         """State, residual and Laplace evidence with other effects at the coordinates of a fit, before any iteration.
@@ -526,8 +572,8 @@ class Fitter:
         search.start([search.begin_at(refit, about)], refit.state)
         return search.result()
 
-    def _update(self, search: FitSearch) -> None:
-        """Take laws, the error of the mesh, noise and gross errors of the best point of a search.
+    def _update(self, search: FitSearch) -> Refit:
+        """Take laws, the error of the mesh, noise and gross errors of the best point of a search, which is returned.
 
         The error of the mesh without any cause is that of all fits to come. It depends on the tissue, not only in
         proportion, and would otherwise be taken for a mechanism's share.
@@ -537,4 +583,6 @@ class Fitter:
             search.update_mesh_share(self.mesh_errors, self.finer)
         elif self.mesh_errors is not None:
             self.mesh_errors = search.update_mesh_errors(self.mesh_errors, self.finer)
-        search.update_noise(search.result())
+        fit = search.result()
+        search.update_noise(fit)
+        return fit

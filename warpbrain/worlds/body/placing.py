@@ -338,10 +338,10 @@ def _moved_once(base: Base, fitter: Fitter, refit: Refit, step: float) -> Refit 
         about = None
     for effects in tried:
         try:
-            begun = max(begun, fitter.begin(effects, refit, about), key=lambda fit: fit.log_evidence)
+            begun = max(begun, fitter.begin(effects, refit, about), key=lambda fit: fit.marginal.log_evidence)
         except CANNOT_BE_FITTED:
             continue
-    if begun.log_evidence < refit.log_evidence + _BETTER:
+    if begun.marginal.log_evidence < refit.marginal.log_evidence + _BETTER:
         return None
     try:
         moved = fitter.fit(begun.effects, begun.columns, [], begun.marginal, begun.state, begun)

@@ -119,11 +119,16 @@ class Refit:
     converged: bool
     #: Part of the error of the mesh that belongs to its mechanisms, if that is known.
     mesh_share: MeshShare | None = None
+    #: By how much the linear model says that a better point exists [nats], if the search has not come to it.
+    unreached: float = 0.0
 
     @property
     def log_evidence(self) -> float:
-        """Laplace approximation."""
-        return self.marginal.log_evidence
+        """Laplace approximation, at the best point that was reached.
+
+        That a linear model would explain everything beyond the last state that has an equilibrium is no evidence.
+        """
+        return self.marginal.log_evidence - self.unreached
 
     def without(self, number: int, base: Base) -> Refit:
         """The same point without one of its effects, from which a set without it is fitted."""
