@@ -13,22 +13,12 @@ from warpbrain.gp.sampling import DrawnLaws, draw_laws, law_of_curve
 
 @dataclass(frozen=True)
 class FromPrior:
-    """Which laws of a case are the generative model's.
+    """Which laws of a case are the generative model's."""
 
-    Attributes
-    ----------
-    case : Case
-        With these laws.
-    model : Process
-    labels : tuple of int
-        Tissues whose laws they are.
-    drawn : DrawnLaws or None
-        With one law for each of these tissues; None if the laws are those of the middle curves.
-    """
-
-    case: Case
+    case: Case  # with these laws
     model: Process
-    labels: tuple[int, ...]
+    labels: tuple[int, ...]  # tissues whose laws they are
+    #: With one law for each of these tissues; None if the laws are those of the middle curves.
     drawn: DrawnLaws | None = None
 
 

@@ -43,30 +43,18 @@ ALIASES = {"synthetic": "phantom", "synthetic-fine": "phantom-fine"}
 
 @dataclass(frozen=True)
 class Entry:
-    """What a shipped case is with one of its meshes.
-
-    Attributes
-    ----------
-    name : str
-    tissue : str
-        ``"multi"`` or ``"single"``.
-    title, origin : str
-        As `Case` has them.
-    nodes, tetrahedra : int
-        Of the imaged anatomy, whole.
-    volume_cm3 : float
-    recordings : dict of str to int
-        How many rows, points or instants each has.
-    """
+    """What a shipped case is with one of its meshes."""
 
     name: str
-    tissue: str
+    tissue: str  # ``"multi"`` or ``"single"``
+    #: As `Case` has them.
     title: str
     origin: str
+    #: Of the imaged anatomy, whole.
     nodes: int
     tetrahedra: int
     volume_cm3: float
-    recordings: dict[str, int]
+    recordings: dict[str, int]  # how many rows, points or instants each has
 
 
 def catalogue() -> list[Entry]:

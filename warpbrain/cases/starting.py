@@ -40,31 +40,20 @@ IN_PLACE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class StartedCase:
-    """What was written.
-
-    Attributes
-    ----------
-    folder, mesh, quality
-    tissues : dict of int to str
-        Names by number.
-    labelled, in_place : dict of int to float, or None
-        Of what was made from labels, for each tissue: volume [m3] of its labels, and the share of its voxels that lie
-        in that tissue of the mesh.
-    cavity, labelled_cavity : float
-        Volume [m3] of the closed cavities of the mesh, and of the labels of cavities.
-    notes : tuple of str
-        What was mended, left out or not reached.
-    """
+    """What was written."""
 
     folder: Path
     mesh: TetMesh
-    tissues: dict[int, str]
+    tissues: dict[int, str]  # names by number
     quality: Quality
+    #: Of what was made from labels, for each tissue: volume [m3] of its labels, and the share of its voxels that lie in
+    #: that tissue of the mesh.
     labelled: dict[int, float] | None
     in_place: dict[int, float] | None
+    #: Volume [m3] of the closed cavities of the mesh, and of the labels of cavities.
     cavity: float
     labelled_cavity: float
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was mended, left out or not reached
 
     @property
     def volumes(self) -> dict[int, float]:

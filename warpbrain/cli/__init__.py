@@ -47,18 +47,10 @@ class _Range:
 
 
 class _GroupedParser(OneLineParser):
-    """A parser whose help lists its commands under titles.
+    """A parser whose help lists its commands under titles."""
 
-    Attributes
-    ----------
-    commands : argparse action
-        Of `add_subparsers`.
-    groups : mapping of str to sequence of str
-        Title and names of its commands, in their order.
-    """
-
-    commands: argparse._SubParsersAction[Any]
-    groups: Mapping[str, Sequence[str]]
+    commands: argparse._SubParsersAction[Any]  # of `add_subparsers`
+    groups: Mapping[str, Sequence[str]]  # title and names of its commands, in their order
 
     def format_help(self) -> str:
         """As `argparse` formats it, with a section for each group."""

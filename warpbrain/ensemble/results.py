@@ -56,27 +56,13 @@ class Fields:
 
 @dataclass(frozen=True)
 class EnsembleResult(Shown):
-    """Everything that an ensemble says.
+    """Everything that an ensemble says."""
 
-    Attributes
-    ----------
-    rows : tuple of Row
-        By number.
-    fields : Fields or None
-        None if no sample has an answer.
-    displacement : mapping of str to Spread
-        Of the samples' mean displacement by node set [m].
-    errors : mapping of str to Spread
-        Of the samples' root mean square errors by recording, in its unit.
-    not_compared : tuple of str
-        Why some recordings are not compared, a sentence each.
-    """
-
-    rows: tuple[Row, ...]
-    fields: Fields | None
-    displacement: Mapping[str, Spread]
-    errors: Mapping[str, Spread]
-    not_compared: tuple[str, ...]
+    rows: tuple[Row, ...]  #: by number
+    fields: Fields | None  #: none if no sample has an answer
+    displacement: Mapping[str, Spread]  #: of the samples' mean displacement by node set [m]
+    errors: Mapping[str, Spread]  #: of the samples' root mean square errors by recording, in its unit
+    not_compared: tuple[str, ...]  #: why some recordings are not compared, a sentence each
 
     @property
     def failed(self) -> tuple[Row, ...]:

@@ -31,23 +31,12 @@ _DISAGREEMENT = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """Values and where they are.
+    """Values and where they are."""
 
-    Attributes
-    ----------
-    path : Path
-        The file they came from.
-    values : (i, j, k) array
-        As the file has them, scaled as it says.
-    grid : Grid
-    notes : tuple of str
-        What the user should know about how the file was read.
-    """
-
-    path: Path
-    values: NDArray[Any]
+    path: Path  # the file they came from
+    values: NDArray[Any]  # (i, j, k), as the file has them, scaled as it says
     grid: Grid
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what the user should know about how the file was read
 
 
 def require(module: str, distribution: str, what: str) -> None:

@@ -138,30 +138,17 @@ def share_rows(offsets: NDArray[np.int32], blocks: int) -> tuple[NDArray[np.int3
 
 
 class Meetings:
-    """Where blocks leave what others read.
-
-    Parameters
-    ----------
-    rows, blocks : int
-    device : Device
-
-    Attributes
-    ----------
-    exchange : wp.array of double
-        Two places that take turns, and one for the solution, with four numbers a row.
-    messages : wp.array of uint64
-        Two places that take turns, with a message for each sum of a block.
-    scratch : wp.array of double
-        What has no room on the chip.
-    control : wp.array of int
-        The number of the last meeting, and whether one failed.
-    """
+    """Where blocks leave what others read."""
 
     def __init__(self, rows: int, blocks: int, device: wp.Device) -> None:
         self._device = device
+        # two places that take turns, and one for the solution, with four numbers a row
         self.exchange = wp.zeros(12 * rows, dtype=wp.float64, device=device)
+        # two places that take turns, with a message for each sum of a block
         self.messages = wp.zeros(4 * _SUMS * blocks, dtype=wp.uint64, device=device)
+        # what has no room on the chip
         self.scratch = wp.zeros(_NUMBERS * rows, dtype=wp.float64, device=device)
+        # the number of the last meeting, and whether one failed
         self.control = wp.zeros(2, dtype=int, device=device)
 
     def check(self) -> None:

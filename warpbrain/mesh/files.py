@@ -44,20 +44,11 @@ _IGNORED = ("vertex", "line", "line3", "triangle", "triangle6", "quad", "quad8",
 
 @dataclass(frozen=True, eq=False)
 class MeshInFile:
-    """A mesh as a file has it.
-
-    Attributes
-    ----------
-    mesh : TetMesh
-    node_numbers : (n,) int array
-        For each node of the mesh its number in the file, from 0.
-    file_nodes : int
-        How many nodes the file has: more than the mesh, if its tetrahedra are of second order.
-    """
+    """A mesh as a file has it."""
 
     mesh: TetMesh
-    node_numbers: NDArray[np.int64]
-    file_nodes: int
+    node_numbers: NDArray[np.int64]  # (n,), for each node of the mesh its number in the file, from 0
+    file_nodes: int  # how many nodes the file has: more than the mesh, if its tetrahedra are of second order
 
 
 def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str | None = None) -> TetMesh:

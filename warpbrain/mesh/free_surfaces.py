@@ -30,43 +30,22 @@ _ORIGINS: tuple[Origin, ...] = ("outer", "inner", "cut")
 
 @dataclass(frozen=True, eq=False)
 class FreeSurface:
-    """A part of the surface on which something can act.
+    """A part of the surface on which something can act."""
 
-    Attributes
-    ----------
-    name : str
-        Of the node set that stands for it: what acts on that acts on its triangles, and on none that can move beside.
-    words : str
-        What people call it.
-    members : (n,) bool array
-        Nodes of that set.
-    faces : (k, 3) int array
-        Triangles of the set that are not held, oriented outwards.
-    """
-
+    #: Of the node set that stands for it: what acts on that acts on its triangles, and on none that can move beside.
     name: str
-    words: str
-    members: Bools
-    faces: Ints
+    words: str  # what people call it
+    members: Bools  # (n,), nodes of that set
+    faces: Ints  # (k, 3), triangles of the set that are not held, oriented outwards
 
 
 @dataclass(frozen=True, eq=False)
 class FreePart:
-    """A connected free surface.
+    """A connected free surface."""
 
-    Attributes
-    ----------
-    origin : str
-        One of `Origin`.
-    faces : (k, 3) int array
-        Triangles, oriented outwards.
-    centre : (3,) array
-        Of its area [m].
-    """
-
-    origin: Origin
-    faces: Ints
-    centre: Floats
+    origin: Origin  # one of `Origin`
+    faces: Ints  # (k, 3), triangles, oriented outwards
+    centre: Floats  # (3,), of its area [m]
 
 
 def free_faces(mesh: TetMesh, members: Bools, held: Bools) -> Ints:

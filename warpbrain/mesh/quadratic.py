@@ -29,22 +29,16 @@ class QuadraticMesh:
     ----------
     corners : TetMesh
         What it is of; its n nodes come first.
-
-    Attributes
-    ----------
-    node_mesh : TetMesh
-        Linear tetrahedra with a corner at each of the N nodes: every element cut into eight. Sets are those of
-        `corners`, see `warpbrain.mesh.refinement.refined`; made once for a mesh.
-    ends : (N, 2) int array
-        Corners between which each node lies in the middle; a corner lies between itself and itself.
-    elements : (m, 10) int array
-        Nodes of each tetrahedron, ascending: its corners, then its midside nodes in the order of
-        `warpbrain.mesh.surface.EDGES`.
     """
 
     corners: TetMesh
+    #: Linear tetrahedra with a corner at each of the N nodes: every element cut into eight. Sets are those of
+    #: `corners`, see `warpbrain.mesh.refinement.refined`; made once for a mesh.
     node_mesh: TetMesh = field(init=False)
+    #: (N, 2), corners between which each node lies in the middle; a corner lies between itself and itself.
     ends: Ints = field(init=False)
+    #: (m, 10), nodes of each tetrahedron, ascending: its corners, then its midside nodes in the order of
+    #: `warpbrain.mesh.surface.EDGES`.
     elements: Ints = field(init=False)
 
     def __post_init__(self) -> None:

@@ -35,20 +35,11 @@ _DIMENSION = {"vertex": 0, "line": 1, "line3": 1}
 
 @dataclass(frozen=True, eq=False)
 class MeshWithRegions:
-    """A mesh with what its file names.
-
-    Attributes
-    ----------
-    mesh : TetMesh
-    names : dict of int to str
-        Names of tissues that the file has.
-    notes : tuple of str
-        Where tissues and sets are from.
-    """
+    """A mesh with what its file names."""
 
     mesh: TetMesh
-    names: dict[int, str]
-    notes: tuple[str, ...]
+    names: dict[int, str]  # names of tissues that the file has
+    notes: tuple[str, ...]  # where tissues and sets are from
 
 
 def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithRegions:

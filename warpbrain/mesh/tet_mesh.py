@@ -19,16 +19,11 @@ LARGEST = 1e12
 
 
 class MeshError(InputError):
-    """A mesh that cannot be computed with; the message is one line that says what is wrong and where.
-
-    Attributes
-    ----------
-    messages : tuple of str
-        Everything that is wrong, of which the message is the first.
-    """
+    """A mesh that cannot be computed with; the message is one line that says what is wrong and where."""
 
     def __init__(self, *messages: str) -> None:
         super().__init__(messages[0])
+        #: Everything that is wrong, of which the message is the first.
         self.messages = messages
 
     def within(self, place: str) -> MeshError:

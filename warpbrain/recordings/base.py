@@ -40,23 +40,7 @@ REFERENCE = Key(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Recording:
-    """What all recordings have; `warpbrain.recordings.recording.RECORDINGS` has the kinds.
-
-    Attributes
-    ----------
-    name : str
-    file : str
-        File it came from, relative to the case folder.
-    role : {"fit", "check"}
-        A ``"check"`` recording is never fitted, only scored.
-    sigma : float or None
-        Noise of one component, one standard deviation, in the unit of what was recorded (m, N, Pa or N m); None: to be
-        estimated.
-    reference: float or None
-        Time [s] of the loaded state from which displacements and forces are counted; None: rest.
-    time : (n,) array or None
-        [s]
-    """
+    """What all recordings have; `warpbrain.recordings.recording.RECORDINGS` has the kinds."""
 
     kind: ClassVar[str]
     #: What `case.toml` says of this kind besides name, file, role and sigma.
@@ -64,11 +48,14 @@ class Recording:
     #: Whether it belongs to a laboratory specimen and not to a body.
     of_specimen: ClassVar[bool] = False
     name: str
-    file: str
-    role: str = "fit"
+    file: str  # it came from, relative to the case folder
+    role: str = "fit"  # "fit" or "check", which is never fitted, only scored
+    #: Noise of one component, one standard deviation, in the unit of what was recorded (m, N, Pa or N m); None: to be
+    #: estimated.
     sigma: float | None = None
+    #: Time [s] of the loaded state from which displacements and forces are counted; None: rest.
     reference: float | None = None
-    time: Floats | None = None
+    time: Floats | None = None  # (n,) [s], increasing
 
     @classmethod
     def read(
@@ -187,26 +174,16 @@ class Recording:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TrackedPoints:
-    """What a file tells of tracked points: where each was and how far it went.
+    """What a file tells of tracked points: where each was and how far it went."""
 
-    Attributes
-    ----------
-    points, displacement : (n, 3) array
-        [m], RAS.
-    time : (n,) array or None
-        [s]
-    ids : tuple of n str, or None
-    sigmas : (n,) array or None
-        Noise of one component of each point [m]; takes precedence over that of the recording.
-    weights : (n,) array or None
-    """
-
+    #: (n, 3) [m], RAS.
     points: Floats
     displacement: Floats
-    time: Floats | None = None
+    time: Floats | None = None  # (n,) [s]
     ids: tuple[str, ...] | None = None
+    #: (n,), noise of one component of each point [m]; takes precedence over that of the recording.
     sigmas: Floats | None = None
-    weights: Floats | None = None
+    weights: Floats | None = None  # (n,)
 
 
 def write_columns(path: Path, columns: Columns) -> None:

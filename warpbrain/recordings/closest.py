@@ -67,24 +67,12 @@ class Spheres:
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoints:
-    """Closest points of a surface.
+    """Closest points of a surface."""
 
-    Attributes
-    ----------
-    position : (n, 3) array
-        Where they are.
-    face : (n,) int32 array
-        Triangle on which each lies; of several, the one with the smallest number.
-    weights : (n, 3) array
-        Barycentric coordinates there: not negative, their sum is 1.
-    distance : (n,) array
-        From the given point.
-    """
-
-    position: Floats
-    face: Ints
-    weights: Floats
-    distance: Floats
+    position: Floats  # (n, 3), where they are
+    face: Ints  # (n,), triangle on which each lies; of several, the one with the smallest number
+    weights: Floats  # (n, 3), barycentric coordinates there: not negative, their sum is 1
+    distance: Floats  # (n,), from the given point
 
     @property
     def features(self) -> NDArray[np.int64]:

@@ -42,18 +42,11 @@ def legacy_error(distances: ArrayLike) -> float:
 
 @dataclass(frozen=True)
 class Error:
-    """Distances in four numbers.
+    """Distances in four numbers."""
 
-    Attributes
-    ----------
-    root_mean_square, percentile_95, largest : float
-        In the unit of the comparison.
-    legacy : float or None
-        `legacy_error` [sqrt(mm)], of lengths only.
-    """
-
+    #: In the unit of the comparison.
     root_mean_square: float
-    legacy: float | None
+    legacy: float | None  # `legacy_error` [sqrt(mm)], of lengths only
     percentile_95: float
     largest: float
 
@@ -71,39 +64,25 @@ class Error:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Comparison:
-    """A recording beside a state.
+    """A recording beside a state."""
 
-    Attributes
-    ----------
-    name, kind, role : str
-        Of the recording.
-    unit : {"m", "N", "N m", "Pa"}
-        Of errors and residuals.
-    rows : (n,) int array
-        Rows of the recording that were compared.
-    before, after : Error
-        With nothing moved (or no force), and with the state. Of a surface: from each recorded point to the surface.
-    residuals_before, residuals_after : (n, 3) array
-        Recorded less computed, for each row. Of a surface: from its closest point to the recorded one. A component that
-        was not recorded is NaN.
-    reverse_before, reverse_after : Error or None
-        Of a surface: from each of its nodes to what was recorded; large where only a part of it was recorded.
-    noise : float or None
-        What the noise alone would leave of the root mean square; None if it is not known.
-    """
-
+    #: Of the recording.
     name: str
     kind: str
     role: str
-    unit: str
-    rows: NDArray[np.int64]
+    unit: str  # of errors and residuals: "m", "N", "N m" or "Pa"
+    rows: NDArray[np.int64]  # (n,), rows of the recording that were compared
+    #: With nothing moved (or no force), and with the state. Of a surface: from each recorded point to the surface.
     before: Error
     after: Error
+    #: (n, 3), recorded less computed, for each row. Of a surface: from its closest point to the recorded one. A
+    #: component that was not recorded is NaN.
     residuals_before: Floats
     residuals_after: Floats
+    #: Of a surface: from each of its nodes to what was recorded; large where only a part of it was recorded.
     reverse_before: Error | None = None
     reverse_after: Error | None = None
-    noise: float | None = None
+    noise: float | None = None  # what the noise alone would leave of the root mean square; None if it is not known
 
     @property
     def count(self) -> int:

@@ -21,27 +21,15 @@ _WEIGHT, _LENGTH = 1e-9, 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Location:
-    """Points as weighted nodes.
+    """Points as weighted nodes."""
 
-    Attributes
-    ----------
-    nodes : (n, 4) int32 array
-        Nodes of the tetrahedron that each point is in, or that has the nearest face of the boundary.
-    weights : (n, 4) array
-        Values of the shape functions, their sum is 1. Outside the mesh they are those of the closest point of its
-        boundary.
-    distance : (n,) array
-        Distance to the mesh [m], zero inside.
-    edge : (n,) array
-        Mean length of the edges of the tetrahedron [m].
-    element : (n,) int64 array
-        Number of the tetrahedron; inside the mesh `nodes` are in the order of its corners.
-    """
-
-    nodes: Ints
+    nodes: Ints  # (n, 4), nodes of the tetrahedron that each point is in, or that has the nearest face of the boundary
+    #: (n, 4), values of the shape functions, their sum is 1. Outside the mesh they are those of the closest point of
+    #: its boundary.
     weights: Floats
-    distance: Floats
-    edge: Floats
+    distance: Floats  # (n,), distance to the mesh [m], zero inside
+    edge: Floats  # (n,), mean length of the edges of the tetrahedron [m]
+    #: (n,), number of the tetrahedron; inside the mesh `nodes` are in the order of its corners.
     element: NDArray[np.int64]
 
     def __len__(self) -> int:

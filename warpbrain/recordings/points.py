@@ -32,15 +32,7 @@ from warpbrain.recordings.tracked_points import tracked_points
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PointsRecording(TrackedPoints, Recording):
-    """Tracked points of a case.
-
-    Attributes
-    ----------
-    outside : {"error", "nearest"}
-        What a point farther outside the mesh than a local edge is: a mistake, or observed at the nearest point of it.
-    moved_file : str or None
-        Where the second positions came from, if start and end are files of their own (Slicer markups).
-    """
+    """Tracked points of a case."""
 
     kind: ClassVar[str] = "points"
     keys: ClassVar[tuple[Key, ...]] = (
@@ -54,7 +46,10 @@ class PointsRecording(TrackedPoints, Recording):
         ),
         REFERENCE,
     )
+    #: What a point farther outside the mesh than a local edge is: a mistake, or observed at the nearest point of it:
+    #: "error" or "nearest".
     outside: str = "error"
+    #: Where the second positions came from, if start and end are files of their own (Slicer markups).
     moved_file: str | None = None
 
     @classmethod

@@ -464,14 +464,7 @@ class Tested:
 
 @dataclass(frozen=True, eq=False)
 class SpecimenRun(Shown):
-    """The simulated tests of a specimen.
-
-    Attributes
-    ----------
-    case : Case
-    rig : Rig
-    tests : tuple of Tested
-    """
+    """The simulated tests of a specimen."""
 
     case: Case
     rig: Rig

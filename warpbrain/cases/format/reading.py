@@ -56,17 +56,13 @@ class Reading:
         How a message calls it: ``"tissue.1"``, ``"boundary 2"``.
     problems : Problems
         Where faults go.
-
-    Attributes
-    ----------
-    variant : str or None
-        Which of the table's variants it is; None if that cannot be told.
     """
 
     def __init__(self, table: Table, values: Any, context: Context, where: str, problems: Problems) -> None:
         self.context, self.where, self.problems = context, where, problems
         self._good: dict[str, Any] = {}
         self._named: set[str] = set(values) if isinstance(values, dict) else set()
+        #: Which of the table's variants it is; None if that cannot be told.
         self.variant: str | None = None
         self.keys = table.keys_of("")
         if not isinstance(values, dict):
@@ -168,26 +164,13 @@ def _file_of(folder: Path, name: str) -> tuple[Path | None, str]:
 
 @dataclass
 class Context:
-    """Where a case is being read from, and what was found wrong so far.
+    """Where a case is being read from, and what was found wrong so far."""
 
-    Attributes
-    ----------
-    file : Path
-        The `case.toml`.
-    tables : dict
-        Its top level.
-    problems : Problems
-    frame : Frame
-        Of every file in the folder.
-    mesh : TetMesh or None
-        The whole anatomy; None if it could not be read.
-    """
-
-    file: Path
-    tables: dict[str, Any]
+    file: Path  # the `case.toml`
+    tables: dict[str, Any]  # its top level
     problems: Problems
-    frame: Frame = field(default_factory=Frame)
-    mesh: TetMesh | None = None
+    frame: Frame = field(default_factory=Frame)  # of every file in the folder
+    mesh: TetMesh | None = None  # the whole anatomy; None if it could not be read
 
     def table(self, table: Table, needed: bool = True) -> Reading:
         """Read ``[name]``; one that may be left out is read as an empty table."""

@@ -34,22 +34,13 @@ _DIRECTIONS = (".csv", ".npy", ".vtu", ".vtk", ".xdmf", ".msh")
 
 @dataclass
 class Named:
-    """Looks up what a key names, and adds to the mesh what comes from elsewhere.
+    """Looks up what a key names, and adds to the mesh what comes from elsewhere."""
 
-    Attributes
-    ----------
-    mesh : TetMesh
-        The whole anatomy; it gains an element set for each tissue that is named as one, the nodes of the wall of each
-        element set that is named as a node set, sets of nodes and vectors of elements from files.
-    tissues : mapping of int to Tissue
-    frame : Frame
-        Of the files.
-    problems : Problems
-    """
-
+    #: The whole anatomy; it gains an element set for each tissue that is named as one, the nodes of the wall of each
+    #: element set that is named as a node set, sets of nodes and vectors of elements from files.
     mesh: TetMesh
     tissues: Mapping[int, Tissue]
-    frame: Frame
+    frame: Frame  # of the files
     problems: Problems
 
     def nodes(self, table: Reading, in_file: MeshInFile) -> str | None:

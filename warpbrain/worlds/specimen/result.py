@@ -34,30 +34,16 @@ _ROWS, _REACH, _DURATION, _SPREAD = 40, 0.5, 100.0, 0.1
 
 @dataclass(frozen=True)
 class Ranked:
-    """One cause.
-
-    Attributes
-    ----------
-    name, sentence : str
-    kind : Kind
-    log_evidence : float
-        Of the cause alone against nothing.
-    probability : float
-        That it acts, whatever else does.
-    detectability : float or None
-        `d` of the effect, fitted alone: its length in standard deviations of noise and nuisances.
-    change : float or None
-        Of the held-out error of all rows [Pa] with it alone; negative is better. None where it was not fitted.
-    values : tuple of Value
-    region : str
-    """
+    """One cause."""
 
     name: str
     sentence: str
     kind: Kind
-    log_evidence: float
-    probability: float
+    log_evidence: float  # of the cause alone against nothing
+    probability: float  # that it acts, whatever else does
+    #: `d` of the effect, fitted alone: its length in standard deviations of noise and nuisances.
     detectability: float | None
+    #: Of the held-out error of all rows [Pa] with it alone; negative is better. None where it was not fitted.
     change: float | None
     values: tuple[Value, ...]
     region: str
@@ -96,32 +82,16 @@ class Score:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpecimenDiagnosis(Verdict[Ranked, Combination]):
-    """A diagnosis of a specimen; what it has in common with others: `warpbrain.worlds.verdict.Verdict`.
+    """A diagnosis of a specimen; what it has in common with others: `warpbrain.worlds.verdict.Verdict`."""
 
-    Attributes
-    ----------
-    protocol : Protocol
-        All recorded rows.
-    assumed : tuple of str
-        Causes of the fit that is "explained".
-    where : Segment or None
-    scores : dict of str to Score
-        ``"declared"``, ``"refitted"`` and, if something is missing, ``"explained"``.
-    stresses : dict of str to (n,) array
-        Of the same, at all rows [Pa]; and ``"heldout refitted"``, ``"heldout explained"``.
-    improvement : (part, low, high) or None
-        Of the refitted case's held-out error that is gone.
-    by_test : bool
-        Whether whole tests were held out.
-    """
-
-    protocol: Protocol
-    assumed: tuple[str, ...]
+    protocol: Protocol  # all recorded rows
+    assumed: tuple[str, ...]  # causes of the fit that is "explained"
     where: Segment | None
-    scores: Mapping[str, Score]
+    scores: Mapping[str, Score]  # ``"declared"``, ``"refitted"`` and, if something is missing, ``"explained"``
+    #: (n,), of the same, at all rows [Pa]; and ``"heldout refitted"``, ``"heldout explained"``.
     stresses: Mapping[str, Floats]
-    improvement: tuple[float, float, float] | None
-    by_test: bool
+    improvement: tuple[float, float, float] | None  # of the refitted case's held-out error that is gone
+    by_test: bool  # whether whole tests were held out
 
     @cached_property
     def sentence(self) -> str:
