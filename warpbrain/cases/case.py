@@ -28,7 +28,7 @@ class Tissue:
     """A tissue of a case."""
 
     name: str
-    law: Law | None  # none if the generative model is to give it (``mu = "prior"``)
+    law: Law | None  # None if the generative model is to give it (``mu = "prior"``)
     formulation: str = "coupled"
     prior: str = ""  # group of the generative model; may be empty
     model: str = "neo-hookean"  # name of the law, which is known even where its parameters are not

@@ -73,10 +73,7 @@ def with_prior_draw(case: Case, number: int, seed: int = 0, model: Process | Non
 def with_prior_middle(case: Case, model: Process | None = None) -> FromPrior:
     """The case with the laws of tissues that say `mu = "prior"` from the middle curves of their groups.
 
-    Raises
-    ------
-    InputError
-        With file, tissue and key, if the model has seen no study of a group.
+    `InputError`: with file, tissue and key, if the model has seen no study of a group.
     """
     asked = _default(model)
     labels = tuple(label for label, tissue in sorted(case.tissues.items()) if tissue.law is None)

@@ -65,10 +65,7 @@ def catalogue() -> list[Entry]:
 def files_of(name: str) -> list[Path]:
     """Every `case.toml` of a shipped case or of a folder: the one of many tissues, and that of one tissue if there.
 
-    Raises
-    ------
-    InputError
-        If there is no such case and no such folder.
+    `InputError` if there is no such case and no such folder.
     """
     name = ALIASES.get(name, name)
     if name in SHIPPED:
@@ -114,10 +111,7 @@ def find_case(name: str, tissue: str = "multi") -> Case:
 def as_case(case: Case | str | os.PathLike[str], tissue: str = "multi") -> Case:
     """A case that may be given itself, by name, or by its path.
 
-    Raises
-    ------
-    InputError
-        If it is none of these, there is no such case, or it is wrong.
+    `InputError` if it is none of these, there is no such case, or it is wrong.
     """
     from warpbrain.cases.case import Case
 

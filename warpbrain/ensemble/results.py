@@ -59,7 +59,7 @@ class EnsembleResult(Shown):
     """Everything that an ensemble says."""
 
     rows: tuple[Row, ...]  #: by number
-    fields: Fields | None  #: none if no sample has an answer
+    fields: Fields | None  #: None if no sample has an answer
     displacement: Mapping[str, Spread]  #: of the samples' mean displacement by node set [m]
     errors: Mapping[str, Spread]  #: of the samples' root mean square errors by recording, in its unit
     not_compared: tuple[str, ...]  #: why some recordings are not compared, a sentence each

@@ -64,10 +64,7 @@ class MovedPoints:
 def read_point_file(path: Path) -> PointFile:
     """Read a 3D Slicer markup (`.mrk.json`, `.fcsv`) or a BIDS `electrodes.tsv`.
 
-    Raises
-    ------
-    InputError
-        Naming the file, what was found and what was expected.
+    `InputError`, naming the file, what was found and what was expected.
     """
     if not (is_electrodes(path) or is_markup(path)):
         raise InputError(f"{path}: found ending '{path.suffix}', expected .mrk.json, .fcsv or a BIDS electrodes.tsv")

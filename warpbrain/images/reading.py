@@ -48,10 +48,7 @@ def require(module: str, distribution: str, what: str) -> None:
 def read_image(path: Path) -> Image:
     """Read one volume of real or whole numbers; any orientation, any voxel size.
 
-    Raises
-    ------
-    InputError
-        Naming the file, what was found and what was expected.
+    `InputError`, naming the file, what was found and what was expected.
     """
     if path.is_dir():
         raise InputError(
@@ -65,10 +62,7 @@ def read_image(path: Path) -> Image:
 def labels_of(image: Image) -> NDArray[np.int32]:
     """The labels (i, j, k) of an image, zero is background.
 
-    Raises
-    ------
-    InputError
-        If its values are not all whole numbers of zero or more.
+    `InputError` if its values are not all whole numbers of zero or more.
     """
     path, values = image.path, image.values
     with np.errstate(invalid="ignore"):

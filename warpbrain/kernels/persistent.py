@@ -167,17 +167,8 @@ class Meetings:
 class PersistentSolve:
     """Solves ``matrix x = b`` by one launch; its parameters are those of `warpbrain.kernels.linear.ConjugateGradient`.
 
-    Parameters
-    ----------
-    matrix : warp.sparse.BsrMatrix
-    diagonal : wp.array of int, shape (n,)
-    b, x : wp.array of vec3, shape (n,)
-    precision : Precision
-    max_iterations : int
-    jacobi : bool
-        Precondition by inverse diagonal blocks.
-    watch : bool
-        End where the smallest curvature is not positive.
+    `diagonal`, `b`, `x` (n,). `jacobi`: precondition by inverse diagonal blocks. `watch`: end where the smallest
+    curvature is not positive.
     """
 
     def __init__(
@@ -219,10 +210,7 @@ class PersistentSolve:
     def outcome(self) -> tuple[int, float, float, float]:
         """Iterations, residual, the norm that was to be reached and the smallest curvature of the last solve.
 
-        Raises
-        ------
-        SolveError
-            If a block did not hear from another.
+        `SolveError` if a block did not hear from another.
         """
         self._meetings.check()
         iterations, residual, goal, curvature = self._outcome.numpy()

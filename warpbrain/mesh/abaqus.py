@@ -40,10 +40,7 @@ class AbaqusSets:
 def read_abaqus(path: Path) -> Any:
     """Read a file: a `meshio.Mesh` with its sets; `info[MATERIAL_SETS]` lists which of them may be the materials.
 
-    Raises
-    ------
-    MeshError
-        If a set cannot be understood or has what is not there, or the file includes another one.
+    `MeshError` if a set cannot be understood or has what is not there, or the file includes another one.
     """
     import meshio
 

@@ -85,10 +85,7 @@ def read_mesh_file(path: str | os.PathLike[str], unit: str = "m", tissue: str | 
 def read_raw(path: Path) -> Any:
     """What meshio reads of a file: a `meshio.Mesh` with cells of any kind.
 
-    Raises
-    ------
-    MeshError
-        Naming the file, what was found and what was expected.
+    `MeshError`, naming the file, what was found and what was expected.
     """
     import meshio
 

@@ -60,21 +60,10 @@ def free_parts(mesh: TetMesh, held: Bools, inner: ArrayLike, smallest: float = 0
     The boundary without triangles whose nodes are all held falls into pieces that hang together through edges; the
     wall of a cut, the walls of voids and the outside are apart even where they touch.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-    held : (n,) bool array
-        Nodes that cannot move, or not along the normal.
-    inner : (n,) bool array
-        Nodes on the walls of voids, as the body was before anything was cut out.
-    smallest : float
-        Part of the area of all pieces of one origin on one closed surface. A piece of less, such as a gap in what is
-        held, belongs to the largest of them.
-
-    Returns
-    -------
-    list of FreePart
-        Outside, voids, cuts; of each the largest area first.
+    `held` (n,): nodes that cannot move, or not along the normal. `inner` (n,): nodes on the walls of voids, as the body
+    was before anything was cut out. `smallest`: part of the area of all pieces of one origin on one closed surface. A
+    piece of less, such as a gap in what is held, belongs to the largest of them. Returns outside, voids, cuts; of each
+    the largest area first.
     """
     faces = mesh.boundary
     free = ~held[faces].all(axis=1)
@@ -121,15 +110,7 @@ def faces_of(mesh: TetMesh, members: Bools) -> Ints:
     A triangle of the surface beside a cut can have all its nodes on the cut's rim. It is no part of the wall: where all
     members on the boundary are nodes of the cut, the set has triangles of the cut alone.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-    members : (n,) bool array
-
-    Returns
-    -------
-    (k, 3) int32 array
-        Node ids, oriented outwards: triangles all of whose nodes are members.
+    `members` (n,). Returns (k, 3): node ids, oriented outwards: triangles all of whose nodes are members.
     """
     faces = mesh.boundary
     held = faces[members[faces].all(axis=1)]
@@ -142,10 +123,7 @@ def faces_of(mesh: TetMesh, members: Bools) -> Ints:
 def faces_of_set(mesh: TetMesh, name: str, who: str) -> Ints:
     """Boundary triangles (k, 3) all of whose nodes are in a node set; `who` asks for them, for the message.
 
-    Raises
-    ------
-    InputError
-        If there is no such set or no such triangle.
+    `InputError` if there is no such set or no such triangle.
     """
     if name not in mesh.node_sets:
         known = ", ".join(sorted(mesh.node_sets)) or "none"

@@ -40,18 +40,8 @@ def integrals_of_shapes(mesh: TetMesh | QuadraticMesh) -> Floats:
 def integrals_above(mesh: TetMesh | QuadraticMesh, up: ArrayLike, level: float) -> Floats:
     """`int N_a dV` over the part of each tetrahedron where `x . up > level`.
 
-    Parameters
-    ----------
-    mesh : TetMesh or QuadraticMesh
-    up : (3,) array
-        Unit normal of the plane.
-    level : float
-        Its distance from the origin along `up` [m].
-
-    Returns
-    -------
-    (m, 4) or (m, 10) array
-        [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`.
+    `up` (3,): unit normal of the plane. `level`: its distance from the origin along `up` [m]. Returns (m, 4) or
+    (m, 10) [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`.
     """
     cut = _Cut(mesh, np.asarray(up, dtype=np.float64), level)
     whole = integrals_of_shapes(mesh)
@@ -72,17 +62,8 @@ def integrals_on_plane(
 ) -> Floats:
     """`int N_a w dA` over the part of the plane `x . up = level` inside each tetrahedron.
 
-    Parameters
-    ----------
-    mesh, up, level
-        See `integrals_above`.
-    weight : callable
-        From points (k, 3) [m] on the plane to values (k,); exact for polynomials of degree 2.
-
-    Returns
-    -------
-    (m, 4) or (m, 10) array
-        [m2] times the unit of the weight.
+    `mesh`, `up`, `level`: see `integrals_above`. `weight`: from points (k, 3) [m] on the plane to values (k,); exact
+    for polynomials of degree 2. Returns (m, 4) or (m, 10) [m2] times the unit of the weight.
     """
     cut = _Cut(mesh, np.asarray(up, dtype=np.float64), level)
     rule, shares = triangle_rule()

@@ -20,21 +20,8 @@ def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius:
     surface would tell these apart as well where the way around is long, but not at an edge or a crest; paths along the
     edges of triangles are as much too long as the mesh is coarse, and what they select jumps as a centre moves.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions [m].
-    faces : (b, 3) array
-        Triangles of the surface, oriented outwards.
-    centre : (3,) array
-        [m]
-    radius : float
-        [m]
-
-    Returns
-    -------
-    (k,) int64 array
-        Numbers of triangles, increasing; empty if none comes within the radius.
+    `points` (n, 3): node positions [m]. `faces` (b, 3): triangles of the surface, oriented outwards. `centre` (3,) and
+    `radius` [m]. Returns (k,): numbers of triangles, increasing; empty if none comes within the radius.
     """
     triangles = np.asarray(faces)
     corners = np.asarray(points, dtype=np.float64)[triangles] - np.asarray(centre, dtype=np.float64)

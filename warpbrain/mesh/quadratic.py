@@ -25,10 +25,7 @@ CORNER_MASS, MIDSIDE_MASS = 1.0 / 36.0, 4.0 / 27.0
 class QuadraticMesh:
     """A mesh with midside nodes.
 
-    Parameters
-    ----------
-    corners : TetMesh
-        What it is of; its n nodes come first.
+    `corners`: what it is of; its n nodes come first.
     """
 
     corners: TetMesh
@@ -112,18 +109,9 @@ class QuadraticMesh:
 def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> Floats:
     """A field of quadratic tetrahedra with straight sides at points in them.
 
-    Parameters
-    ----------
-    weights : (n, 4) array
-        Barycentric coordinates of each point.
-    corners : (n, 4, c) array
-        Values at the corners of its tetrahedron.
-    middles : (n, 6, c) array
-        Values in the middle of the edges, in the order of `warpbrain.mesh.surface.EDGES`.
-
-    Returns
-    -------
-    (n, c) array
+    `weights` (n, 4): barycentric coordinates of each point. `corners` (n, 4, c): values at the corners of its
+    tetrahedron. `middles` (n, 6, c): values in the middle of the edges, in the order of `warpbrain.mesh.surface.EDGES`.
+    Returns (n, c).
     """
     of_corners = np.einsum("na,nac->nc", weights * (2.0 * weights - 1.0), corners)
     return np.asarray(of_corners + np.einsum("na,nac->nc", 4.0 * weights[:, EDGES].prod(axis=2), middles))

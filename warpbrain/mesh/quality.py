@@ -18,19 +18,10 @@ _OPPOSITE = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])
 def dihedral_angles(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
     """Angles between the faces of tetrahedra.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions, any unit.
-    tetrahedra : (m, 4) array
-        Node ids, positively oriented.
-
-    Returns
-    -------
-    (m, 6) array
-        Interior dihedral angle [degrees] at edges 01, 02, 03, 12, 13, 23. A regular tetrahedron has
-        arccos(1/3) = 70.53 degrees at every edge. The angle is made from the sine and the cosine, so that
-        flat tetrahedra are measured as well as good ones.
+    `points` (n, 3): node positions, any unit. `tetrahedra` (m, 4): node ids, positively oriented. Returns (m, 6):
+    interior dihedral angle [degrees] at edges 01, 02, 03, 12, 13, 23. A regular tetrahedron has arccos(1/3) = 70.53
+    degrees at every edge. The angle is made from the sine and the cosine, so that flat tetrahedra are measured as well
+    as good ones.
     """
     corner = np.asarray(points, dtype=np.float64)[np.asarray(tetrahedra)]
     start, end = corner[:, EDGES[:, 0]], corner[:, EDGES[:, 1]]
@@ -46,17 +37,8 @@ def dihedral_angles(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
 def components(tetrahedra: ArrayLike, tissue: ArrayLike | None = None) -> Ints:
     """Number of the face-connected piece that each tetrahedron belongs to.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids.
-    tissue : (m,) array, optional
-        If given, faces between different labels do not connect: pieces are then pieces of one tissue.
-
-    Returns
-    -------
-    (m,) int32 array
-        Piece numbers 0, 1, ... in order of each piece's first tetrahedron.
+    `tetrahedra` (m, 4): node ids. `tissue` (m,): if given, faces between different labels do not connect: pieces are
+    then pieces of one tissue. Returns (m,): piece numbers 0, 1, ... in order of each piece's first tetrahedron.
     """
     tets = np.asarray(tetrahedra)
     pair = paired_faces(tets)[0] // len(FACES)

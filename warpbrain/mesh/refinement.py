@@ -25,13 +25,9 @@ def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
     The four at the corners are similar to the whole; the octahedron between them is cut along its shortest diagonal, so
     that elements do not become worse without limit (Bey 1995, Computing 55, 355).
 
-    Returns
-    -------
-    mesh : TetMesh
-        Nodes 0 to n - 1 are those of the mesh it is of, elements 8 e to 8 e + 7 are in element e. Midpoints are in
-        node sets by the rule of `inherited`.
-    ends : (n', 2) int array
-        For each node the two between which it lies in the middle; an old one lies between itself and itself.
+    Returns `mesh`: nodes 0 to n - 1 are those of the mesh it is of, elements 8 e to 8 e + 7 are in element e. Midpoints
+    are in node sets by the rule of `inherited`; `ends` (n', 2): for each node the two between which it lies in the
+    middle; an old one lies between itself and itself.
     """
     sides = np.sort(mesh.tetrahedra[:, EDGES], axis=2).reshape(-1, 2)
     edges, number = np.unique(sides, axis=0, return_inverse=True)
@@ -93,13 +89,8 @@ def inherited(members: Bools, ends: Ints, surface: Bools) -> Bools:
     A midpoint is in it if both ends of its edge are; of a set of nodes of the surface only if the edge lies on the
     surface too.
 
-    Parameters
-    ----------
-    members : (n,) bool array
-    ends : (n', 2) int array
-        The two nodes between which each node lies in the middle.
-    surface : (n',) bool array
-        Nodes, midpoints among them, that are of the boundary.
+    `members` (n,). `ends` (n', 2): the two nodes between which each node lies in the middle. `surface` (n',): nodes,
+    midpoints among them, that are of the boundary.
     """
     both = members[ends].all(axis=1)
     inside = members & ~surface[: len(members)]

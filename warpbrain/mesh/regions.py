@@ -45,18 +45,9 @@ class MeshWithRegions:
 def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithRegions:
     """Read a mesh with its tissues and sets.
 
-    Parameters
-    ----------
-    path : Path
-    unit : {"m", "mm"}
-        Of its coordinates.
-    array : str, optional
-        Cell array of the tissues, or `SETS`; by default ``tissue`` if there is one, else the only one that can be it.
-
-    Raises
-    ------
-    MeshError
-        Naming the file, if it is no mesh, or several arrays could be the tissues; the message lists them.
+    `unit` ("m" or "mm"): of its coordinates. `array`: cell array of the tissues, or `SETS`; by default ``tissue`` if
+    there is one, else the only one that can be it. `MeshError`, naming the file, if it is no mesh, or several arrays
+    could be the tissues; the message lists them.
     """
     raw = read_raw(path)
     if not any(block.type in TETRAHEDRA for block in raw.cells):

@@ -34,22 +34,9 @@ def edges_of(faces: ArrayLike) -> NDArray[np.int64]:
 def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Which faces of which tetrahedra coincide.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids.
-
-    Returns
-    -------
-    pairs : (k, 2) int64 array
-        Faces shared by two tetrahedra; face number = 4 * tetrahedron + local face.
-    single : (b,) int64 array
-        Faces that only one tetrahedron has.
-
-    Raises
-    ------
-    ValueError
-        If a face belongs to three or more tetrahedra.
+    `tetrahedra` (m, 4): node ids. Returns `pairs` (k, 2): faces shared by two tetrahedra; face number = 4 * tetrahedron
+    + local face; `single` (b,): faces that only one tetrahedron has. `ValueError` if a face belongs to three or more
+    tetrahedra.
     """
     tets = np.asarray(tetrahedra)
     faces = np.sort(tets[:, FACES].reshape(-1, 3), axis=1)
@@ -75,15 +62,7 @@ def _corners(tetrahedra: ArrayLike, faces: NDArray[np.int64]) -> Ints:
 def all_faces(tetrahedra: ArrayLike) -> Ints:
     """Every triangle of a mesh once, inside and on the boundary.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids.
-
-    Returns
-    -------
-    (k, 3) int32 array
-        Node ids.
+    `tetrahedra` (m, 4): node ids. Returns (k, 3): node ids.
     """
     pairs, single = paired_faces(tetrahedra)
     return _corners(tetrahedra, np.concatenate([pairs[:, 0], single]))
@@ -92,15 +71,8 @@ def all_faces(tetrahedra: ArrayLike) -> Ints:
 def boundary_faces(tetrahedra: ArrayLike) -> Ints:
     """Triangles of the boundary, oriented outwards.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids, positively oriented.
-
-    Returns
-    -------
-    (b, 3) int32 array
-        Node ids; ``(p1 - p0) x (p2 - p0)`` points out of the body, into a cavity where there is one.
+    `tetrahedra` (m, 4): node ids, positively oriented. Returns (b, 3): node ids; ``(p1 - p0) x (p2 - p0)`` points out
+    of the body, into a cavity where there is one.
     """
     return _corners(tetrahedra, paired_faces(tetrahedra)[1])
 
@@ -108,17 +80,8 @@ def boundary_faces(tetrahedra: ArrayLike) -> Ints:
 def interface_faces(tetrahedra: ArrayLike, tissue: ArrayLike) -> Ints:
     """Triangles between tetrahedra of different labels.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids, positively oriented.
-    tissue : (m,) array
-        Labels; a boolean element set works as well.
-
-    Returns
-    -------
-    (k, 3) int32 array
-        Node ids; the normal points away from the smaller label.
+    `tetrahedra` (m, 4): node ids, positively oriented. `tissue` (m,): labels; a boolean element set works as well.
+    Returns (k, 3): node ids; the normal points away from the smaller label.
     """
     pairs = paired_faces(tetrahedra)[0]
     labels = np.asarray(tissue)[pairs // 4]
@@ -137,16 +100,8 @@ def in_rows(faces: ArrayLike, others: ArrayLike) -> Bools:
 def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
     """Edges at which an oriented surface ends.
 
-    Parameters
-    ----------
-    faces : (b, 3) array
-        Triangles, all oriented to one side.
-
-    Returns
-    -------
-    (k, 2) int64 array
-        Edges that triangles do not run along as often one way as the other: none on a closed surface, even one that
-        touches itself.
+    `faces` (b, 3): triangles, all oriented to one side. Returns (k, 2): edges that triangles do not run along as often
+    one way as the other: none on a closed surface, even one that touches itself.
     """
     triangles = np.asarray(faces, dtype=np.int64)
     sides = triangles[:, SIDES].reshape(-1, 2)
@@ -158,17 +113,8 @@ def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
 def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Ints:
     """Number of the edge-connected surface each triangle belongs to.
 
-    Parameters
-    ----------
-    faces : (b, 3) array
-        Node ids.
-    joins : (3 b,) bool array, optional
-        Which of their sides, see `edges_of`, connect; all by default.
-
-    Returns
-    -------
-    (b,) int32 array
-        Surface numbers 0, 1, ...
+    `faces` (b, 3): node ids. `joins` (3 b,): which of their sides, see `edges_of`, connect; all by default. Returns
+    (b,): surface numbers 0, 1, ...
     """
     count = len(np.asarray(faces))
     number = np.unique(edges_of(faces), axis=0, return_inverse=True)[1].ravel()
@@ -181,16 +127,8 @@ def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Ints:
 def pinched_nodes(faces: ArrayLike) -> Ints:
     """Nodes where closed surfaces touch themselves or each other.
 
-    Parameters
-    ----------
-    faces : (b, 3) array
-        Node ids; every edge belongs to an even number of triangles.
-
-    Returns
-    -------
-    (k,) int32 array
-        Ids of nodes on an edge of more than two triangles, and of nodes whose triangles form more than one fan.
-        Empty for smooth closed surfaces.
+    `faces` (b, 3): node ids; every edge belongs to an even number of triangles. Returns (k,): ids of nodes on an edge
+    of more than two triangles, and of nodes whose triangles form more than one fan. Empty for smooth closed surfaces.
     """
     triangles = np.asarray(faces)
     sides = triangles[:, SIDES].reshape(-1, 2)
@@ -212,19 +150,9 @@ def pinched_nodes(faces: ArrayLike) -> Ints:
 def split_boundary(points: ArrayLike, tetrahedra: ArrayLike) -> tuple[Ints, list[Ints]]:
     """Outer surface and cavity walls.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions.
-    tetrahedra : (m, 4) array
-        Node ids, positively oriented.
-
-    Returns
-    -------
-    outer : (b, 3) int32 array
-        Triangles of the surfaces that enclose volume: one surface for a body in one piece.
-    cavities : list of (c, 3) int32 arrays
-        Triangles of each closed surface that excludes volume, largest volume first; normals point into the cavity.
+    `points` (n, 3): node positions. `tetrahedra` (m, 4): node ids, positively oriented. Returns `outer` (b, 3):
+    triangles of the surfaces that enclose volume: one surface for a body in one piece; `cavities` (c, 3): triangles of
+    each closed surface that excludes volume, largest volume first; normals point into the cavity.
     """
     faces = boundary_faces(tetrahedra)
     surface = closed_surfaces(faces)
@@ -266,17 +194,8 @@ def tangents(normals: ArrayLike) -> Floats:
 def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
     """Surface area lumped to nodes: a third of every triangle's area goes to each of its corners.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions [m].
-    faces : (b, 3) array
-        Triangles.
-
-    Returns
-    -------
-    (n,) array
-        Area [m2]; zero for nodes that `faces` does not name.
+    `points` (n, 3): node positions [m]. `faces` (b, 3): triangles. Returns (n,): area [m2]; zero for nodes that `faces`
+    does not name.
     """
     share = np.linalg.norm(face_vectors(points, faces), axis=1) / 3.0
     triangles = np.asarray(faces)
@@ -287,19 +206,10 @@ def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
 def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.bool_]]:
     """Angle-weighted normals (Baerentzen and Aanaes 2005) of each triangle's features, and which are on a rim.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-    faces : (k, 3) int array
-        Oriented outwards.
-
-    Returns
-    -------
-    normals : (k, 7, 3) array
-        Unit normals of the face, of its edges ab, bc, ca and of its corners. The closest point `p` of a closed surface
-        to `x` has `x` outside if `(x - p) . n > 0` with the normal of the feature that `p` is on.
-    on_rim : (k, 7) bool array
-        True for an edge of one triangle only and its corners, whose normal is that of the face.
+    `points` (n, 3). `faces` (k, 3): oriented outwards. Returns `normals` (k, 7, 3): unit normals of the face, of its
+    edges ab, bc, ca and of its corners, and `on_rim` (k, 7): True for an edge of one triangle only and its corners,
+    whose normal is that of the face. The closest point `p` of a closed surface to `x` has `x` outside if
+    `(x - p) . n > 0` with the normal of the feature that `p` is on.
     """
     normals = np.empty((len(faces), 7, 3))
     normals[:, 0] = _unit(face_vectors(points, faces))

@@ -295,17 +295,8 @@ class TetMesh:
 def signed_volumes(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
     """Signed volume of tetrahedra, in the cube of the unit of `points`.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions.
-    tetrahedra : (m, 4) array
-        Node ids.
-
-    Returns
-    -------
-    (m,) array
-        Positive where the tetrahedron is positively oriented.
+    `points` (n, 3): node positions. `tetrahedra` (m, 4): node ids. Returns (m,): positive where the tetrahedron is
+    positively oriented.
     """
     corner = np.asarray(points, dtype=np.float64)[np.asarray(tetrahedra)]
     a, b, c = (corner[:, i] - corner[:, 0] for i in (1, 2, 3))

@@ -63,25 +63,14 @@ class Recording:
     ) -> Self | None:
         """Read a file.
 
-        Parameters
-        ----------
-        path : Path
-        frame : Frame
-            Unit and axes of the file, unless it states its own.
-        problems : Problems
-            Gets everything that is wrong with the file.
-        name, file, role
-            As in `Recording`.
-        sigma : float, optional
-            As `case.toml` has it: noise of one component in the unit of the file.
-        **given
-            The `keys` of the kind in SI units and RAS axes, None where `case.toml` says nothing; of a key that names a
-            file its path, with the text as `KEY_file`.
+        `frame`: unit and axes of the file, unless it states its own.
+        `problems`: gets everything that is wrong with the file.
+        `name`, `file`, `role`: as in `Recording`.
+        `sigma`: as `case.toml` has it: noise of one component in the unit of the file.
+        `**given`: the `keys` of the kind in SI units and RAS axes, None where `case.toml` says nothing; of a key that
+        names a file its path, with the text as `KEY_file`.
 
-        Returns
-        -------
-        Recording or None
-            None if there were problems.
+        Returns None if there were problems.
         """
         with collected(path, problems) as of_file:
             values, unit = cls._read(path, frame, of_file, given)
@@ -130,10 +119,7 @@ class Recording:
     def check(self, mesh: TetMesh, path: Path, problems: Problems) -> None:
         """Note as problems what cannot have been recorded of a body (its mesh at rest, without what was resected).
 
-        Raises
-        ------
-        InputError
-            If the mesh has nothing that it could have been recorded of.
+        `InputError` if the mesh has nothing that it could have been recorded of.
         """
 
     @property
@@ -151,16 +137,8 @@ class Recording:
         Numbers are written with all their digits: in metres reading gives the same ones back, in mm the same to
         rounding. What stands in `case.toml` (name, role, sigma, node set, boundary, mode) is not in the file.
 
-        Parameters
-        ----------
-        path : Path
-        frame : Frame
-            Unit and axes of the file.
-
-        Raises
-        ------
-        InputError
-            If the ending is not that of such a recording, or the file cannot be written.
+        `frame`: unit and axes of the file. `InputError` if the ending is not that of such a recording, or the file
+        cannot be written.
         """
         path = Path(path)
         if path.suffix.lower() != self.ending:

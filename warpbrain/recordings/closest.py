@@ -25,10 +25,7 @@ class Spheres:
 
     They are sorted by size so that few large ones do not widen the search for all others.
 
-    Parameters
-    ----------
-    centres : (m, 3) array
-    radii : (m,) array
+    `centres` (m, 3). `radii` (m,).
     """
 
     def __init__(self, centres: Floats, radii: Floats) -> None:
@@ -85,17 +82,7 @@ class ClosestPoints:
 def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> ClosestPoints:
     """Closest points of a surface, exact to rounding; triangles without area count as the segments they are.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-    vertices : (v, 3) array
-    faces : (k, 3) array
-        Ids of vertices.
-
-    Raises
-    ------
-    InputError
-        If there are no faces.
+    `points` (n, 3). `vertices` (v, 3). `faces` (k, 3): ids of vertices. `InputError` if there are no faces.
     """
     xyz = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     triangles = np.asarray(faces)

@@ -27,15 +27,7 @@ def legacy_error(distances: ArrayLike) -> float:
     Its unit is the square root of a mm, not mm: it is the root of the mean distance, and no root mean square. It is
     here to stand beside published numbers, and for nothing else.
 
-    Parameters
-    ----------
-    distances : (n,) array or (n, 3) array
-        Distances or residual vectors [m].
-
-    Returns
-    -------
-    float
-        [sqrt(mm)]
+    `distances` (n,) or residual vectors (n, 3) [m]. Returns [sqrt(mm)].
     """
     return float(np.sqrt(np.mean(1000.0 * lengths(distances))))
 
@@ -100,24 +92,13 @@ def compare_points(
 ) -> Comparison:
     """Compare displacements of tracked points.
 
-    Parameters
-    ----------
-    recording : PointsRecording
-    mesh : TetMesh
-        At rest.
-    u : (N, 3) array
-        Displacement of the nodes [m].
-    time : float, optional
-        Of the state [s]; the recording's end if left out, see `rows_at`.
-    location : Location, optional
-        Of all points of the recording in the mesh, if it is known already.
-    rows : (n,) int array, optional
-        Those that are compared, whatever the time.
+    `mesh`: at rest.
+    `u` (N, 3): displacement of the nodes [m].
+    `time`: of the state [s]; the recording's end if left out, see `rows_at`.
+    `location`: of all points of the recording in the mesh, if it is known already.
+    `rows` (n,): those that are compared, whatever the time.
 
-    Raises
-    ------
-    InputError
-        If nothing was recorded at that time.
+    `InputError` if nothing was recorded at that time.
     """
     rows = rows_at(recording, time) if rows is None else rows
     place = locate(mesh.points, mesh.tetrahedra, recording.points[rows]) if location is None else location.at(rows)
@@ -142,11 +123,8 @@ def compare_surface(
     Parameters are those of `compare_points`. The way back goes from the nodes of these faces to the recorded triangles,
     or to the nearest recorded points if no triangles were recorded.
 
-    Raises
-    ------
-    InputError
-        If the mesh has no such node set, no boundary triangle has all its nodes in it, or nothing was recorded at that
-        time.
+    `InputError` if the mesh has no such node set, no boundary triangle has all its nodes in it, or nothing was recorded
+    at that time.
     """
     rows = rows_at(recording, time) if rows is None else rows
     points = recording.points[rows]
@@ -169,18 +147,8 @@ def compare_force(
 ) -> Comparison:
     """Compare the resultant of a boundary; components that were not recorded do not count.
 
-    Parameters
-    ----------
-    recording : ForceRecording
-    reaction : (3,) array
-        Force of the boundary on the tissue [N].
-    time, rows : optional
-        As in `compare_points`.
-
-    Raises
-    ------
-    InputError
-        If no component of the force was recorded, or nothing at that time.
+    `reaction` (3,): force of the boundary on the tissue [N]. `time`, `rows`: as in `compare_points`. `InputError` if no
+    component of the force was recorded, or nothing at that time.
     """
     rows = rows_at(recording, time) if rows is None else rows
     before = recording.force[rows]

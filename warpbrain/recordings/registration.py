@@ -15,10 +15,7 @@ from warpbrain.errors import InputError
 class Registration:
     """How far a registration may be wrong: one standard deviation each, normal.
 
-    Raises
-    ------
-    InputError
-        If one is not a positive number.
+    `InputError` if one is not a positive number.
     """
 
     shift: float  # of each component of a shift [m]

@@ -188,10 +188,7 @@ def turn_of(axis: tuple[float, float, float], sheared: tuple[float, float, float
 
     Without `sheared` the machine's x is what of the tissue's is across the axis, or of its y where that is little.
 
-    Raises
-    ------
-    InputError
-        If one of them is zero, or they are one direction.
+    `InputError` if one of them is zero, or they are one direction.
     """
     z = np.array(axis, dtype=np.float64)
     if not np.linalg.norm(z) > 0.0:

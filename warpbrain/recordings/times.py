@@ -42,21 +42,8 @@ def rows_at(recording: Recording, time: float | None = None) -> Ints:
     two, and of each id its own. They count if that is no farther away than half the median interval between the
     recording's times; a recording of one time must have that very time.
 
-    Parameters
-    ----------
-    recording : Recording
-    time : float, optional
-        [s]
-
-    Returns
-    -------
-    (k,) int64 array
-        Row numbers, increasing, at least one.
-
-    Raises
-    ------
-    InputError
-        If nothing was recorded at that time, or the recording has no times.
+    `time` [s]. Returns (k,): row numbers, increasing, at least one. `InputError` if nothing was recorded at that time,
+    or the recording has no times.
     """
     times = recording.time
     if times is None:

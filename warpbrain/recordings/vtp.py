@@ -29,10 +29,7 @@ def read_vtp(path: Path) -> tuple[Floats, Ints, str | None]:
 
     Polygons are cut into fans of triangles, strips into their triangles; vertices and lines are left out.
 
-    Raises
-    ------
-    ValueError
-        With what is wrong, if it is no such file.
+    `ValueError`: with what is wrong, if it is no such file.
     """
     file = _File(path.read_bytes())
     points: list[Floats] = [np.empty((0, 3))]

@@ -62,10 +62,7 @@ def make_regions(image: Image, assignment: Assignment) -> Regions:
 
     Pieces apart from the largest are left out, and unlabelled voids inside get the nearest label: both are noted.
 
-    Raises
-    ------
-    InputError
-        If the volume is none that a brain can have.
+    `InputError` if the volume is none that a brain can have.
     """
     codes, grid = _cropped(image, assignment)
     unit = image.grid.voxel_volume

@@ -45,17 +45,10 @@ def parse_toml(file: Path, problems: Problems) -> dict[str, Any] | None:
 class Reading:
     """A table of a file: the values that are right, with every fault noted as a problem.
 
-    Parameters
-    ----------
-    table : Table
-        What it may say.
-    values : Any
-        What the file has there.
-    context : Context
-    where : str
-        How a message calls it: ``"tissue.1"``, ``"boundary 2"``.
-    problems : Problems
-        Where faults go.
+    `table`: what it may say.
+    `values`: what the file has there.
+    `where`: how a message calls it: ``"tissue.1"``, ``"boundary 2"``.
+    `problems`: where faults go.
     """
 
     def __init__(self, table: Table, values: Any, context: Context, where: str, problems: Problems) -> None:
