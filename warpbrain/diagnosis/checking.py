@@ -66,10 +66,7 @@ def distance(sensors: Sensors, errors: Floats) -> float:
 
 
 class HeldOut:
-    """Predicts the rows of one case.
-
-    `local`: whether all that acts is local.
-    """
+    """Predicts the rows of one case. `local`: whether all that acts is local."""
 
     def __init__(self, sensors: Sensors, local: bool) -> None:
         self.sensors, self.blocks = sensors, blocks_of(sensors, local)

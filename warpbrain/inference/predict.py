@@ -49,10 +49,7 @@ class Prediction:
 
 
 def predict(model: GaussianModel, residual: Floats, blocks: Ints) -> Prediction:
-    """Predict every block of rows.
-
-    `residual` (n,), `blocks` (n,).
-    """
+    """Predict every block of rows. `residual` (n,), `blocks` (n,)."""
     return predict_with(model, residual, blocks, [np.zeros((len(model), 0))])[0]
 
 

@@ -23,10 +23,7 @@ CORNER_MASS, MIDSIDE_MASS = 1.0 / 36.0, 4.0 / 27.0
 
 @dataclass(frozen=True, eq=False)
 class QuadraticMesh:
-    """A mesh with midside nodes.
-
-    `corners`: what it is of; its n nodes come first.
-    """
+    """A mesh with midside nodes. `corners`: what it is of; its n nodes come first."""
 
     corners: TetMesh
     #: Linear tetrahedra with a corner at each of the N nodes: every element cut into eight. Sets are those of

@@ -83,10 +83,7 @@ class SavedResult:
 
 
 def read_result(folder: Path) -> SavedResult:
-    """Open a folder of results.
-
-    `InputError` if it holds none, or they cannot be read.
-    """
+    """Open a folder of results; `InputError` if it holds none, or they cannot be read."""
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
     name = next((name for name in _KINDS if (folder / name).is_file()), None)

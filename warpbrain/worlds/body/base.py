@@ -112,10 +112,7 @@ class BaseFinder:
         return self._prior()
 
     def find(self) -> Base:
-        """The base state.
-
-        `SolveError` if the case as declared has no equilibrium.
-        """
+        """The base state; `SolveError` if the case as declared has no equilibrium."""
         self._listener.stage("the case as declared")
         declared = self.states.solve(self._declared())
         self._listener.stage("tissue beside any smooth force")

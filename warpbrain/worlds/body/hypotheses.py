@@ -54,10 +54,7 @@ _BETTER = 1.0
 
 
 class HypothesisSearch:
-    """Weighs sets of causes.
-
-    `spacing`: between the places of a scan [m].
-    """
+    """Weighs sets of causes. `spacing`: between the places of a scan [m]."""
 
     def __init__(self, base: Base, candidates: Candidates, spacing: float, listener: Listener) -> None:
         self.base, self.candidates, self.spacing, self._listener = base, candidates, spacing, listener
