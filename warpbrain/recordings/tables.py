@@ -55,9 +55,9 @@ class Table:
         missing = [name for name in names if name not in self.header]
         for name in missing:
             near = _nearest(name, self.header)
-            found = ", ".join(f"{column}" for column in self.header[:8]) + (", ..." if len(self.header) > 8 else "")
+            columns = ", ".join(self.header[:8]) + (", ..." if len(self.header) > 8 else "")
             cure = f"is {shown(near)} meant?" if near else ""
-            self._problems.add(self.path, "header", f"found no column '{name}', found {found[:100]}", cure)
+            self._problems.add(self.path, "header", f"found no column '{name}', found {columns[:100]}", cure)
         return not missing
 
     def require(self, *names: str) -> None:
