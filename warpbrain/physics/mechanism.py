@@ -48,6 +48,8 @@ from warpbrain.physics.words import Smallest, Values, clauses, label, number
 #: an array of directions, a closed surface, a position, a vector that is no length, or numbers. Users may say a tissue
 #: for an element set, and files for directions and surfaces (`warpbrain.cases.parts.named`).
 KINDS = ("number", "text", "node set", "element set", "directions", "surface", "position", "vector", "numbers")
+#: Of these, what a state changes smoothly with.
+NUMBERS = ("number", "position", "vector", "numbers")
 
 
 @dataclass(frozen=True)
@@ -193,6 +195,19 @@ class Mechanism(Ramped, abc.ABC):
     def with_body_turned(self, rotation: Floats) -> Mechanism:
         """As it acts on a body that is turned in the room by a rotation (3, 3); itself if it turns with the body."""
         return self
+
+    def differs_in_numbers_only(self, other: Mechanism) -> bool:
+        """Whether another one is the same but for numbers, settings of the method and the ramp."""
+        if type(other) is not type(self):
+            return False
+        for name in (f.name for f in dataclasses.fields(self) if f.name != "ramp"):
+            says, mine, its = self.parameters().get(name), getattr(self, name), getattr(other, name)
+            if says is not None and says.kind in NUMBERS:
+                if not says.method and ((mine is None) != (its is None) or np.shape(mine) != np.shape(its)):
+                    return False
+            elif not (says is not None and says.method) and mine != its:
+                return False
+        return True
 
     @classmethod
     def required(cls) -> tuple[str, ...]:
