@@ -50,28 +50,55 @@ class Tissue:
 
 @dataclass(frozen=True)
 class Case(Shown):
-    """What a `case.toml` says, in SI units and RAS axes."""
+    """What a `case.toml` says, in SI units and RAS axes.
+
+    Attributes
+    ----------
+    name, title, origin : str
+        ``origin`` is ``"measured"``, ``"stand-in"`` or ``"synthetic"``.
+    path : Path
+        The file that was read.
+    frame : Frame
+        Unit and axes of the folder's files, in which they are written again.
+    gravity_axis : (float, float, float) or None
+        Where 'down' was while recording; None if unknown.
+    registration : Registration or None
+        How well recordings are registered to the anatomy; None if the case does not say.
+    mesh : TetMesh
+        The imaged anatomy, whole.
+    mesh_file : str
+        Relative to the folder; empty for a specimen.
+    specimen : Specimen or None
+    tissues : mapping of int to Tissue
+    density, poisson : float
+        [kg/m3] and without unit.
+    heterogeneity : float or None
+        Standard deviation of `ln mu` from place to place within a tissue; None if the case does not say.
+    boundaries : tuple of Boundary
+    mechanisms : tuple of Mechanism
+    recordings : tuple of Recording
+    remarks : tuple of str
+        What a user should know of how the files were read.
+    """
 
     name: str
     title: str
-    origin: str  #: ``"measured"``, ``"stand-in"`` or ``"synthetic"``
-    path: Path  #: the file that was read
-    mesh: TetMesh  #: the imaged anatomy, whole
+    origin: str
+    path: Path
+    mesh: TetMesh
     tissues: Mapping[int, Tissue]
-    density: float  #: [kg/m3]
+    density: float
     poisson: float
-    #: Standard deviation of `ln mu` from place to place within a tissue; None if the case does not say.
     heterogeneity: float | None = None
-    frame: Frame = field(default_factory=Frame)  #: unit and axes of the folder's files, in which they are written again
-    gravity_axis: tuple[float, float, float] | None = None  #: where 'down' was while recording; None if unknown
-    #: How well recordings are registered to the anatomy; None if the case does not say.
+    frame: Frame = field(default_factory=Frame)
+    gravity_axis: tuple[float, float, float] | None = None
     registration: Registration | None = None
-    mesh_file: str = "mesh.vtu"  #: relative to the folder; empty for a specimen
+    mesh_file: str = "mesh.vtu"
     specimen: Specimen | None = None
     boundaries: tuple[Boundary, ...] = ()
     mechanisms: tuple[Mechanism, ...] = ()
     recordings: tuple[Recording, ...] = ()
-    remarks: tuple[str, ...] = ()  #: what a user should know of how the files were read
+    remarks: tuple[str, ...] = ()
 
     @property
     def folder(self) -> Path:

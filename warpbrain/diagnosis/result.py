@@ -89,18 +89,33 @@ class Fit:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Diagnosis(Verdict[Ranked, Combination]):
-    """A diagnosis of a body; what it has in common with others: `warpbrain.worlds.verdict.Verdict`."""
+    """A diagnosis of a body; what it has in common with others: `warpbrain.worlds.verdict.Verdict`.
+
+    Attributes
+    ----------
+    map : ScoreMap
+    when : Onset or None
+        When the best explanation set in; None with one recorded time, or if nothing physical is missing.
+    search : HypothesisSearch
+        Of the sets of causes, with its base.
+    weighted_sets : dict of str to WeightedSet
+        ``"refitted"`` without any cause, ``"explained"`` with all that is named.
+    held_out : dict of str to Prediction
+        Their predictions of held-out points.
+    confusion : Confusion
+    fit : Fit
+    unknown : Traits or None
+        Of a force that no mechanism explains: alone, or in addition to what is named.
+    """
 
     map: ScoreMap
-    #: When the best explanation set in; None with one recorded time, or if nothing physical is missing.
     when: Onset | None
-    search: HypothesisSearch  #: of the sets of causes, with its base
-    #: ``"refitted"`` without any cause, ``"explained"`` with all that is named.
+    search: HypothesisSearch
     weighted_sets: Mapping[str, WeightedSet]
-    held_out: Mapping[str, Prediction]  #: their predictions of held-out points
+    held_out: Mapping[str, Prediction]
     confusion: Confusion
     fit: Fit
-    unknown: Traits | None = None  #: of a force that no mechanism explains: alone, or in addition to what is named
+    unknown: Traits | None = None
 
     @property
     def base(self) -> Base:

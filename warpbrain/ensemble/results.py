@@ -56,13 +56,27 @@ class Fields:
 
 @dataclass(frozen=True)
 class EnsembleResult(Shown):
-    """Everything that an ensemble says."""
+    """Everything that an ensemble says.
 
-    rows: tuple[Row, ...]  #: by number
-    fields: Fields | None  #: None if no sample has an answer
-    displacement: Mapping[str, Spread]  #: of the samples' mean displacement by node set [m]
-    errors: Mapping[str, Spread]  #: of the samples' root mean square errors by recording, in its unit
-    not_compared: tuple[str, ...]  #: why some recordings are not compared, a sentence each
+    Attributes
+    ----------
+    rows : tuple of Row
+        By number.
+    fields : Fields or None
+        None if no sample has an answer.
+    displacement : mapping of str to Spread
+        Of the samples' mean displacement by node set [m].
+    errors : mapping of str to Spread
+        Of the samples' root mean square errors by recording, in its unit.
+    not_compared : tuple of str
+        Why some recordings are not compared, a sentence each.
+    """
+
+    rows: tuple[Row, ...]
+    fields: Fields | None
+    displacement: Mapping[str, Spread]
+    errors: Mapping[str, Spread]
+    not_compared: tuple[str, ...]
 
     @property
     def failed(self) -> tuple[Row, ...]:

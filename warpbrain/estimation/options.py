@@ -22,18 +22,33 @@ class Listener:
 
 @dataclass(frozen=True)
 class EstimationOptions:
-    """How to estimate."""
+    """How to estimate.
+
+    Attributes
+    ----------
+    likelihood : Likelihood
+    discretisation : Discretisation or None
+        None: the mesh is taken for exact, and the estimate holds for this mesh only.
+    registration : bool
+        Whether a rigid error of registration is estimated along, as large as `registration_of` the case; otherwise
+        positions are taken as they were recorded.
+    samples : int
+        Draws that check Laplace's approximation, an equilibrium each.
+    chain : int
+        Equilibria of the chain that replaces it where it fails.
+    seed : int
+        Of those draws.
+    tolerance : float
+        Of Gauss-Newton, see `GaussNewton`.
+    """
 
     likelihood: Likelihood = field(default_factory=Likelihood)
-    #: None: the mesh is taken for exact, and the estimate holds for this mesh only.
     discretisation: Discretisation | None = field(default_factory=Discretisation)
-    #: Whether a rigid error of registration is estimated along, as large as `registration_of` the case; otherwise
-    #: positions are taken as they were recorded.
     registration: bool = True
-    samples: int = 40  #: draws that check Laplace's approximation, an equilibrium each
-    chain: int = 300  #: equilibria of the chain that replaces it where it fails
-    seed: int = 0  #: of those draws
-    tolerance: float = 1e-4  #: of Gauss-Newton, see `GaussNewton`
+    samples: int = 40
+    chain: int = 300
+    seed: int = 0
+    tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
         if not isinstance(self.registration, bool):

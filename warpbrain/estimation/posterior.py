@@ -270,20 +270,42 @@ class Marginal:
 
 @dataclass(frozen=True, eq=False)
 class Posterior(Shown):
-    """The answer."""
+    """The answer.
+
+    Attributes
+    ----------
+    case : Case
+    options : EstimationOptions
+    prior : Prior
+    modes : tuple of Estimate
+        The most probable first.
+    remarks : tuple of str
+        What a user should know of how it was found.
+    mesh_errors : tuple of DiscretisationError
+        The error of the mesh each time it was computed; the last one counts. Empty if it was left out.
+    importance : Importance
+        The check of Laplace's approximation.
+    doubts : tuple of str
+        Why that is not to be believed; empty if it is.
+    chain : Chain or None
+        What takes its place then.
+    solves : mapping of str to int
+        Equilibria by what they were for.
+    seconds : mapping of str to float
+        Wall time by stage.
+    """
 
     case: Case
     options: EstimationOptions
     prior: Prior
-    modes: tuple[Estimate, ...]  #: the most probable first
-    remarks: tuple[str, ...]  #: what a user should know of how it was found
-    #: The error of the mesh each time it was computed; the last one counts. Empty if it was left out.
+    modes: tuple[Estimate, ...]
+    remarks: tuple[str, ...]
     mesh_errors: tuple[DiscretisationError, ...]
-    importance: Importance  #: the check of Laplace's approximation
-    doubts: tuple[str, ...]  #: why that is not to be believed; empty if it is
-    chain: Chain | None  #: what takes its place then
-    solves: Mapping[str, int]  #: equilibria by what they were for
-    seconds: Mapping[str, float]  #: wall time by stage
+    importance: Importance
+    doubts: tuple[str, ...]
+    chain: Chain | None
+    solves: Mapping[str, int]
+    seconds: Mapping[str, float]
 
     @property
     def best(self) -> Estimate:

@@ -77,18 +77,34 @@ class Prior:
     the coefficient: that is a mass on a side, which the samples have, which `at_bound` states, and which `log_density`
     spreads inwards a little. Ogden's stable exponents lie above 1 and below -2: those of different signs are clusters.
     Of both shapes the Gaussian approximation is a poor one, and `distances` says how poor.
+
+    Attributes
+    ----------
+    model : Process
+    groups : tuple of str
+        One for each tissue, all different.
+    laws_of : tuple of str
+        Name of the law of each tissue.
+    poisson, formulation : float, str or tuple of str
+        With which the laws are stable; one formulation for all tissues, or one for each.
+    seed : int
+    theta : (n, p) array
+        Draws 0 to n - 1 of the seed, on which all but `samples` rests.
+    attempts : int
+        That these draws took.
+    at_bound : (groups,) array
+        Part of the draws in which the fit of a tissue lies at a bound of its parameters.
     """
 
     model: Process
-    groups: tuple[str, ...]  #: one for each tissue, all different
-    laws_of: tuple[str, ...]  #: name of the law of each tissue
-    #: With which the laws are stable; one formulation for all tissues, or one for each.
+    groups: tuple[str, ...]
+    laws_of: tuple[str, ...]
     poisson: float
     formulation: str | tuple[str, ...]
     seed: int
-    theta: Floats  #: (n, p), draws 0 to n - 1 of the seed, on which all but `samples` rests
-    attempts: int  #: that these draws took
-    at_bound: Floats  #: (groups,), part of the draws in which the fit of a tissue lies at a bound of its parameters
+    theta: Floats
+    attempts: int
+    at_bound: Floats
 
     @classmethod
     def of(

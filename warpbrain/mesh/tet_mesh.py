@@ -19,11 +19,16 @@ LARGEST = 1e12
 
 
 class MeshError(InputError):
-    """A mesh that cannot be computed with; the message is one line that says what is wrong and where."""
+    """A mesh that cannot be computed with; the message is one line that says what is wrong and where.
+
+    Attributes
+    ----------
+    messages : tuple of str
+        Everything that is wrong, of which the message is the first.
+    """
 
     def __init__(self, *messages: str) -> None:
         super().__init__(messages[0])
-        #: Everything that is wrong, of which the message is the first.
         self.messages = messages
 
     def within(self, place: str) -> MeshError:

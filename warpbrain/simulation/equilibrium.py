@@ -46,25 +46,44 @@ class NewtonStep:
 
 @dataclass(frozen=True)
 class EquilibriumOptions:
-    """How to solve."""
+    """How to solve.
 
-    #: Converged when ``|r| <= tolerance (|f_int| + |f_ext|)``: out-of-balance force on the free components against all
-    #: nodal forces, reactions included.
+    Attributes
+    ----------
+    tolerance : float
+        Converged when ``|r| <= tolerance (|f_int| + |f_ext|)``: out-of-balance force on the free components against
+        all nodal forces, reactions included.
+    max_newton : int
+        Iterations in a load step before it is cut.
+    max_total_newton : int
+        Iterations in all before the solve gives up.
+    max_load_step, min_load_step : float
+        Largest load step, and the smallest before the solve gives up. A small largest step follows the path of a
+        slowly growing load; with the default of 1 Newton's method may land on another branch beyond a limit point.
+    cg_tolerance : float
+        Loosest relative tolerance of a linear solve; tightened as Newton converges.
+    max_cg : int
+        Iterations of a linear solve.
+    preconditioner : str
+        See `warpbrain.kernels.linear.PRECONDITIONERS`.
+    pass_unstable : bool
+        What to do where the tangent is indefinite, at limit and branching points of the equilibrium path. True: go on
+        downhill, as the damped body would (snap-through), and say so in the history. False: end there with an error
+        that names it. Negative curvature is seen only along the search directions of CG, not in every direction.
+    max_augmentations : int
+        Solves in all to meet the constraints that penalties stand for (contact).
+    """
+
     tolerance: float = 1e-8
-    max_newton: int = 30  #: iterations in a load step before it is cut
-    max_total_newton: int = 150  #: iterations in all before the solve gives up
-    #: Largest load step, and the smallest before the solve gives up. A small largest step follows the path of a slowly
-    #: growing load; with the default of 1 Newton's method may land on another branch beyond a limit point.
+    max_newton: int = 30
+    max_total_newton: int = 150
     max_load_step: float = 1.0
     min_load_step: float = 1.0 / 1024.0
-    cg_tolerance: float = 0.03  #: loosest relative tolerance of a linear solve; tightened as Newton converges
-    max_cg: int = 10_000  #: iterations of a linear solve
-    preconditioner: str = "block-jacobi"  #: see `warpbrain.kernels.linear.PRECONDITIONERS`
-    #: What to do where the tangent is indefinite, at limit and branching points of the equilibrium path. True: go on
-    #: downhill, as the damped body would (snap-through), and say so in the history. False: end there with an error that
-    #: names it. Negative curvature is seen only along the search directions of CG, not in every direction.
+    cg_tolerance: float = 0.03
+    max_cg: int = 10_000
+    preconditioner: str = "block-jacobi"
     pass_unstable: bool = True
-    max_augmentations: int = 20  #: solves in all to meet the constraints that penalties stand for (contact)
+    max_augmentations: int = 20
 
     def __post_init__(self) -> None:
         for name in ("tolerance", "min_load_step", "cg_tolerance"):
@@ -77,12 +96,25 @@ class EquilibriumOptions:
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A converged state."""
+    """A converged state.
 
-    u: Floats  #: (n, 3), displacement [m]
-    internal: Floats  #: (n, 3), internal forces [N]; on constrained components they are the reactions
-    energy: float  #: stored energy [J]
-    residual: float  #: relative out-of-balance force reached
+    Attributes
+    ----------
+    u : (n, 3) array
+        Displacement [m].
+    internal : (n, 3) array
+        Internal forces [N]; on constrained components they are the reactions.
+    energy : float
+        Stored energy [J].
+    residual : float
+        Relative out-of-balance force reached.
+    history : tuple of NewtonStep
+    """
+
+    u: Floats
+    internal: Floats
+    energy: float
+    residual: float
     history: tuple[NewtonStep, ...]
 
     @property
@@ -113,6 +145,11 @@ class EquilibriumSolver:
         Adds up the wall time by phase.
     factors : KeptFactors, optional
         Kept by who solves for many states that are near to each other; they serve on the CPU alone.
+
+    Attributes
+    ----------
+    clock : PhaseClock
+        Wall time by phase.
     """
 
     def __init__(

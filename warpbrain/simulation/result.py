@@ -39,23 +39,38 @@ class NodalState:
 class Result(Shown):
     """The state of a body.
 
+    Attributes
+    ----------
+    mesh : TetMesh
+        The simulated mesh, undeformed.
+    u : (n, 3) array
+        Displacement [m].
+    J : (m,) array
+        Volume ratio of each element.
+    principal_stretches : (m, 3) array
+        Descending.
+    von_mises, pressure : (m,) array
+        Of the Cauchy stress [Pa]; pressure is positive in compression.
+    reactions : (n, 3) array
+        What holds the constrained components [N]: their internal forces less the loads that act on them; zero
+        elsewhere.
+    nodal_pressures : mapping of str to (n,) array
+        What mechanisms know at the nodes [Pa]: ``fluid_pressure`` of drainage.
+    u_middles : (m, 6, 3) array or None
+        Displacement [m] of the midside nodes of quadratic elements, in the order of `warpbrain.mesh.surface.EDGES`.
+
     Of quadratic elements displacements are those of the mesh's own nodes, strain and stress those in the middle of
     elements, and half of what holds a midside node is at either end of its edge.
     """
 
-    mesh: TetMesh  #: the simulated mesh, undeformed
-    u: Floats  #: (n, 3), displacement [m]
-    J: Floats  #: (m,), volume ratio of each element
-    principal_stretches: Floats  #: (m, 3), descending
-    von_mises: Floats  #: (m,), of the Cauchy stress [Pa]
-    pressure: Floats  #: (m,), of the Cauchy stress [Pa], positive in compression
-    #: (n, 3), what holds the constrained components [N]: their internal forces less the loads that act on them; zero
-    #: elsewhere.
+    mesh: TetMesh
+    u: Floats
+    J: Floats
+    principal_stretches: Floats
+    von_mises: Floats
+    pressure: Floats
     reactions: Floats
-    #: (n,), what mechanisms know at the nodes [Pa]: ``fluid_pressure`` of drainage.
     nodal_pressures: Mapping[str, Floats] = field(default_factory=dict)
-    #: (m, 6, 3), displacement [m] of the midside nodes of quadratic elements, in the order of
-    #: `warpbrain.mesh.surface.EDGES`.
     u_middles: Floats | None = None
 
     def displacement_statistics(self) -> Mapping[str, Statistics]:

@@ -227,14 +227,29 @@ def states_at_rest(case: Case, system: System, end: NodalState, tolerance: float
 
 @dataclass(frozen=True, eq=False)
 class Run(Shown):
-    """A simulated case."""
+    """A simulated case.
+
+    Attributes
+    ----------
+    case : Case
+    model : Model
+        Of the case, with the elements that were asked for or chosen.
+    chosen : str or None
+        Why these elements, if nobody asked for them.
+    result : Result
+        The last state.
+    observed : Observed
+        It, and earlier ones, beside what was recorded.
+    followed : Followed
+        How it was found.
+    """
 
     case: Case
-    model: Model  #: of the case, with the elements that were asked for or chosen
-    chosen: str | None  #: why these elements, if nobody asked for them
-    result: Result  #: the last state
-    observed: Observed  #: it, and earlier ones, beside what was recorded
-    followed: Followed  #: how it was found
+    model: Model
+    chosen: str | None
+    result: Result
+    observed: Observed
+    followed: Followed
 
     @property
     def mesh(self) -> TetMesh:

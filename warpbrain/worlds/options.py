@@ -10,16 +10,38 @@ from warpbrain.errors import InputError
 
 @dataclass(frozen=True)
 class DiagnosisOptions:
-    """Options of a diagnosis; `InputError` if a number makes no sense."""
+    """Options of a diagnosis.
 
-    candidates: tuple[str, ...] | None = None  #: causes to look for; None: all
-    alpha: float = 0.05  #: probability of a false alarm
-    seed: int = 0  #: of all draws
-    draws: int = 400  #: of residuals in which nothing is missing
-    mesh_error: bool = True  #: of bodies: whether the error of the mesh is computed on elements of half the size
-    #: Of bodies: credit mechanisms also with what nuisances could explain: an ablation, for comparisons.
+    Parameters
+    ----------
+    candidates : tuple of str or None
+        Causes to look for; None: all.
+    alpha : float
+        Probability of a false alarm.
+    seed : int
+        Of all draws.
+    draws : int
+        Of residuals in which nothing is missing.
+    mesh_error : bool
+        Of bodies: whether the error of the mesh is computed on elements of half the size.
+    without_nuisances : bool
+        Of bodies: credit mechanisms also with what nuisances could explain: an ablation, for comparisons.
+    ends : bool
+        Of specimens: whether glued ends are computed; otherwise states are taken for homogeneous, as test evaluations
+        do.
+
+    Raises
+    ------
+    InputError
+        If a number makes no sense.
+    """
+
+    candidates: tuple[str, ...] | None = None
+    alpha: float = 0.05
+    seed: int = 0
+    draws: int = 400
+    mesh_error: bool = True
     without_nuisances: bool = False
-    #: Of specimens: whether glued ends are computed; otherwise states are homogeneous, as test evaluations take them.
     ends: bool = True
 
     def __post_init__(self) -> None:

@@ -30,23 +30,51 @@ Combination = TypeVar("Combination")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Verdict(Shown, Generic[Ranked, Combination]):
-    """What was left out of a case."""
+    """What was left out of a case.
+
+    Attributes
+    ----------
+    case : Case
+    decision : Decision
+        After the checks; `by_posterior` before them.
+    doubts : tuple of str
+        Checks that failed, in words.
+    p_value, alpha : float
+        Of the hypothesis that nothing is missing; a claim is significant up to `alpha`.
+    p_left : float or None
+        Of the hypothesis that nothing else is missing; None if nothing is named.
+    named : tuple of Ranked
+        What is named, the most probable first, as it is in the joint fit.
+    ranking : tuple of Ranked
+    rejected : dict of str to str
+        Causes that were not looked for, and why.
+    combinations : tuple of Combination
+        Sets of causes, the most probable first.
+    next_measurement : tuple of Measurement
+    smallest : dict of str to Smallest
+    confirmations : tuple of Confirmation
+        Of each mechanism of the best set.
+    explained : Case or None
+        The case with what was named, ready to run.
+    assumptions, remarks : tuple of str
+    seconds : dict of str to float
+    """
 
     case: Case
-    decision: Decision  # after the checks; `by_posterior` before them
+    decision: Decision
     by_posterior: Decision
-    doubts: tuple[str, ...]  # checks that failed, in words
-    p_value: float  # of the hypothesis that nothing is missing
-    alpha: float  # up to which a claim is significant
-    p_left: float | None  # of the hypothesis that nothing else is missing; None if nothing is named
-    named: tuple[Ranked, ...]  # what is named, the most probable first, as it is in the joint fit
+    doubts: tuple[str, ...]
+    p_value: float
+    alpha: float
+    p_left: float | None
+    named: tuple[Ranked, ...]
     ranking: tuple[Ranked, ...]
-    rejected: Mapping[str, str]  # causes that were not looked for, and why
-    combinations: tuple[Combination, ...]  # sets of causes, the most probable first
+    rejected: Mapping[str, str]
+    combinations: tuple[Combination, ...]
     next_measurement: tuple[Measurement, ...]
     smallest: Mapping[str, Smallest]
-    confirmations: tuple[Confirmation, ...]  # of each mechanism of the best set
-    explained: Case | None  # the case with what was named, ready to run
+    confirmations: tuple[Confirmation, ...]
+    explained: Case | None
     assumptions: tuple[str, ...]
     remarks: tuple[str, ...]
     seconds: Mapping[str, float]

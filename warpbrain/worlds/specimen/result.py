@@ -82,16 +82,32 @@ class Score:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpecimenDiagnosis(Verdict[Ranked, Combination]):
-    """A diagnosis of a specimen; what it has in common with others: `warpbrain.worlds.verdict.Verdict`."""
+    """A diagnosis of a specimen; what it has in common with others: `warpbrain.worlds.verdict.Verdict`.
 
-    protocol: Protocol  # all recorded rows
-    assumed: tuple[str, ...]  # causes of the fit that is "explained"
+    Attributes
+    ----------
+    protocol : Protocol
+        All recorded rows.
+    assumed : tuple of str
+        Causes of the fit that is "explained".
+    where : Segment or None
+    scores : dict of str to Score
+        ``"declared"``, ``"refitted"`` and, if something is missing, ``"explained"``.
+    stresses : dict of str to (n,) array
+        Of the same, at all rows [Pa]; and ``"heldout refitted"``, ``"heldout explained"``.
+    improvement : (part, low, high) or None
+        Of the refitted case's held-out error that is gone.
+    by_test : bool
+        Whether whole tests were held out.
+    """
+
+    protocol: Protocol
+    assumed: tuple[str, ...]
     where: Segment | None
-    scores: Mapping[str, Score]  # ``"declared"``, ``"refitted"`` and, if something is missing, ``"explained"``
-    #: (n,), of the same, at all rows [Pa]; and ``"heldout refitted"``, ``"heldout explained"``.
+    scores: Mapping[str, Score]
     stresses: Mapping[str, Floats]
-    improvement: tuple[float, float, float] | None  # of the refitted case's held-out error that is gone
-    by_test: bool  # whether whole tests were held out
+    improvement: tuple[float, float, float] | None
+    by_test: bool
 
     @cached_property
     def sentence(self) -> str:
