@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +15,10 @@ from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.recordings.agreement import lengths, root_mean_square
 from warpbrain.recordings.closest import closest_points
-from warpbrain.recordings.location import Location, locate
+from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
-from warpbrain.recordings.times import rows_at
 
-Ints = NDArray[np.int32]
+Rows = NDArray[np.int64]
 
 
 def legacy_error(distances: ArrayLike) -> float:
@@ -54,7 +54,7 @@ class Error:
         )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """A recording beside a state."""
 
@@ -63,12 +63,9 @@ class Comparison:
     kind: str
     role: str
     unit: str  # of errors and residuals: "m", "N", "N m" or "Pa"
-    rows: NDArray[np.int64]  # (n,), rows of the recording that were compared
-    #: With nothing moved (or no force), and with the state. Of a surface: from each recorded point to the surface.
-    before: Error
-    after: Error
-    #: (n, 3), recorded less computed, for each row. Of a surface: from its closest point to the recorded one. A
-    #: component that was not recorded is NaN.
+    rows: Rows  # (n,), rows of the recording that were compared
+    #: (n, 3), recorded less computed, for each row, with nothing moved (or no force), and with the state. Of a surface:
+    #: from its closest point to the recorded one. A component that was not recorded is NaN.
     residuals_before: Floats
     residuals_after: Floats
     #: Of a surface: from each of its nodes to what was recorded; large where only a part of it was recorded.
@@ -81,27 +78,27 @@ class Comparison:
         """Rows that were compared."""
         return len(self.rows)
 
+    @cached_property
+    def before(self) -> Error:
+        """With nothing moved; of a surface: from each recorded point to the surface."""
+        return self._error(self.residuals_before)
 
-def compare_points(
-    recording: PointsRecording,
-    mesh: TetMesh,
-    u: ArrayLike,
-    time: float | None = None,
-    location: Location | None = None,
-    rows: NDArray[np.int64] | None = None,
-) -> Comparison:
+    @cached_property
+    def after(self) -> Error:
+        """With the state."""
+        return self._error(self.residuals_after)
+
+    def _error(self, residuals: Floats) -> Error:
+        # components count that were recorded throughout
+        return Error.of(residuals[:, np.isfinite(self.residuals_before).all(axis=0)], self.unit)
+
+
+def compare_points(recording: PointsRecording, mesh: TetMesh, u: ArrayLike, rows: Rows) -> Comparison:
     """Compare displacements of tracked points.
 
-    `mesh`: at rest.
-    `u` (N, 3): displacement of the nodes [m].
-    `time`: of the state [s]; the recording's end if left out, see `rows_at`.
-    `location`: of all points of the recording in the mesh, if it is known already.
-    `rows` (n,): those that are compared, whatever the time.
-
-    `InputError` if nothing was recorded at that time.
+    `mesh`: at rest. `u` (N, 3): displacement of the nodes [m]. `rows` (n,): those that are compared, see `rows_at`.
     """
-    rows = rows_at(recording, time) if rows is None else rows
-    place = locate(mesh.points, mesh.tetrahedra, recording.points[rows]) if location is None else location.at(rows)
+    place = locate(mesh.points, mesh.tetrahedra, recording.points[rows])
     before = recording.displacement[rows]
     after = before - place.interpolate(u)
     squares = recording.sigma**2 if recording.sigma is not None else None
@@ -111,22 +108,14 @@ def compare_points(
     return _comparison(recording, rows, before, after, noise)
 
 
-def compare_surface(
-    recording: SurfaceRecording,
-    mesh: TetMesh,
-    u: ArrayLike,
-    time: float | None = None,
-    rows: NDArray[np.int64] | None = None,
-) -> Comparison:
+def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, rows: Rows) -> Comparison:
     """Compare a recorded surface with the moved faces of its node set, both ways.
 
     Parameters are those of `compare_points`. The way back goes from the nodes of these faces to the recorded triangles,
     or to the nearest recorded points if no triangles were recorded.
 
-    `InputError` if the mesh has no such node set, no boundary triangle has all its nodes in it, or nothing was recorded
-    at that time.
+    `InputError` if the mesh has no such node set, or no boundary triangle has all its nodes in it.
     """
-    rows = rows_at(recording, time) if rows is None else rows
     points = recording.points[rows]
     faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
     members = np.unique(faces)
@@ -139,18 +128,12 @@ def compare_surface(
     return replace(compared, reverse_before=reverse[0], reverse_after=reverse[1])
 
 
-def compare_force(
-    recording: ForceRecording,
-    reaction: ArrayLike,
-    time: float | None = None,
-    rows: NDArray[np.int64] | None = None,
-) -> Comparison:
+def compare_force(recording: ForceRecording, reaction: ArrayLike, rows: Rows) -> Comparison:
     """Compare the resultant of a boundary; components that were not recorded do not count.
 
-    `reaction` (3,): force of the boundary on the tissue [N]. `time`, `rows`: as in `compare_points`. `InputError` if no
-    component of the force was recorded, or nothing at that time.
+    `reaction` (3,): force of the boundary on the tissue [N]. `rows`: as in `compare_points`. `InputError` if no
+    component of the force was recorded.
     """
-    rows = rows_at(recording, time) if rows is None else rows
     before = recording.force[rows]
     recorded = np.isfinite(before).all(axis=0)
     if not recorded.any():
@@ -160,49 +143,26 @@ def compare_force(
     return _comparison(recording, rows, before, after, noise)
 
 
-def _comparison(
-    recording: Recording, rows: NDArray[np.int64], before: Floats, after: Floats, noise: float | None
-) -> Comparison:
-    """The comparison of residuals (n, 3), of whose components those count that were recorded throughout."""
-    unit, recorded = recording.noise_unit, np.isfinite(before).all(axis=0)
-    return Comparison(
-        name=recording.name,
-        kind=recording.kind,
-        role=recording.role,
-        unit=unit,
-        rows=rows,
-        before=Error.of(before[:, recorded], unit),
-        after=Error.of(after[:, recorded], unit),
-        residuals_before=before,
-        residuals_after=after,
-        noise=noise,
-    )
+def _comparison(recording: Recording, rows: Rows, before: Floats, after: Floats, noise: float | None) -> Comparison:
+    unit = recording.noise_unit
+    return Comparison(recording.name, recording.kind, recording.role, unit, rows, before, after, noise=noise)
 
 
 def joined(parts: Sequence[Comparison]) -> Comparison:
     """Comparisons of one recording with states of several times as one; of a surface the way back is of the last."""
     if len(parts) == 1:
         return parts[0]
-    before, after = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("residuals_before", "residuals_after")
-    )
-    recorded = np.isfinite(before).all(axis=0)
-    unit = parts[-1].unit
     noises = [part.noise for part in parts]
     squares = [part.count * noise**2 for part, noise in zip(parts, noises, strict=True) if noise is not None]
-    rows = np.concatenate([part.rows for part in parts])
-    return replace(
-        parts[-1],
-        rows=rows,
-        before=Error.of(before[:, recorded], unit),
-        after=Error.of(after[:, recorded], unit),
-        residuals_before=before,
-        residuals_after=after,
-        noise=float(np.sqrt(sum(squares) / len(rows))) if len(squares) == len(parts) else None,
+    rows, before, after = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("rows", "residuals_before", "residuals_after")
     )
+    noise = float(np.sqrt(sum(squares) / len(rows))) if len(squares) == len(parts) else None
+    return replace(parts[-1], rows=rows, residuals_before=before, residuals_after=after, noise=noise)
 
 
-def _to_recorded(nodes: Floats, points: Floats, faces: Ints | None) -> Floats:
+def _to_recorded(nodes: Floats, points: Floats, faces: NDArray[np.int32] | None) -> Floats:
     if faces is not None:
         return closest_points(nodes, points, faces).distance
     from scipy.spatial import cKDTree

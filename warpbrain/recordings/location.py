@@ -46,11 +46,6 @@ class Location:
         rows = np.repeat(np.arange(len(self)), 4)
         return csr_matrix((self.weights.ravel(), (rows, self.nodes.ravel())), shape=(len(self), count))
 
-    def at(self, rows: ArrayLike) -> Location:
-        """The location of some of the points, by their numbers."""
-        chosen = np.asarray(rows)
-        return Location(*(values[chosen] for values in vars(self).values()))
-
 
 def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> Location:
     """Find points in a mesh, or the closest points of its boundary.
