@@ -8,8 +8,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Int32s
 from warpbrain.cases.boundary import Boundary, Fixed, Sliding
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError
@@ -123,7 +123,7 @@ class Case(Shown):
         return next((m for m in self.mechanisms if isinstance(m, Resection)), None)
 
     @cached_property
-    def remaining(self) -> tuple[TetMesh, NDArray[np.int32]]:
+    def remaining(self) -> tuple[TetMesh, Int32s]:
         """The mesh without what was resected, and for each of its nodes the id in the whole mesh."""
         if self.resection is None:
             return self.mesh, np.arange(len(self.mesh.points), dtype=np.int32)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpbrain.errors import InputError
+from warpbrain.problems import nearest
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
@@ -132,7 +132,6 @@ def _existing(name: str) -> Path:
     except (OSError, ValueError):  # a name that no file can have
         there = False
     if not there:
-        near = difflib.get_close_matches(name, SHIPPED, 1)
-        hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(SHIPPED)}"
+        hint = nearest(name, SHIPPED, f"there are: {', '.join(SHIPPED)}")
         raise InputError(f"case '{name}': no such case and no such folder ({hint})")
     return path

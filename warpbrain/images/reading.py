@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.errors import InputError
 from warpbrain.images.grid import Grid
 
@@ -59,7 +59,7 @@ def read_image(path: Path) -> Image:
     return _with_itk(path) if path.suffix.lower() in BY_ITK else _with_nibabel(path)
 
 
-def labels_of(image: Image) -> NDArray[np.int32]:
+def labels_of(image: Image) -> Int32s:
     """The labels (i, j, k) of an image, zero is background.
 
     `InputError` if its values are not all whole numbers of zero or more.

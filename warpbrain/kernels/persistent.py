@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 from warp.sparse import BsrMatrix
 
+from warpbrain.arrays import Int32s
 from warpbrain.errors import SolveError
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
@@ -128,7 +128,7 @@ def shared_memory(device: wp.Device) -> int:
     return int(device.max_shared_memory_per_block - _RESERVED) // 8 * 8
 
 
-def share_rows(offsets: NDArray[np.int32], blocks: int) -> tuple[NDArray[np.int32], int, int]:
+def share_rows(offsets: Int32s, blocks: int) -> tuple[Int32s, int, int]:
     """First row of each block, by the entries (n + 1,) of rows; how many threads share a row; messages for a thread."""
     starts = np.searchsorted(offsets, np.linspace(0, offsets[-1], blocks + 1)).astype(np.int32)
     starts[0], starts[-1] = 0, len(offsets) - 1

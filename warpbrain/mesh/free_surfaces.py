@@ -7,20 +7,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.errors import InputError
-from warpbrain.mesh.surface import (
-    Bools,
-    Floats,
-    Ints,
-    closed_surfaces,
-    face_vectors,
-    in_rows,
-    interface_faces,
-    node_vectors,
-    nodes_of,
-)
+from warpbrain.mesh.surface import closed_surfaces, face_vectors, in_rows, interface_faces, node_vectors, nodes_of
 from warpbrain.mesh.tet_mesh import TetMesh
 
 #: The outside of a body, the wall of a void within it, and what was inside until tetrahedra were taken out.
@@ -36,7 +27,7 @@ class FreeSurface:
     name: str
     words: str  # what people call it
     members: Bools  # (n,), nodes of that set
-    faces: Ints  # (k, 3), triangles of the set that are not held, oriented outwards
+    faces: Int32s  # (k, 3), triangles of the set that are not held, oriented outwards
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +35,11 @@ class FreePart:
     """A connected free surface."""
 
     origin: Origin  # one of `Origin`
-    faces: Ints  # (k, 3), triangles, oriented outwards
+    faces: Int32s  # (k, 3), triangles, oriented outwards
     centre: Floats  # (3,), of its area [m]
 
 
-def free_faces(mesh: TetMesh, members: Bools, held: Bools) -> Ints:
+def free_faces(mesh: TetMesh, members: Bools, held: Bools) -> Int32s:
     """Triangles (k, 3) of the boundary that a set of nodes holds and that can move: not all of their nodes are held."""
     faces = faces_of(mesh, members)
     return np.asarray(faces[~held[faces].all(axis=1)])
@@ -84,7 +75,7 @@ def free_parts(mesh: TetMesh, held: Bools, inner: ArrayLike, smallest: float = 0
     return parts
 
 
-def _pieces(faces: Ints, areas: Floats, rows: NDArray[np.int64], smallest: float) -> Iterator[NDArray[np.int64]]:
+def _pieces(faces: Int32s, areas: Floats, rows: Ints, smallest: float) -> Iterator[Ints]:
     """Rows of each piece of some triangles of one closed surface."""
     piece = closed_surfaces(faces[rows])
     size = np.bincount(piece, areas[rows])
@@ -98,13 +89,13 @@ def set_of(mesh: TetMesh, part: FreePart) -> Bools:
     return nodes_of(part.faces, len(mesh.points))
 
 
-def rim_corners(mesh: TetMesh) -> Ints:
+def rim_corners(mesh: TetMesh) -> Int32s:
     """Triangles (k, 3) of the cut whose nodes are all on its rim: a set of nodes of the surface beside holds them."""
     beside = mesh.boundary[~in_rows(mesh.boundary, mesh.cut)]
     return np.asarray(mesh.cut[nodes_of(beside, len(mesh.points))[mesh.cut].all(axis=1)])
 
 
-def faces_of(mesh: TetMesh, members: Bools) -> Ints:
+def faces_of(mesh: TetMesh, members: Bools) -> Int32s:
     """Triangles of the boundary that a set of nodes holds.
 
     A triangle of the surface beside a cut can have all its nodes on the cut's rim. It is no part of the wall: where all
@@ -120,7 +111,7 @@ def faces_of(mesh: TetMesh, members: Bools) -> Ints:
     return np.asarray(held[in_rows(held, mesh.cut)])
 
 
-def faces_of_set(mesh: TetMesh, name: str, who: str) -> Ints:
+def faces_of_set(mesh: TetMesh, name: str, who: str) -> Int32s:
     """Boundary triangles (k, 3) all of whose nodes are in a node set; `who` asks for them, for the message.
 
     `InputError` if there is no such set or no such triangle.

@@ -13,12 +13,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Ints
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.mesh.integrals import shape_values, triangle_rule
 from warpbrain.mesh.quadratic import QuadraticMesh
-from warpbrain.mesh.surface import Floats
 from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Barycentric points of a rule of degree 2 on a tetrahedron, of equal weights (Keast 1986); exact for quadratic shapes.
@@ -78,7 +77,7 @@ def integrals_on_plane(
     return integrals
 
 
-def elements_of_nodes(mesh: TetMesh | QuadraticMesh) -> NDArray[np.int32]:
+def elements_of_nodes(mesh: TetMesh | QuadraticMesh) -> Int32s:
     """Nodes of each tetrahedron, (m, 4) or (m, 10), in the order of the integrals."""
     return mesh.tetrahedra if isinstance(mesh, TetMesh) else mesh.elements
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.mesh.surface import SIDES, Floats, closed_surfaces, face_vectors
+from warpbrain.arrays import Floats, Ints
+from warpbrain.mesh.surface import SIDES, closed_surfaces, face_vectors
 
 #: Cosine of the angle between two triangles that face different ways: a right angle, but for rounding.
 _ASIDE = 1e-6
 
 
-def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius: float) -> NDArray[np.int64]:
+def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius: float) -> Ints:
     """Triangles that belong to the patch of a surface around the point of it that is nearest to a centre.
 
     Those that come within the radius, face the same way as the triangle at that point (less than a right angle from

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools
+from warpbrain.arrays import Bools, Int32s, Ints
 from warpbrain.mesh.abaqus import MATERIAL_SETS
 from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_in_file, read_raw
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
@@ -99,7 +99,7 @@ def _of_tetrahedra(raw: Any, name: str) -> NDArray[Any]:
     return np.concatenate([np.asarray(raw.cell_data[name][b]) for b in _blocks(raw)])
 
 
-def _whole(values: NDArray[Any]) -> NDArray[np.int64] | None:
+def _whole(values: NDArray[Any]) -> Ints | None:
     """Values (n,) as whole numbers, None if they are not."""
     if values.ndim == 2 and values.shape[1] == 1:
         values = values[:, 0]
@@ -168,7 +168,7 @@ def _members(raw: Any, name: str) -> list[Bools]:
     return all_members
 
 
-def _numbered(raw: Any, names: list[str]) -> list[NDArray[np.int32]]:
+def _numbered(raw: Any, names: list[str]) -> list[Int32s]:
     values = [np.zeros(len(block.data), dtype=np.int32) for block in raw.cells]
     for number, name in enumerate(names, 1):
         for each, members in zip(values, _members(raw, name), strict=True):
@@ -178,7 +178,7 @@ def _numbered(raw: Any, names: list[str]) -> list[NDArray[np.int32]]:
 
 def _name_nodes(raw: Any, chosen: str | None, physical: Mapping[tuple[int, int], str]) -> list[str]:
     """Add node sets of faces, edges and points, and of the values of point arrays; says which."""
-    added: dict[str, list[NDArray[np.int64]]] = {}
+    added: dict[str, list[Ints]] = {}
     for number, block in enumerate(raw.cells):
         if block.type in TETRAHEDRA:
             continue

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 
 # corners of the four faces of a positive tetrahedron, each seen counter-clockwise from outside; face i is opposite i
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -17,7 +15,7 @@ EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 SIDES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
-def connected(links: NDArray[np.integer], count: int) -> NDArray[np.int32]:
+def connected(links: NDArray[np.integer], count: int) -> Int32s:
     """Number (count,) of the connected part that each of some things is in, by pairs (k, 2) of things that touch."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -26,12 +24,12 @@ def connected(links: NDArray[np.integer], count: int) -> NDArray[np.int32]:
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def edges_of(faces: ArrayLike) -> NDArray[np.int64]:
+def edges_of(faces: ArrayLike) -> Ints:
     """Sides (3 b, 2) of triangles (b, 3), one triangle after the other, ends ascending."""
     return np.sort(np.asarray(faces, dtype=np.int64)[:, SIDES].reshape(-1, 2), axis=1)
 
 
-def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def paired_faces(tetrahedra: ArrayLike) -> tuple[Ints, Ints]:
     """Which faces of which tetrahedra coincide.
 
     `tetrahedra` (m, 4): node ids. Returns `pairs` (k, 2): faces shared by two tetrahedra; face number = 4 * tetrahedron
@@ -54,12 +52,12 @@ def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.i
     return pairs[np.argsort(pairs[:, 0])], np.sort(order[~same & ~follows])
 
 
-def _corners(tetrahedra: ArrayLike, faces: NDArray[np.int64]) -> Ints:
+def _corners(tetrahedra: ArrayLike, faces: Ints) -> Int32s:
     tets = np.asarray(tetrahedra)
     return np.asarray(tets[faces[:, None] // 4, FACES[faces % 4]], dtype=np.int32)
 
 
-def all_faces(tetrahedra: ArrayLike) -> Ints:
+def all_faces(tetrahedra: ArrayLike) -> Int32s:
     """Every triangle of a mesh once, inside and on the boundary.
 
     `tetrahedra` (m, 4): node ids. Returns (k, 3): node ids.
@@ -68,7 +66,7 @@ def all_faces(tetrahedra: ArrayLike) -> Ints:
     return _corners(tetrahedra, np.concatenate([pairs[:, 0], single]))
 
 
-def boundary_faces(tetrahedra: ArrayLike) -> Ints:
+def boundary_faces(tetrahedra: ArrayLike) -> Int32s:
     """Triangles of the boundary, oriented outwards.
 
     `tetrahedra` (m, 4): node ids, positively oriented. Returns (b, 3): node ids; ``(p1 - p0) x (p2 - p0)`` points out
@@ -77,7 +75,7 @@ def boundary_faces(tetrahedra: ArrayLike) -> Ints:
     return _corners(tetrahedra, paired_faces(tetrahedra)[1])
 
 
-def interface_faces(tetrahedra: ArrayLike, tissue: ArrayLike) -> Ints:
+def interface_faces(tetrahedra: ArrayLike, tissue: ArrayLike) -> Int32s:
     """Triangles between tetrahedra of different labels.
 
     `tetrahedra` (m, 4): node ids, positively oriented. `tissue` (m,): labels; a boolean element set works as well.
@@ -97,7 +95,7 @@ def in_rows(faces: ArrayLike, others: ArrayLike) -> Bools:
     return np.asarray(np.isin(number[: len(rows[0])], number[len(rows[0]) :]))
 
 
-def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
+def rim_edges(faces: ArrayLike) -> Ints:
     """Edges at which an oriented surface ends.
 
     `faces` (b, 3): triangles, all oriented to one side. Returns (k, 2): edges that triangles do not run along as often
@@ -110,7 +108,7 @@ def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
     return np.asarray(edges[along != 0.0])
 
 
-def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Ints:
+def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Int32s:
     """Number of the edge-connected surface each triangle belongs to.
 
     `faces` (b, 3): node ids. `joins` (3 b,): which of their sides, see `edges_of`, connect; all by default. Returns
@@ -124,7 +122,7 @@ def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Ints:
     return np.asarray(np.unique(labels, return_inverse=True)[1].ravel(), dtype=np.int32)
 
 
-def pinched_nodes(faces: ArrayLike) -> Ints:
+def pinched_nodes(faces: ArrayLike) -> Int32s:
     """Nodes where closed surfaces touch themselves or each other.
 
     `faces` (b, 3): node ids; every edge belongs to an even number of triangles. Returns (k,): ids of nodes on an edge
@@ -147,7 +145,7 @@ def pinched_nodes(faces: ArrayLike) -> Ints:
     return np.asarray(np.union1d(nodes[fans > 1], edges[owners > 2].ravel()), dtype=np.int32)
 
 
-def split_boundary(points: ArrayLike, tetrahedra: ArrayLike) -> tuple[Ints, list[Ints]]:
+def split_boundary(points: ArrayLike, tetrahedra: ArrayLike) -> tuple[Int32s, list[Int32s]]:
     """Outer surface and cavity walls.
 
     `points` (n, 3): node positions. `tetrahedra` (m, 4): node ids, positively oriented. Returns `outer` (b, 3):
@@ -203,7 +201,7 @@ def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
     return np.asarray(lumped, dtype=np.float64)
 
 
-def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.bool_]]:
+def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, Bools]:
     """Angle-weighted normals (Baerentzen and Aanaes 2005) of each triangle's features, and which are on a rim.
 
     `points` (n, 3). `faces` (k, 3): oriented outwards. Returns `normals` (k, 7, 3): unit normals of the face, of its

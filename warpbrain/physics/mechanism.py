@@ -31,9 +31,8 @@ from functools import cached_property
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Expectation
@@ -58,13 +57,13 @@ class ClosedSurface:
 
     file: str  # where it came from, for people
     points: Floats = field(repr=False, compare=False)  # (n, 3) [m]
-    faces: NDArray[np.int32] = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
+    faces: Int32s = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
 
     def __str__(self) -> str:
         return self.file
 
     @property
-    def outward(self) -> NDArray[np.int32]:
+    def outward(self) -> Int32s:
         """The triangles, all turned if they enclose a negative volume."""
         a, b, c = (self.points[self.faces[:, i]] - self.points.mean(axis=0) for i in range(3))
         return self.faces if np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0 else self.faces[:, ::-1]
@@ -427,5 +426,5 @@ class Relaxing(Protocol):
 class Removing(Protocol):
     """A mechanism that takes elements away before anything is computed."""
 
-    def remaining(self, mesh: TetMesh) -> tuple[TetMesh, NDArray[np.int32]]:
+    def remaining(self, mesh: TetMesh) -> tuple[TetMesh, Int32s]:
         """The mesh that is left, and for each of its nodes the id in the whole mesh."""

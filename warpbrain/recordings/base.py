@@ -10,13 +10,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.surface import Ints
 from warpbrain.mesh.vtu import write_vtu
 from warpbrain.problems import Problems
 from warpbrain.recordings.text import collected
@@ -172,7 +171,7 @@ def write_columns(path: Path, columns: Columns) -> None:
         csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC).writerows(zip(*values, strict=True))
 
 
-def write_triangles(path: Path, points: Floats, faces: Ints, frame: Frame) -> None:
+def write_triangles(path: Path, points: Floats, faces: Int32s, frame: Frame) -> None:
     """Write a surface with points (n, 3) [m, RAS] and triangles (k, 3) as VTU."""
     import meshio
 

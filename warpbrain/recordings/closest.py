@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.errors import InputError
-
-Ints = NDArray[np.int32]
 
 #: Barycentric coordinates up to this are none.
 _ON = 1e-12
@@ -40,12 +38,12 @@ class Spheres:
             ids = np.flatnonzero(sizes == size)
             self._classes.append((cKDTree(centres[ids]), ids, float(radii[ids].max())))
 
-    def nearest(self, points: Floats, count: int) -> NDArray[np.int64]:
+    def nearest(self, points: Floats, count: int) -> Ints:
         """The `count` spheres, or all if there are fewer, whose centres are nearest to each point: (n, count)."""
         count = min(count, len(self._radii))
         return np.asarray(self._all.query(points, k=count)[1], dtype=np.int64).reshape(len(points), count)
 
-    def touching(self, points: Floats, reach: Floats) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    def touching(self, points: Floats, reach: Floats) -> Iterator[tuple[Ints, Ints]]:
         """All pairs (point, sphere) no farther apart than `reach` (n,) of the point, a batch at a time."""
         reach = reach * (1.0 + 1e-9)
         for tree, ids, largest in self._classes:
@@ -67,12 +65,12 @@ class ClosestPoints:
     """Closest points of a surface."""
 
     position: Floats  # (n, 3), where they are
-    face: Ints  # (n,), triangle on which each lies; of several, the one with the smallest number
+    face: Int32s  # (n,), triangle on which each lies; of several, the one with the smallest number
     weights: Floats  # (n, 3), barycentric coordinates there: not negative, their sum is 1
     distance: Floats  # (n,), from the given point
 
     @property
-    def features(self) -> NDArray[np.int64]:
+    def features(self) -> Ints:
         """On which feature (n,) of its triangle each lies, as `warpbrain.mesh.surface` numbers them."""
         zero = self.weights <= _ON
         edges = np.select([zero[:, 2], zero[:, 0], zero[:, 1]], [1, 2, 3], 0)
@@ -119,11 +117,11 @@ def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
 
 
 def _improve(
-    which: NDArray[np.int64],
-    candidates: NDArray[np.int64],
+    which: Ints,
+    candidates: Ints,
     points: Floats,
     corners: Floats,
-    face: NDArray[np.int64],
+    face: Ints,
     distance: Floats,
     weights: Floats,
 ) -> None:

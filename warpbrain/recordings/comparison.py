@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.tet_mesh import TetMesh
@@ -17,8 +17,6 @@ from warpbrain.recordings.agreement import lengths, root_mean_square
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
-
-Rows = NDArray[np.int64]
 
 
 def legacy_error(distances: ArrayLike) -> float:
@@ -63,7 +61,7 @@ class Comparison:
     kind: str
     role: str
     unit: str  # of errors and residuals: "m", "N", "N m" or "Pa"
-    rows: Rows  # (n,), rows of the recording that were compared
+    rows: Ints  # (n,), rows of the recording that were compared
     #: (n, 3), recorded less computed, for each row, with nothing moved (or no force), and with the state. Of a surface:
     #: from its closest point to the recorded one. A component that was not recorded is NaN.
     residuals_before: Floats
@@ -93,7 +91,7 @@ class Comparison:
         return Error.of(residuals[:, np.isfinite(self.residuals_before).all(axis=0)], self.unit)
 
 
-def compare_points(recording: PointsRecording, mesh: TetMesh, u: ArrayLike, rows: Rows) -> Comparison:
+def compare_points(recording: PointsRecording, mesh: TetMesh, u: ArrayLike, rows: Ints) -> Comparison:
     """Compare displacements of tracked points.
 
     `mesh`: at rest. `u` (N, 3): displacement of the nodes [m]. `rows` (n,): those that are compared, see `rows_at`.
@@ -108,7 +106,7 @@ def compare_points(recording: PointsRecording, mesh: TetMesh, u: ArrayLike, rows
     return _comparison(recording, rows, before, after, noise)
 
 
-def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, rows: Rows) -> Comparison:
+def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, rows: Ints) -> Comparison:
     """Compare a recorded surface with the moved faces of its node set, both ways.
 
     Parameters are those of `compare_points`. The way back goes from the nodes of these faces to the recorded triangles,
@@ -128,7 +126,7 @@ def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, ro
     return replace(compared, reverse_before=reverse[0], reverse_after=reverse[1])
 
 
-def compare_force(recording: ForceRecording, reaction: ArrayLike, rows: Rows) -> Comparison:
+def compare_force(recording: ForceRecording, reaction: ArrayLike, rows: Ints) -> Comparison:
     """Compare the resultant of a boundary; components that were not recorded do not count.
 
     `reaction` (3,): force of the boundary on the tissue [N]. `rows`: as in `compare_points`. `InputError` if no
@@ -143,7 +141,7 @@ def compare_force(recording: ForceRecording, reaction: ArrayLike, rows: Rows) ->
     return _comparison(recording, rows, before, after, noise)
 
 
-def _comparison(recording: Recording, rows: Rows, before: Floats, after: Floats, noise: float | None) -> Comparison:
+def _comparison(recording: Recording, rows: Ints, before: Floats, after: Floats, noise: float | None) -> Comparison:
     unit = recording.noise_unit
     return Comparison(recording.name, recording.kind, recording.role, unit, rows, before, after, noise=noise)
 
@@ -162,7 +160,7 @@ def joined(parts: Sequence[Comparison]) -> Comparison:
     return replace(parts[-1], rows=rows, residuals_before=before, residuals_after=after, noise=noise)
 
 
-def _to_recorded(nodes: Floats, points: Floats, faces: NDArray[np.int32] | None) -> Floats:
+def _to_recorded(nodes: Floats, points: Floats, faces: Int32s | None) -> Floats:
     if faces is not None:
         return closest_points(nodes, points, faces).distance
     from scipy.spatial import cKDTree

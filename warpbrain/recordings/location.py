@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.mesh.surface import EDGES, FACES, paired_faces
 from warpbrain.recordings.closest import Spheres, closest_points
-
-Ints = NDArray[np.int32]
 
 # how far outside a tetrahedron a point is still inside: as a weight, and as a length in parts of the longest edge.
 # Rounding alone puts a point on a common face outside both of its tetrahedra
@@ -23,14 +21,14 @@ _WEIGHT, _LENGTH = 1e-9, 1e-10
 class Location:
     """Points as weighted nodes."""
 
-    nodes: Ints  # (n, 4), nodes of the tetrahedron that each point is in, or that has the nearest face of the boundary
+    nodes: Int32s  # (n, 4), of the tetrahedron that each point is in, or that has the nearest face of the boundary
     #: (n, 4), values of the shape functions, their sum is 1. Outside the mesh they are those of the closest point of
     #: its boundary.
     weights: Floats
     distance: Floats  # (n,), distance to the mesh [m], zero inside
     edge: Floats  # (n,), mean length of the edges of the tetrahedron [m]
     #: (n,), number of the tetrahedron; inside the mesh `nodes` are in the order of its corners.
-    element: NDArray[np.int64]
+    element: Ints
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -80,13 +78,13 @@ def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> 
     return Location(members, weights, distance, edge, owner)
 
 
-def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
+def _containing(corners: Floats, points: Floats) -> Ints:
     """Number of a tetrahedron (m, 4, 3) that each point is in, -1 if it is in none."""
     centres = corners.mean(axis=1)
     spheres = Spheres(centres, np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1))
     element = np.full(len(points), -1, dtype=np.int64)
 
-    def depth(which: NDArray[np.int64], candidates: NDArray[np.int64]) -> Floats:
+    def depth(which: Ints, candidates: Ints) -> Floats:
         """The least weight, -inf if the point is not inside."""
         # of most meshes few tetrahedra are near any point
         near, of = np.unique(candidates, return_inverse=True)

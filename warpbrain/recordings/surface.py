@@ -8,12 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.surface import Ints
 from warpbrain.problems import Problems
 from warpbrain.recordings.base import (
     POSITION,
@@ -45,7 +44,7 @@ class SurfaceRecording(Recording):
     points: Floats  # (n, 3) [m]
     nodes: str  # name of the node set whose faces are the surface
     normals: Floats | None = None  # (n, 3), unit normals
-    faces: Ints | None = None  # (k, 3), triangles, if a surface mesh was recorded
+    faces: Int32s | None = None  # (k, 3), triangles, if a surface mesh was recorded
 
     @classmethod
     def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content:

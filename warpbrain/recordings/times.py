@@ -35,7 +35,7 @@ def compared_rows(recording: Recording) -> Ints:
 
 
 def rows_at(recording: Recording, time: float | None = None) -> Ints:
-    """Ints that say what was so at a time.
+    """Rows that say what was so at a time.
 
     Without a time it is the end: every row of points or of a surface that has no times; of points with ids the last row
     of each; else the rows of the last time. At a time it is the rows of the recorded time nearest to it, the earlier of

@@ -71,7 +71,7 @@ def observe(
 def _rows_by_time(
     case: Case, recording: Recording, time: float | None, states: Mapping[float, State]
 ) -> list[tuple[float, Ints]]:
-    """Ints of a recording that are compared, by the time of the state that they are compared with."""
+    """Rows of a recording that are compared, by the time of the state that they are compared with."""
     assert isinstance(recording, PointsRecording | SurfaceRecording | ForceRecording)
     times = times_of(recording)
     rows = compared_rows(recording)

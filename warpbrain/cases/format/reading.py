@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import tomllib
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ from typing import Any
 from warpbrain.frame import Frame
 from warpbrain.keys import Table, short
 from warpbrain.mesh import TetMesh
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, nearest
 
 #: No case.toml is as large as this [bytes]; a file that is must be something else.
 LARGEST_TOML = 4 << 20
@@ -74,8 +73,8 @@ class Reading:
             elif fault := self.keys[name].fault(value):
                 # a unit or axes that look alike are others all the same
                 guess = isinstance(value, str) and name not in ("units", "axes")
-                near = difflib.get_close_matches(value, self.keys[name].choices, 1) if guess else []
-                self.problem(name, fault, f"did you mean '{near[0]}'?" if near else self.keys[name].hint)
+                choices = self.keys[name].choices if guess else ()
+                self.problem(name, fault, nearest(value, choices, self.keys[name].hint))
             else:
                 self._good[name] = value
         for name, key in self.keys.items():
@@ -90,9 +89,7 @@ class Reading:
             takes = ", ".join(key.name for key in table.variants[self.variant]) or "no key of its own"
             self.problem(name, f"means nothing with {table.by.name} '{self.variant}'", f"it takes {takes}")
             return
-        near = difflib.get_close_matches(name, list(self.keys), 1)
-        cure = f"did you mean '{near[0]}'?" if near else f"expected one of {', '.join(self.keys)}"
-        self.problem(name, "unknown key", cure)
+        self.problem(name, "unknown key", nearest(name, self.keys))
 
     def problem(self, key: str, message: str, cure: str = "") -> None:
         """Note what is wrong with a key."""
