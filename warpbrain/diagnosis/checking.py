@@ -99,8 +99,10 @@ class HeldOut:
         A pattern is a random mixture of the modes of a smooth force with the size that fits best. The best of `tries`
         patterns is taken, as the mechanism is the best of its places.
 
-        `without`: of all else that acts. `residual` (n,). `modes` (n, m): as large as the noise. `freedom`:
-        coefficients of the mechanism.
+        `without`: of all else that acts.
+        `residual` (n,).
+        `modes` (n, m): as large as the noise.
+        `freedom`: coefficients of the mechanism.
         """
         sizes = beliefs("unknown.sizes")
         chosen = []

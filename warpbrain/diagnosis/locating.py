@@ -114,8 +114,10 @@ def score_map(
 ) -> ScoreMap:
     """The map of residuals (n,).
 
-    `model`: of noise and nuisances. `residual` (n,). `draws` (n, b): of rows if no cause acts. `length`, `spacing`: of
-    patches and between them [m].
+    `model`: of noise and nuisances.
+    `residual` (n,).
+    `draws` (n, b): of rows if no cause acts.
+    `length`, `spacing`: of patches and between them [m].
     """
     from scipy.special import chdtrc, chdtri
 
@@ -186,8 +188,11 @@ def traits_of(
 ) -> Traits:
     """Traits of what residuals (n,) show beside noise and nuisances.
 
-    `model`: of noise and nuisances. `residual` (n,). `noise`: typical noise of displacements [m]. `length`: of patches
-    [m]. `centre` (3,): about which moments are taken [m].
+    `model`: of noise and nuisances.
+    `residual` (n,).
+    `noise`: typical noise of displacements [m].
+    `length`: of patches [m].
+    `centre` (3,): about which moments are taken [m].
     """
     sites, answers = force_patches(at, length)
     # patches on held nodes have no effect

@@ -61,8 +61,10 @@ class Onset:
 def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianModel, residual: Floats) -> Onset | None:
     """When a cause set in; None where nothing was recorded at several times.
 
-    `cause`: the best explanation, as if it acted all the time; None: an unknown force. `in_time`: whether it changes in
-    time under constant loads. `model`: of all else that acts. `residual` (n,): less what is expected of all else.
+    `cause`: the best explanation, as if it acted all the time; None: an unknown force.
+    `in_time`: whether it changes in time under constant loads.
+    `model`: of all else that acts.
+    `residual` (n,): less what is expected of all else.
     """
     times = np.array(base.states.times)
     if len(times) < 2:

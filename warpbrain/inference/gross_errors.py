@@ -59,8 +59,9 @@ class _Group:
 class PointRows:
     """Rows of recorded points under a model: what hypotheses with further columns have in common.
 
-    `residual` (n,): less what is expected of the causes. `points`: rows of each point; rows of none are never gross
-    errors. `weighted` (n,): `S^-1 r`, if it is known.
+    `residual` (n,): less what is expected of the causes.
+    `points`: rows of each point; rows of none are never gross errors.
+    `weighted` (n,): `S^-1 r`, if it is known.
     """
 
     def __init__(
@@ -96,7 +97,9 @@ class PointRows:
         """Density of the rows where some points may be gross errors.
 
         `start` (g,): the most probable inflation of each point under a hypothesis that is nearly the same; all are
-        sound by default. `further`: of these rows. `length`: a factor on these.
+        sound by default.
+        `further`: of these rows.
+        `length`: a factor on these.
         """
         search = _Search(self, prior, further, length)
         if start is not None and (start > 1.0).any():
@@ -306,8 +309,10 @@ class RowsAtScales:
 
     What neither changes is computed once.
 
-    `model`: the causes of the hypothesis among its columns. `residual` (n,): less what is expected of the causes.
-    `points`: rows of each point. `further` (n, k).
+    `model`: the causes of the hypothesis among its columns.
+    `residual` (n,): less what is expected of the causes.
+    `points`: rows of each point.
+    `further` (n, k).
     """
 
     def __init__(
@@ -322,7 +327,8 @@ class RowsAtScales:
     def summed(self, length: float = 1.0, scale: float = 1.0, inflation: Floats | None = None) -> Summed:
         """The evidence with the further columns multiplied by a factor.
 
-        `length`: that factor. `scale`: a factor on the noise near the most probable one, where the sum begins.
+        `length`: that factor.
+        `scale`: a factor on the noise near the most probable one, where the sum begins.
         `inflation` (g,): of gross errors under a hypothesis that is nearly the same.
         """
         values = self._values

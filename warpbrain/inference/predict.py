@@ -84,8 +84,9 @@ def predict_with(
 class FieldFactors:
     """Log Bayes factor of a mixture of fields and sizes over none; what depends on the fields alone is computed once.
 
-    `fields` (n, k). `sizes` (s,): factors on the columns of a field, all equally probable. `weights` (f,): log
-    probability of each field; equal unless given.
+    `fields` (n, k).
+    `sizes` (s,): factors on the columns of a field, all equally probable.
+    `weights` (f,): log probability of each field; equal unless given.
     """
 
     def __init__(

@@ -80,7 +80,11 @@ class ClosestPoints:
 def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> ClosestPoints:
     """Closest points of a surface, exact to rounding; triangles without area count as the segments they are.
 
-    `points` (n, 3). `vertices` (v, 3). `faces` (k, 3): ids of vertices. `InputError` if there are no faces.
+    `points` (n, 3).
+    `vertices` (v, 3).
+    `faces` (k, 3): ids of vertices.
+
+    `InputError` if there are no faces.
     """
     xyz = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     triangles = np.asarray(faces)

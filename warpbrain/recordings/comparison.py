@@ -94,7 +94,9 @@ class Comparison:
 def compare_points(recording: PointsRecording, mesh: TetMesh, u: ArrayLike, rows: Ints) -> Comparison:
     """Compare displacements of tracked points.
 
-    `mesh`: at rest. `u` (N, 3): displacement of the nodes [m]. `rows` (n,): those that are compared, see `rows_at`.
+    `mesh`: at rest.
+    `u` (N, 3): displacement of the nodes [m].
+    `rows` (n,): those that are compared, see `rows_at`.
     """
     place = locate(mesh.points, mesh.tetrahedra, recording.points[rows])
     before = recording.displacement[rows]

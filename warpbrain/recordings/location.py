@@ -48,7 +48,9 @@ class Location:
 def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> Location:
     """Find points in a mesh, or the closest points of its boundary.
 
-    `mesh_points` (N, 3): nodes [m]. `tetrahedra` (m, 4): node ids. `points` (n, 3): what to find [m].
+    `mesh_points` (N, 3): nodes [m].
+    `tetrahedra` (m, 4): node ids.
+    `points` (n, 3): what to find [m].
     """
     nodes = np.asarray(mesh_points, dtype=np.float64)
     tets = np.asarray(tetrahedra)

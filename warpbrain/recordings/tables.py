@@ -27,8 +27,9 @@ LARGEST = 1e12
 class Table:
     """A table as it was read: cells that are asked for are checked, and what is wrong is added to `problems`.
 
-    `header`: names of the columns. `cells`: each as long as the header. `rows`: line in the file of each row, counted
-    from 1.
+    `header`: names of the columns.
+    `cells`: each as long as the header.
+    `rows`: line in the file of each row, counted from 1.
     """
 
     def __init__(

@@ -31,8 +31,11 @@ def added_readers() -> dict[str, Reader]:
 def tracked_points(path: Path, frame: Frame, moved: Path | None, problems: Problems) -> TrackedPoints:
     """Points of a file.
 
-    `frame`: unit and axes of a CSV file; all others state theirs. `moved`: the second markup of a pair. `problems`:
-    gets what is wrong. `Unreadable` if there is nothing to be had of the file.
+    `frame`: unit and axes of a CSV file; all others state theirs.
+    `moved`: the second markup of a pair.
+    `problems`: gets what is wrong.
+
+    `Unreadable` if there is nothing to be had of the file.
     """
     ending = path.suffix.lower()
     if is_markup(path):

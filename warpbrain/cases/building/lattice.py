@@ -45,9 +45,12 @@ def cut(
 ) -> tuple[Floats, Ints, Ints, Bools]:
     """Split every edge that crosses the zero level, there.
 
-    `points` (n, 3), `tetrahedra` (m, 4). `labels` (m,): handed down to the pieces. `field`: from positions (k, 3) to
-    values (k,). Returns points, tetrahedra and labels of the cut mesh, conforming and positively oriented if the given
-    one is, and for each tetrahedron whether the field is positive there.
+    `points` (n, 3), `tetrahedra` (m, 4).
+    `labels` (m,): handed down to the pieces.
+    `field`: from positions (k, 3) to values (k,).
+
+    Returns points, tetrahedra and labels of the cut mesh, conforming and positively oriented if the given one is, and
+    for each tetrahedron whether the field is positive there.
 
     Bisecting an edge splits every tetrahedron around it in two, which keeps the mesh conforming whatever the order.
     Here the crossed edges are bisected in order of their number. One tetrahedron has at most four of them and each

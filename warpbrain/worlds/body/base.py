@@ -262,7 +262,9 @@ def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats
     It depends on the mesh, the load and the sensors; if it is overestimated it hides what is missing. Its evidence is
     that of models with and without a smooth force, so that a missing cause is not taken for an error of the mesh.
 
-    `factor` (n, n): of the noise. `residual` (n,). `smooth` (n, k): columns of a smooth force as large as the noise.
+    `factor` (n, n): of the noise.
+    `residual` (n,).
+    `smooth` (n, k): columns of a smooth force as large as the noise.
     """
     from scipy.special import logsumexp, softmax
 
