@@ -22,9 +22,8 @@ from mechanism_picture import MAGNIFIED, PLACE
 from warpbrain.atomic import whole_file
 from warpbrain.bench.mechanisms import BASE, PLAIN, ratio
 from warpbrain.physics import potential
-from warpbrain.physics.continuous import smooth_parameters
 from warpbrain.physics.load import Load
-from warpbrain.physics.mechanism import Following, Mechanism
+from warpbrain.physics.mechanism import NUMBERS, Following, Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 
 # what mechanisms cost, from the files that `python -m warpbrain.bench mechanisms` wrote ----------------------
@@ -228,7 +227,8 @@ def confusions(mechanism: type[Mechanism]) -> list[str]:
 def derivatives(mechanism: type[Mechanism]) -> list[str]:
     """How a state is differentiated by its parameters: by differences along the way, or not, where one switches."""
     lines = []
-    numbers = [f"`{key}`" for key in smooth_parameters(mechanism)]
+    parameters = mechanism.parameters().items()
+    numbers = [f"`{key}`" for key, says in parameters if says.kind in NUMBERS and not says.method]
     if numbers:
         lines.append(f"[Derivatives](../solvers.md#derivatives) by {', '.join(numbers)}.")
     for key, says in mechanism.parameters().items():

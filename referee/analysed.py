@@ -45,16 +45,16 @@ def read_analyses(folder: Path, labels: Mapping[str, Mapping[str, Any]]) -> dict
         If there is none of any case.
     """
     losses = known_of(FILE)["losses"]
-    found = {}
+    analyses = {}
     for name in labels:
         file = folder / f"{name}.json"
         if file.exists():
             read = json.loads(file.read_text(encoding="ascii"))
             draws = tuple(_diagnosis(draw, losses) for draw in read["draws"])
-            found[name] = Analysis(tuple(read["conditional"]), draws)
-    if not found:
+            analyses[name] = Analysis(tuple(read["conditional"]), draws)
+    if not analyses:
         raise InputError(f"{folder}: no analysis of any case")
-    return found
+    return analyses
 
 
 def with_conditionals(label: Mapping[str, Any], analysis: Analysis | None) -> Mapping[str, Any]:

@@ -93,9 +93,9 @@ def analyse(labels: Mapping[str, Mapping[str, Any]], out: Path, workers: int) ->
     with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"), initializer=one_thread) as pool:
         jobs = {pool.submit(analysed, label): name for name, label in waiting.items()}
         for count, job in enumerate(as_completed(jobs), start=1):
-            told = job.result()
-            (out / f"{jobs[job]}.json").write_text(json.dumps(told) + "\n", encoding="ascii")
-            print(f"{count} of {len(jobs)}: {jobs[job]} in {told['seconds']:.0f} s", flush=True)
+            analysis = job.result()
+            (out / f"{jobs[job]}.json").write_text(json.dumps(analysis) + "\n", encoding="ascii")
+            print(f"{count} of {len(jobs)}: {jobs[job]} in {analysis['seconds']:.0f} s", flush=True)
 
 
 def analysed(label: Mapping[str, Any]) -> dict[str, Any]:
@@ -211,7 +211,7 @@ def posteriors(residuals: Floats, known: Known, random: Random) -> list[dict[str
     # in the order of `MODELLED`
     traps = [plain + moved.T @ moved, _noisy(known), plain + uneven.T @ uneven]
     analyst = Analyst(known.lower, known.sight.numbers, known.sight.setting.gross, known.named, known.nameless, traps)
-    told = []
+    analyses = []
     for w in residuals:
         p, p_value = analyst.posterior(w)
         sets: dict[tuple[str, ...], float] = {}
@@ -219,8 +219,8 @@ def posteriors(residuals: Floats, known: Known, random: Random) -> list[dict[str
             short = (NOT_PHYSICS,) if NOT_PHYSICS in causes else causes
             sets[short] = sets.get(short, 0.0) + value
         kept = [[list(causes), round(value, 4)] for causes, value in sets.items() if value > LEAST]
-        told.append({"p_value": p_value, "sets": sorted(kept, key=_by_probability)})
-    return told
+        analyses.append({"p_value": p_value, "sets": sorted(kept, key=_by_probability)})
+    return analyses
 
 
 def _by_probability(row: Sequence[Any]) -> float:

@@ -75,7 +75,7 @@ def calibrate(sets: Sequence[ScoredSet], write: Path = FILE) -> str:
     probabilities = [*apart, *(scale.probabilities(b.hypotheses) for _, b in others)]
     losses, spoken = priced([o for o, _ in everyone], [b for _, b in everyone], probabilities, known["losses"])
     names = " and ".join(each.cases.resolve().parent.name for each in sets)
-    told = {
+    content = {
         "source": f"`python -m referee calibrate`, {len(useful)} cases of {names}",
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "temperature": round(scale.temperature, 3),
@@ -85,7 +85,7 @@ def calibrate(sets: Sequence[ScoredSet], write: Path = FILE) -> str:
         "losses": losses,
         "interval": {"temperature": np.round(ends, 3).tolist()},
     }
-    write.write_text(json.dumps(told, indent=1) + "\n", encoding="ascii")
+    write.write_text(json.dumps(content, indent=1) + "\n", encoding="ascii")
     kinds = ", ".join(f"{sum(o.kind == kind for o, _ in useful)} {kind}" for kind in _KINDS)
     lines = [
         f"{len(outcomes)} cases, {len(missing)} without a diagnosis; fitted to {len(useful)}: {kinds}.",
@@ -174,7 +174,7 @@ def _before_and_after(ballots: Sequence[Ballot], apart: Sequence[Floats], weight
     plain = [one.probabilities(b.hypotheses) for b in ballots]
     lines = ["", f"mean log loss at a temperature of 1: {log_loss(one, ballots):.3f}; calibration error:"]
     for name, rows in (("at a temperature of 1", plain), ("by the other four fifths", apart)):
-        found: dict[str, Any] = reliability(np.concatenate(rows), right)
-        lines.append(f"  {name}: {found['ece']:.3f}")
-        lines += [f"    stated {q:.2f}: right {r:.2f} of {n}" for q, r, n in found["rows"]]
+        measured: dict[str, Any] = reliability(np.concatenate(rows), right)
+        lines.append(f"  {name}: {measured['ece']:.3f}")
+        lines += [f"    stated {q:.2f}: right {r:.2f} of {n}" for q, r, n in measured["rows"]]
     return lines

@@ -30,12 +30,12 @@ def compare(folders: Sequence[Path], outcomes: Sequence[Outcome]) -> dict[str, d
     """Shares of each method, under the names of the tool's; `folders`: of the case of each outcome."""
     with mapped(os.cpu_count() or 1) as each:
         said = list(each(_answers, folders))
-    found = {}
+    by_method = {}
     for method in METHODS:
         given = [outcome_of(o.label, answers[method]) for o, answers in zip(outcomes, said, strict=True)]
         scored = shares(given)
-        found[method] = {name: scored[name] for name in COMPARED}
-    return found
+        by_method[method] = {name: scored[name] for name in COMPARED}
+    return by_method
 
 
 def _answers(case: Path) -> dict[str, Answer]:

@@ -49,8 +49,8 @@ def creep(
         See `referee.equilibrium.balance`.
     """
     stress = np.zeros((*problem.body.region[1].shape, 3))
-    found = [balance(replace(problem, factor=1.0 + sum(beta for beta, _ in branches)), start, near, until)]
-    elastic = _second(problem, found[0].u)
+    balances = [balance(replace(problem, factor=1.0 + sum(beta for beta, _ in branches)), start, near, until)]
+    elastic = _second(problem, balances[0].u)
     stresses = [beta * elastic for beta, _ in branches]
     before = 0.0
     for time in times:
@@ -60,11 +60,11 @@ def creep(
         kept = [w * q - h * elastic for w, h, q in zip(whole, half, stresses, strict=True)]
         given = sum(kept, stress if problem.stress is None else problem.stress)
         now = replace(problem, factor=1.0 + sum(half), stress=given)
-        found.append(balance(now, found[-1].u, found[-1].linear, until))
-        elastic = _second(problem, found[-1].u)
+        balances.append(balance(now, balances[-1].u, balances[-1].linear, until))
+        elastic = _second(problem, balances[-1].u)
         stresses = [k + h * elastic for k, h in zip(kept, half, strict=True)]
         before = time
-    return found[1:]
+    return balances[1:]
 
 
 def _second(problem: Problem, u: Floats) -> Floats:

@@ -80,12 +80,12 @@ class Spread:
         precision = self.precision if others is None else without(others, self.precision)
         mixture = Mixture(precision, self._sight.numbers, self._sight.setting.gross)
         # of each draw its opposite, too: what is linear in it is no matter of chance then
-        found = [
+        ratios = [
             mixture.log_density(sign * e, wrong)[0] - mixture.log_density(sign * e + delta, wrong)[0]
             for e, wrong in zip(self._drawn, self._wrong, strict=True)
             for sign in (1.0, -1.0)
         ]
-        square = min(2.0 * float(np.mean(found)), float(delta @ precision @ delta))
+        square = min(2.0 * float(np.mean(ratios)), float(delta @ precision @ delta))
         return float(np.sqrt(max(square, 0.0)))
 
 

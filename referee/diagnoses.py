@@ -235,12 +235,12 @@ def _parameter(said: dict[str, Any]) -> tuple[float, float | None]:
 
 def _heldout(fit: dict[str, Any]) -> dict[str, float]:
     """Error at what was not fitted, told by stage or by quantity."""
-    found = {}
+    errors = {}
     for stage in ("declared", "refitted", "explained"):
         by_stage, by_quantity = fit.get(stage), fit.get("heldout_rmse_m")
         value = by_stage.get("heldout_rmse_m") if isinstance(by_stage, dict) else None
         if value is None and isinstance(by_quantity, dict):
             value = by_quantity.get(stage)
         if value is not None:
-            found[stage] = float(value)
-    return found
+            errors[stage] = float(value)
+    return errors

@@ -224,8 +224,7 @@ def _sign(random: Random) -> int:
 def _free(body: Body, points: Floats) -> NDArray[np.bool_]:
     """Which points are away from what is held."""
     held = body.points[body.nodes("fixed") | body.nodes("side")]
-    found: NDArray[np.bool_] = cKDTree(held).query(points)[0] > _AWAY
-    return found
+    return np.asarray(cKDTree(held).query(points)[0] > _AWAY)
 
 
 # many effects are drawn in one body

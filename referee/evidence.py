@@ -107,5 +107,4 @@ def _at_best(
 
 def _within(size: Floats, ends: tuple[Floats, Floats], both: NDArray[np.bool_]) -> Floats:
     sign = np.where(both & (size < 0.0), -1.0, 1.0)
-    found: Floats = sign * np.clip(sign * size, *ends)
-    return found
+    return np.asarray(sign * np.clip(sign * size, *ends))

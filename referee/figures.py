@@ -80,12 +80,12 @@ def _accuracy(file: Path, effects: Sequence[Outcome]) -> None:
     )
     for name, test, colour, marker, aside in series:
         for k, (low, high) in enumerate(BINS):
-            found = share(test(o) for o in effects if low <= o.d < high)
-            if found.value is None:
+            rated = share(test(o) for o in effects if low <= o.d < high)
+            if rated.value is None:
                 continue
-            ends = [[found.value - found.interval[0]], [found.interval[1] - found.value]]
+            ends = [[rated.value - rated.interval[0]], [rated.interval[1] - rated.value]]
             label = name if k == len(BINS) - 1 else None
-            axes.errorbar(k + aside, found.value, ends, fmt=marker, color=colour, capsize=3, label=label)
+            axes.errorbar(k + aside, rated.value, ends, fmt=marker, color=colour, capsize=3, label=label)
     counts = [sum(low <= o.d < high for o in effects) for low, high in BINS]
     ticks = [f"{bin_name(low, high)}\n({count})" for (low, high), count in zip(BINS, counts, strict=True)]
     axes.set_xticks(range(len(BINS)), ticks)

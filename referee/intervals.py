@@ -33,7 +33,7 @@ class Share:
         high = float(beta.ppf(0.975, k + 1, n - k)) if k < n else 1.0
         return low, high
 
-    def told(self) -> dict[str, object]:
+    def described(self) -> dict[str, object]:
         """For a file."""
         return {"hits": self.hits, "of": self.of, "share": self.value, "interval": list(self.interval)}
 

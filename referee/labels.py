@@ -38,8 +38,8 @@ def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dic
     acting = []
     for one, given in zip(truth.found, truth.given, strict=True):
         stands = {"detectability": one.d, "conditional": given, "upper": one.upper, "wanted": one.wanted}
-        told = {name: _number(value) for name, value in stands.items()}
-        acting.append({**one.effect.told(), **told, "drawn_again": one.again, **_alone(truth, one)})
+        numbers = {name: _number(value) for name, value in stands.items()}
+        acting.append({**one.effect.described(), **numbers, "drawn_again": one.again, **_alone(truth, one)})
     return {
         "case": name,
         "kind": plan.kind,
@@ -49,7 +49,7 @@ def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dic
         "upper": _number(truth.upper),
         "rms_effect_m": _number(np.sqrt((clean**2).sum(axis=2).mean())),
         "rms_declared_m": _number(np.sqrt((truth.declared[fitted] ** 2).sum(axis=1).mean())),
-        "setting": truth.setting.told(),
+        "setting": truth.setting.described(),
         "points_m": _array(points[fitted]),
         "clean_effect_m": _array(clean),
         "clean_effect_on_wall_m": _array(truth.effect_on_wall),

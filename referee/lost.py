@@ -41,23 +41,21 @@ class Lost:
 
     def left(self, rows: Floats) -> Floats:
         """Rows (k, rows) without what is lost."""
-        found: Floats = rows - (rows @ self._basis) @ self._basis.T
-        return found
+        return np.asarray(rows - (rows @ self._basis) @ self._basis.T)
 
     def at(self, rows: Floats) -> Floats:
         """Where rows (k, rows) let expect the mistaken points, (k, z, 3) [m]."""
-        found: Floats = (rows @ self._expect.T).reshape(len(rows), self._count, 3)
-        return found
+        return np.asarray((rows @ self._expect.T).reshape(len(rows), self._count, 3))
 
     def log_density(self, wrong: Floats) -> Floats:
         """Log density (...) of mistakes (..., z, 3) [m]."""
-        found = np.zeros(wrong.shape[:-2])
+        total = np.zeros(wrong.shape[:-2])
         for k, table in enumerate(self._tables):
             far = np.linalg.norm(wrong[..., k, :], axis=-1)
             # beyond the table it falls on as it does at its end
             slope = (table[-1] - table[-2]) / _STEP
-            found += np.interp(far, self._lengths, table) + slope * np.maximum(far - self._lengths[-1], 0.0)
-        return found
+            total += np.interp(far, self._lengths, table) + slope * np.maximum(far - self._lengths[-1], 0.0)
+        return total
 
     def of(self, draws: Draws) -> tuple[Draws, Floats]:
         """Draws of what is left, and how far each moves the mistaken points (k, z, 3) [m] at a size of 1."""

@@ -128,14 +128,14 @@ class Mixture:
         if len(rows):
             inner = self.precision[np.ix_(rows, rows)]
             known = np.linalg.inv(inner)
-            found = known @ weighted[rows]
+            mean = known @ weighted[rows]
             across = self.precision[:, rows][self.points]
-            v = v - across @ found
+            v = v - across @ mean
             blocks = blocks - across @ known @ across.transpose(0, 2, 1)
-            x[wrong] = found.reshape(-1, 3)
+            x[wrong] = mean.reshape(-1, 3)
             covariance[wrong] = np.einsum("iaib->iab", known.reshape(len(rows) // 3, 3, -1, 3))
             # less the density of their rows given the sound ones
-            log += 0.5 * (float(found @ inner @ found) + len(rows) * _LOG_2_PI - float(np.linalg.slogdet(inner)[1]))
+            log += 0.5 * (float(mean @ inner @ mean) + len(rows) * _LOG_2_PI - float(np.linalg.slogdet(inner)[1]))
         covariance[~wrong] = np.linalg.inv(blocks[~wrong])
         x[~wrong] = np.einsum("kij,kj->ki", covariance[~wrong], v[~wrong])
         mistaken = log_density(x, covariance)

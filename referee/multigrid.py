@@ -254,5 +254,4 @@ def _vectors(x: Singles) -> wp.array:
 
 
 def _dots(a: Singles, b: Singles) -> Floats:
-    found: Floats = np.einsum("nk,nk->k", a, b, dtype=np.float64)
-    return found
+    return np.asarray(np.einsum("nk,nk->k", a, b, dtype=np.float64))

@@ -145,10 +145,10 @@ class Outcome:
         """
         if not self.named or self.kind != "effect" or self.effect["amount"] is None:
             return None
-        found = self.said.parameters.get(self.effect["parameter"])
-        if found is None:
+        estimate = self.said.parameters.get(self.effect["parameter"])
+        if estimate is None:
             return None
-        value, sd = found
+        value, sd = estimate
         true = float(self.effect["amount"])
         if self.effect["parameter"] == "ratio":
             if value <= 0.0:
@@ -174,7 +174,7 @@ class Outcome:
 
 def read_outcomes(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> tuple[list[Outcome], list[str]]:
     """Outcomes of all cases of which there is a diagnosis, and the names of those of which there is none."""
-    found, missing = [], []
+    outcomes, missing = [], []
     seen = read_seen(diagnoses)
     left_out = {row["case"]: row.get("left_out") or "" for row in read_runs(diagnoses)}
     for name, label in labels.items():
@@ -182,7 +182,7 @@ def read_outcomes(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> t
         if file.exists():
             whole, *given = seen.get(name) or [None]
             said = read_diagnosis(file)
-            found.append(Outcome(name, label, said, whole, tuple(given), left_out.get(name, "")))
+            outcomes.append(Outcome(name, label, said, whole, tuple(given), left_out.get(name, "")))
         elif not any(left_out.values()) or name in left_out:
             missing.append(name)
-    return found, missing
+    return outcomes, missing

@@ -27,5 +27,5 @@ def read_runs(out: Path) -> list[dict[str, str]]:
 def read_seen(diagnoses: Path) -> dict[str, list[float]]:
     """What was written, also by runs that told `d` of all alone; nothing if nothing was."""
     file = diagnoses / SEEN
-    found = json.loads(file.read_text(encoding="ascii")) if file.exists() else {}
-    return {name: value if isinstance(value, list) else [value] for name, value in found.items()}
+    content = json.loads(file.read_text(encoding="ascii")) if file.exists() else {}
+    return {name: value if isinstance(value, list) else [value] for name, value in content.items()}

@@ -63,7 +63,7 @@ def score_all(
         folders |= {prefix + o.name: each.cases / o.name for o in diagnosed}
         outcomes += [replace(o, name=prefix + o.name) for o in diagnosed]
         missing += [prefix + name for name in silent]
-    found, calibrated, measured = shares(outcomes), calibration(outcomes), amounts(outcomes)
+    scored, calibrated, measured = shares(outcomes), calibration(outcomes), amounts(outcomes)
     confused = confusion(outcomes)
     baselines = {}
     if compared:
@@ -74,21 +74,21 @@ def score_all(
     of_analyst = [o for outcome in outcomes for o in analysts(outcome, analyses)]
     optimal = {name: value for name, value in shares(of_analyst).items() if not name.startswith(NOT_ASKED)}
     right = {o.name: value for o in outcomes if (value := rightness(o, analyses)) is not None}
-    text = score_text(found, calibrated, measured, confused, baselines, others, outcomes, missing, optimal, right)
+    text = score_text(scored, calibrated, measured, confused, baselines, others, outcomes, missing, optimal, right)
     out.mkdir(parents=True, exist_ok=True)
-    told = {
+    summary = {
         "cases": len(outcomes),
         "without_diagnosis": missing,
-        "shares": {name: value.told() for name, value in found.items()},
+        "shares": {name: value.described() for name, value in scored.items()},
         "optimal": {name: value.value for name, value in optimal.items()},
         "optimal analyst asked": len({o.name for o in of_analyst}),
         "calibration": calibrated,
         "measured": measured,
-        "baselines": {m: {name: value.told() for name, value in row.items()} for m, row in baselines.items()},
-        "beside": {name: {key: value.told() for key, value in row.items()} for name, row in others.items()},
+        "baselines": {m: {name: value.described() for name, value in row.items()} for m, row in baselines.items()},
+        "beside": {name: {key: value.described() for key, value in row.items()} for name, row in others.items()},
         "draws_given_up": sum(len(label["attempts"]) for label in opened.values()),
     }
-    (out / "score.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    (out / "score.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
     (out / "score.md").write_text(text, encoding="utf-8")
     draw_figures(out, confused, calibrated, outcomes)
     return text
@@ -99,7 +99,7 @@ def _beside(
 ) -> dict[str, dict[str, Share]]:
     """Shares of the run and of others, in the cases that all of them have diagnosed."""
     runs = {"the run": outcomes, **{name: read_outcomes(opened, folder)[0] for name, folder in beside.items()}}
-    all_of = set.intersection(*({o.name for o in found} for found in runs.values()))
+    all_of = set.intersection(*({o.name for o in of_run} for of_run in runs.values()))
     if not all_of:
         raise InputError(f"--beside: no case that the run, {' and '.join(beside)} all have diagnosed")
-    return {name: shares([o for o in found if o.name in all_of]) for name, found in runs.items()}
+    return {name: shares([o for o in of_run if o.name in all_of]) for name, of_run in runs.items()}

@@ -63,7 +63,7 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
     effects = of["effect"]
     plain = [o for o in effects if o.d >= PLAIN]
     for_tool = [o for o in effects if o.seen is not None and o.seen >= PLAIN]
-    found = {
+    scored = {
         "false alarms": share(o.said.alarm for o in of["none"]),
         "significant where nothing is missing": share(o.said.p_value <= ALPHA for o in of["none"]),
         "traps named as physics": share(o.said.verdict in NAMING for o in of["trap"]),
@@ -73,7 +73,7 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
         ),
     }
     for low, high in BINS:
-        found[f"best candidate right, {bin_name(low, high)}"] = share(o.top for o in effects if low <= o.d < high)
+        scored[f"best candidate right, {bin_name(low, high)}"] = share(o.top for o in effects if low <= o.d < high)
     others: dict[str, list[tuple[Outcome, float | None]]] = {
         "the old": [(o, o.upper) for o in effects],
         "the tool's": [(o, o.seen) for o in effects],
@@ -82,8 +82,8 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
     for measure, by in others.items():
         for low, high in BINS:
             within = (o.top for o, d in by if d is not None and low <= d < high)
-            found[f"best candidate right, {measure} {bin_name(low, high)}"] = share(within)
-    found |= {
+            scored[f"best candidate right, {measure} {bin_name(low, high)}"] = share(within)
+    scored |= {
         "right name or group holding it, d >= 8": share(o.held for o in plain),
         "right name or group holding it, the tool's d >= 8": share(o.held for o in for_tool),
         "right name alone, d >= 8": share(o.named for o in plain),
@@ -102,9 +102,9 @@ def shares(outcomes: Sequence[Outcome]) -> dict[str, Share]:
     for least in (PLAIN, VISIBLE):
         for words, given in (("d", attrgetter("given")), ("the tool's d", attrgetter("seen_given"))):
             name = f"both of two named, each {'of ' if words != 'd' else ''}{words} >= {least:g}"
-            found[name] = share(_both(o) for o in of["two"] if (d := given(o)) and min(d) >= least)
+            scored[name] = share(_both(o) for o in of["two"] if (d := given(o)) and min(d) >= least)
     missing = [o for o in of["left out"] if o.d >= PLAIN]
-    return found | {
+    return scored | {
         "mechanism left out, called by a name, d >= 8": share(o.said.spoken for o in missing),
         "mechanism left out, unknown or a group with it, d >= 8": share(
             o.said.verdict == "unknown" or o.held for o in missing
@@ -161,8 +161,8 @@ def _median(values: Sequence[float]) -> dict[str, Any]:
 def confusion(outcomes: Sequence[Outcome]) -> tuple[list[str], list[str], list[list[int]]]:
     """Rows (what is true), columns (what is said) and counts."""
     rows = sorted({_true(o) for o in outcomes}, key=lambda name: (name != "nothing", name))
-    columns = sorted({_told(o) for o in outcomes}, key=lambda name: (name != "nothing", name))
-    table = [[sum(_true(o) == row and _told(o) == column for o in outcomes) for column in columns] for row in rows]
+    columns = sorted({_answer_of(o) for o in outcomes}, key=lambda name: (name != "nothing", name))
+    table = [[sum(_true(o) == row and _answer_of(o) == column for o in outcomes) for column in columns] for row in rows]
     return rows, columns, table
 
 
@@ -172,7 +172,7 @@ def _true(outcome: Outcome) -> str:
     return names.get(outcome.kind, true)
 
 
-def _told(outcome: Outcome) -> str:
+def _answer_of(outcome: Outcome) -> str:
     said = outcome.said
     if said.spoken:
         return " + ".join(sorted(said.names))

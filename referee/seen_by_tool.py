@@ -33,13 +33,13 @@ def write_seen(labels: Mapping[str, Mapping[str, Any]], diagnoses: Path) -> dict
 
     What is known stays: covariances are large, and of no use once `d` is known.
     """
-    found = read_seen(diagnoses) | {
+    known = read_seen(diagnoses) | {
         name: stands_out(label, diagnoses / name)
         for name, label in labels.items()
         if label["effects"] and (diagnoses / name / COVARIANCE).exists()
     }
-    (diagnoses / SEEN).write_text(json.dumps(found, indent=1) + "\n", encoding="ascii")
-    return found
+    (diagnoses / SEEN).write_text(json.dumps(known, indent=1) + "\n", encoding="ascii")
+    return known
 
 
 def stands_out(label: Mapping[str, Any], folder: Path) -> list[float]:

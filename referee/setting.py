@@ -192,7 +192,7 @@ class Setting:
             loads=loads,
         )
 
-    def told(self) -> dict[str, Any]:
+    def described(self) -> dict[str, Any]:
         """Everything of it, for the label."""
         return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
 

@@ -14,7 +14,7 @@ BELOW = 0.05
 
 
 def score_text(
-    found: Mapping[str, Share],
+    scored: Mapping[str, Share],
     calibrated: Mapping[str, Any],
     measured: Mapping[str, Mapping[str, Any]],
     confused: tuple[list[str], list[str], list[list[int]]],
@@ -39,14 +39,14 @@ def score_text(
         "| score | share with 95 % interval (Clopper-Pearson) | the optimal analyst | bar | |",
         "|---" * 5 + "|",
     ]
-    for name, value in found.items():
+    for name, value in scored.items():
         best = percent(optimal.get(name))
-        told, bar = _bar(name, optimal.get(name))
-        lines.append(f"| {name} | {value} | {best} | {told} | {_met(name, value, bar)} |")
+        wanted, bar = _bar(name, optimal.get(name))
+        lines.append(f"| {name} | {value} | {best} | {wanted} | {_met(name, value, bar)} |")
     for name, words in (("spoken", "spoken names"), ("all", "all stated probabilities")):
         ece = calibrated[name]["ece"]
-        told = "-" if ece is None else f"{ece:.3f}"
-        lines.append(f"| expected calibration error, {words} | {told} | | <= 0.05 | {_within(ece, 0.05)} |")
+        error = "-" if ece is None else f"{ece:.3f}"
+        lines.append(f"| expected calibration error, {words} | {error} | | <= 0.05 | {_within(ece, 0.05)} |")
     lines += ["", "| measured, d >= 5 | median | quartiles | of |", "|---|---|---|---|"]
     for name, row in measured.items():
         if row["of"]:
@@ -58,13 +58,13 @@ def score_text(
     if baselines:
         names = list(next(iter(baselines.values())))
         lines += ["", f"| method | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
-        for method, row in {"the tool": {name: found[name] for name in names}, **baselines}.items():
+        for method, row in {"the tool": {name: scored[name] for name in names}, **baselines}.items():
             lines.append(f"| {method} | {' | '.join(str(row[name]) for name in names)} |")
         lines.append(f"| the optimal analyst | {' | '.join(percent(optimal.get(name)) for name in names)} |")
     if beside:
         lines += ["", f"| score, in cases of all | {' | '.join(beside)} | the optimal analyst |"]
         lines += ["|---" * (len(beside) + 2) + "|"]
-        for key in found:
+        for key in scored:
             lines.append(
                 f"| {key} | {' | '.join(str(row[key]) for row in beside.values())} | {percent(optimal.get(key))} |"
             )

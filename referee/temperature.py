@@ -142,9 +142,9 @@ def interval(
 ) -> tuple[float, float]:
     """Ends of the 95 % interval of the temperature, by fitting cases drawn with replacement."""
     random = np.random.default_rng(1)
-    found = [
+    temperatures = [
         fit([ballots[k] for k in random.integers(len(ballots), size=len(ballots))], weights).temperature
         for _ in range(draws)
     ]
-    low, high = np.percentile(found, [2.5, 97.5]).tolist()
+    low, high = np.percentile(temperatures, [2.5, 97.5]).tolist()
     return low, high

@@ -49,10 +49,9 @@ def __getattr__(name: str) -> Any:
         return import_module("warpbrain.physics.mechanisms").mechanisms()
     if name in _homes():
         return getattr(import_module(_homes()[name]), name)
-    from difflib import get_close_matches
+    from warpbrain.problems import nearest
 
-    near = get_close_matches(name, __dir__(), 1)
-    cure = f"did you mean '{near[0]}'?" if near else "dir(warpbrain) lists what there is"
+    cure = nearest(name, __dir__(), "dir(warpbrain) lists what there is")
     raise AttributeError(f"module 'warpbrain' has no attribute '{name}': {cure}")
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import NoReturn
 
@@ -30,6 +32,14 @@ _PLACE, _MESSAGE = 120, 800
 def _shortened(text: str, most: int) -> str:
     one_line = " ".join(text.split())
     return one_line if len(one_line) <= most else f"{one_line[: most - 20]}...{one_line[-20:]}"
+
+
+def nearest(name: object, names: Iterable[str], otherwise: str | None = None) -> str:
+    """The cure for a name that is not known: the one that is probably meant, or `otherwise`, or all of them."""
+    known = {candidate.lower(): candidate for candidate in names}
+    if near := get_close_matches(str(name).lower(), list(known), n=1):
+        return f"did you mean '{known[near[0]]}'?"
+    return f"expected one of {', '.join(known.values())}" if otherwise is None else otherwise
 
 
 class Unreadable(Exception):

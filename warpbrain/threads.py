@@ -56,14 +56,14 @@ def in_threads(work: Callable[[Part], Made], parts: Sequence[Part]) -> list[Made
         return list(_pool(count, os.getpid()).map(work, parts))
 
 
-def fill_columns(found: Any, work: Callable[[slice], Any], together: int) -> None:
+def fill_columns(array: Any, work: Callable[[slice], Any], together: int) -> None:
     """Fill an array (m, k) with what a function makes of each slice of its columns, so many of them a part."""
 
     def fill(first: int) -> None:
         some = slice(first, first + together)
-        found[:, some] = work(some)
+        array[:, some] = work(some)
 
-    in_threads(fill, range(0, found.shape[1], together))
+    in_threads(fill, range(0, array.shape[1], together))
 
 
 def beside(work: Callable[[], Made]) -> Callable[[], Made]:

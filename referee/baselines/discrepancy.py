@@ -54,15 +54,15 @@ def probabilities(problem: Whitened) -> dict[str, float]:
         alone.append(base)
         logs = np.array([_cause(y, columns[:, own]) for _, own in groups])
         each.append([base + float(logsumexp(logs[of[cause]]) - np.log(len(of[cause]))) for cause in causes])
-    found = {
+    log_weights = {
         "": alone[0] + np.log(NOTHING),
         "unknown": float(logsumexp(np.array(alone[1:]) - np.log(len(fields) - 1))) + np.log(UNKNOWN),
     }
     share = np.log((1.0 - NOTHING - UNKNOWN) / len(causes))
     for k, cause in enumerate(causes):
-        found[cause] = float(logsumexp(np.array([row[k] for row in each]) + prior)) + share
-    total = float(logsumexp(list(found.values())))
-    return {name: float(np.exp(log - total)) for name, log in found.items()}
+        log_weights[cause] = float(logsumexp(np.array([row[k] for row in each]) + prior)) + share
+    total = float(logsumexp(list(log_weights.values())))
+    return {name: float(np.exp(log - total)) for name, log in log_weights.items()}
 
 
 def _discrepancies(problem: Whitened) -> Iterator[tuple[float, Floats, Floats]]:

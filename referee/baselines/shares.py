@@ -12,8 +12,8 @@ NAMED = 0.3
 
 def weights(amounts: Floats, causes: Strings) -> dict[str, float]:
     """Sum of absolute amounts of columns of unit length, by cause; of those that have any."""
-    found = {str(cause): float(np.abs(amounts[causes == cause]).sum()) for cause in np.unique(causes)}
-    return {cause: weight for cause, weight in found.items() if weight > 0.0}
+    by_cause = {str(cause): float(np.abs(amounts[causes == cause]).sum()) for cause in np.unique(causes)}
+    return {cause: weight for cause, weight in by_cause.items() if weight > 0.0}
 
 
 def named(weighed: dict[str, float]) -> tuple[str, ...]:

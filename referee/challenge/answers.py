@@ -86,16 +86,16 @@ def _answer(where: str, row: Mapping[str, str | None]) -> Answer:
     verdict = " + ".join(part.strip() for part in verdict.lower().split("+"))
     if verdict not in VERDICTS:
         raise InputError(f"{where}: verdict '{verdict}'; expected one of {', '.join(VERDICTS)}")
-    told = tuple(name.strip() for name in names.split(BETWEEN) if name.strip())
-    if (verdict in NAMING) != bool(told):
-        raise InputError(f"{where}: '{verdict}' with {len(told)} names; {', '.join(NAMING)} have names, others none")
+    named = tuple(name.strip() for name in names.split(BETWEEN) if name.strip())
+    if (verdict in NAMING) != bool(named):
+        raise InputError(f"{where}: '{verdict}' with {len(named)} names; {', '.join(NAMING)} have names, others none")
     try:
         probability = float(stated) if stated else None
     except ValueError:
         raise InputError(f"{where}: probability '{stated}'; expected a number") from None
     if probability is not None and not 0.0 <= probability <= 1.0:
         raise InputError(f"{where}: probability {stated}; expected 0 to 1")
-    return Answer(case, verdict, told, probability)
+    return Answer(case, verdict, named, probability)
 
 
 def commit(answers: Path) -> str:

@@ -118,8 +118,8 @@ def _score(given: argparse.Namespace) -> int:
         about=given.about,
         of_set=given.of_set,
     )
-    for name, told in (scores["shares"] | scores["mechanisms"]).items():
-        print(f"{name}: {Share(told['hits'], told['of'])}")
+    for name, counts in (scores["shares"] | scores["mechanisms"]).items():
+        print(f"{name}: {Share(counts['hits'], counts['of'])}")
     known = scores["calibration"]
     if known["of"]:
         print(

@@ -54,8 +54,8 @@ def export(cases: Path, out: Path, only: Sequence[str] = (), workers: int = 1) -
     out.mkdir(parents=True, exist_ok=True)
     waiting = [folders[name] for name in names if not (out / f"{name}.npz").exists()]
     with mapped(workers) as each:
-        for count, told in enumerate(each(partial(_export, out), waiting), start=1):
-            print(f"{count} of {len(waiting)}: {told}", flush=True)
+        for count, sentence in enumerate(each(partial(_export, out), waiting), start=1):
+            print(f"{count} of {len(waiting)}: {sentence}", flush=True)
     (out / LIST).write_text("".join(f"{name}\n" for name in names), encoding="ascii")
     return len(names)
 

@@ -59,8 +59,8 @@ def _section(rows: Sequence[Scores]) -> list[str]:
     lines = [f"## {first['set'] or 'A set'}", "", f"{first['cases']} cases.", ""]
     lines += [f"| code | {' | '.join(HEADINGS.values())} | without an answer |", "|---" * (len(HEADINGS) + 2) + "|"]
     for row in rows:
-        told = " | ".join(_told(_share(row, name)) for name in HEADINGS)
-        lines.append(f"| {row['answers']} | {told} | {len(row['without_answer'])} |")
+        cells = " | ".join(_in_words(_share(row, name)) for name in HEADINGS)
+        lines.append(f"| {row['answers']} | {cells} | {len(row['without_answer'])} |")
     names = sorted({name for row in rows for name in row["mechanisms"]})
     lines += [
         "",
@@ -71,8 +71,8 @@ def _section(rows: Sequence[Scores]) -> list[str]:
     ]
     for row in rows:
         counts = [row["mechanisms"].get(name, {"hits": 0, "of": 0}) for name in names]
-        told = " | ".join(f"{count['hits']} of {count['of']}" for count in counts)
-        lines.append(f"| {row['answers']} | {told} |")
+        cells = " | ".join(f"{count['hits']} of {count['of']}" for count in counts)
+        lines.append(f"| {row['answers']} | {cells} |")
     lines += ["", "Stated probabilities that the answer is right:", ""]
     lines += ["| code | stated | calibration error | Brier score | stated: right, of |", "|---" * 5 + "|"]
     for row in rows:
@@ -88,11 +88,11 @@ def _section(rows: Sequence[Scores]) -> list[str]:
 
 
 def _share(row: Scores, name: str) -> Share:
-    told = row["shares"][name]
-    return Share(told["hits"], told["of"])
+    counts = row["shares"][name]
+    return Share(counts["hits"], counts["of"])
 
 
-def _told(value: Share) -> str:
+def _in_words(value: Share) -> str:
     if not value.of:
         return "0 of 0"
     low, high = value.interval

@@ -108,7 +108,7 @@ def outcome_of(label: Mapping[str, Any], answer: Answer) -> Outcome:
 
 def scores_of(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """Shares, shares of each mechanism, and whether stated probabilities are right as often as they say."""
-    found = shares(outcomes)
+    scored = shares(outcomes)
     effects = [o for o in outcomes if o.kind == "effect"]
     mechanisms: dict[str, Share] = {
         name: share(o.named for o in effects if o.truth == name) for name in sorted({o.truth for o in effects})
@@ -117,10 +117,10 @@ def scores_of(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     p, was = np.array([p for p, _ in stated], dtype=float), np.array([w for _, w in stated], dtype=bool)
     return {
         "shares": {
-            "answers right": share(right(o) for o in outcomes).told(),
-            **{name: found[name].told() for name in SCORED},
+            "answers right": share(right(o) for o in outcomes).described(),
+            **{name: scored[name].described() for name in SCORED},
         },
-        "mechanisms": {name: value.told() for name, value in mechanisms.items()},
+        "mechanisms": {name: value.described() for name, value in mechanisms.items()},
         "calibration": {
             **reliability(p, was),
             "of": len(p),

@@ -54,22 +54,22 @@ def nuisances(response: DeclaredResponse) -> tuple[list[str], Floats]:
     forces += [("mesh", -UNRESOLVED * force) for force in _unresolved(response)]
     forces += [("law", -np.sqrt(share) * body.nodal(_law(response, law) - P)) for law, share in BOTH_LAWS]
     seen = response.forces(np.stack([force for _, force in forces], axis=1))
-    told = [*names, *(name for name, _ in forces)]
-    return told, np.concatenate([np.stack(columns, axis=1).reshape(len(rows.kind), -1), seen], axis=1)
+    all_names = [*names, *(name for name, _ in forces)]
+    return all_names, np.concatenate([np.stack(columns, axis=1).reshape(len(rows.kind), -1), seen], axis=1)
 
 
 def _registration(response: DeclaredResponse) -> list[tuple[str, Floats]]:
     rows, points = response.rows_of, response.body.mesh.points
     moves = rows.kind != "force"
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    found = []
+    columns = []
     for axis in np.eye(3):
-        found.append(("shift", SHIFT / np.sqrt(3.0) * moves * (rows.direction @ axis)))
+        columns.append(("shift", SHIFT / np.sqrt(3.0) * moves * (rows.direction @ axis)))
     arm = rows.place - middle
     for axis in np.eye(3):
         turned = np.einsum("ki,ki->k", np.cross(axis, arm), rows.direction)
-        found.append(("turn", TURN / np.sqrt(3.0) * moves * turned))
-    return found
+        columns.append(("turn", TURN / np.sqrt(3.0) * moves * turned))
+    return columns
 
 
 def _poisson(response: DeclaredResponse) -> Floats:
@@ -93,7 +93,7 @@ def _unresolved(response: DeclaredResponse) -> list[Floats]:
     body, tetrahedra = response.body, response.body.mesh.tetrahedra
     inverse = np.swapaxes(np.linalg.inv(response.F), 1, 2)
     volumetric = (body.lam * np.log(np.linalg.det(response.F)))[:, None, None] * inverse
-    found = []
+    unresolved = []
     for P in (volumetric, body.stress(response.F) - volumetric):
         away = np.zeros_like(P)
         for label in np.unique(body.mesh.tissue):
@@ -105,8 +105,8 @@ def _unresolved(response: DeclaredResponse) -> list[Floats]:
             nodal = np.stack([np.bincount(corners, volume * part, minlength=n) for part in flat.T], axis=1)
             recovered = (nodal / total[:, None])[tetrahedra[within]].mean(axis=1)
             away[within] = recovered.reshape(-1, 3, 3) - P[within]
-        found.append(body.nodal(away))
-    return found
+        unresolved.append(body.nodal(away))
+    return unresolved
 
 
 def _law(response: DeclaredResponse, law: Law) -> Floats:

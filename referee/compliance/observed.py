@@ -110,16 +110,16 @@ def _sigma(recording: Recording) -> float:
 def _points(
     body: NeoHookeanBody, recording: PointsRecording
 ) -> tuple[str, Floats, Floats, Floats, float, Floats, csr_matrix]:
-    found = locate(body.mesh.points, body.mesh.tetrahedra, recording.points)
+    located = locate(body.mesh.points, body.mesh.tetrahedra, recording.points)
     k = len(recording.points)
     rows = np.repeat(np.arange(3 * k), 4)
-    columns = (3 * found.nodes[:, None, :].astype(np.int64) + np.arange(3)[:, None]).ravel()
-    values = np.broadcast_to(found.weights[:, None, :], (k, 3, 4)).ravel()
+    columns = (3 * located.nodes[:, None, :].astype(np.int64) + np.arange(3)[:, None]).ravel()
+    values = np.broadcast_to(located.weights[:, None, :], (k, 3, 4)).ravel()
     reading = csr_matrix((values, (rows, columns)), shape=(3 * k, body.mesh.points.size))
     time = np.full(k, np.nan) if recording.time is None else recording.time
     place, direction = np.repeat(recording.points, 3, axis=0), np.tile(np.eye(3), (k, 1))
-    told = recording.displacement.ravel()
-    return "displacement", place, direction, np.repeat(time, 3), _sigma(recording), told, reading
+    observed = recording.displacement.ravel()
+    return "displacement", place, direction, np.repeat(time, 3), _sigma(recording), observed, reading
 
 
 def _wall(
@@ -138,8 +138,8 @@ def _wall(
     values = (nearest.weights[:, :, None] * normals[:, None, :]).ravel()
     columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
     reading = csr_matrix((values, (np.repeat(np.arange(k), 9), columns)), shape=(k, body.mesh.points.size))
-    told = np.einsum("ki,ki->k", recording.points - place, normals)
-    return "wall", place, normals, np.full(k, np.nan), _sigma(recording), told, reading
+    observed = np.einsum("ki,ki->k", recording.points - place, normals)
+    return "wall", place, normals, np.full(k, np.nan), _sigma(recording), observed, reading
 
 
 def _force(

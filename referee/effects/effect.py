@@ -70,7 +70,7 @@ class Effect(abc.ABC):
         """Middle of a local effect [m]."""
         return getattr(self, "centre", None)
 
-    def told(self) -> dict[str, Any]:
+    def described(self) -> dict[str, Any]:
         """Everything of it, for the label."""
         return {
             "kind": self.kind,

@@ -54,7 +54,7 @@ def test_what_is_assumed_is_not_said_to_be_left_out(tmp_path):
     ("said", "expected"),
     [
         ("swelling", "swelling: amount is missing [%]"),
-        ("sweling:amount=3", "no mechanism 'sweling': did you mean swelling?"),
+        ("sweling:amount=3", "no mechanism 'sweling': did you mean 'swelling'?"),
         ("swelling:amount=much", "amount: found 'much', expected a number [%]"),
         ("swelling:amount=-95", "amount: found -95, expected a number between -90 and 400"),
         ("swelling:size=3", "no key 'size' of swelling: expected one of amount, elements, centre, radius"),

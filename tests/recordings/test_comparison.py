@@ -12,6 +12,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.comparison import (
+    Comparison,
     Error,
     compare_force,
     compare_points,
@@ -50,6 +51,11 @@ def surface_of(u, faces=False) -> SurfaceRecording:
     return SurfaceRecording(name="s", file="s.csv", nodes="top", points=moved[chosen].mean(axis=1))
 
 
+def compare(recording, *state, time=None) -> Comparison:
+    of = {"points": compare_points, "surface": compare_surface, "force": compare_force}[recording.kind]
+    return of(recording, *state, rows_at(recording, time))
+
+
 def test_formulas():
     residuals = np.array([[0.003, 0.004, 0], [0, 0, 0]])
     assert root_mean_square(residuals) == pytest.approx(0.005 / np.sqrt(2))
@@ -63,26 +69,20 @@ def test_formulas():
 
 def test_an_exact_observation_leaves_nothing():
     recording = points_of()
-    compared = compare_points(recording, MESH, U)
+    compared = compare(recording, MESH, U)
     assert compared.after.largest < 1e-16
     assert compared.before.root_mean_square == pytest.approx(root_mean_square(recording.displacement))
-    assert compared.before == compare_points(recording, MESH, 0 * U).after
+    assert compared.before == compare(recording, MESH, 0 * U).after
     np.testing.assert_array_equal(compared.residuals_before, recording.displacement)
     assert compared.count == 20
     for faces in (False, True):
-        compared = compare_surface(surface_of(U, faces), MESH, U)
+        compared = compare(surface_of(U, faces), MESH, U)
         if not faces:
             assert compared.after.largest < 1e-16
             assert compared.before.root_mean_square > 1e-3
         else:
             assert compared.reverse_after.largest < 1e-16
             assert compared.reverse_before.root_mean_square > 1e-3
-
-
-def test_a_location_may_be_given():
-    recording = points_of()
-    place = locate(MESH.points, MESH.tetrahedra, recording.points)
-    assert compare_points(recording, MESH, 2 * U, location=place).after == compare_points(recording, MESH, 2 * U).after
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -97,8 +97,8 @@ def test_where_all_of_it_lies_changes_nothing(seed, faces):
     surface = surface_of(1.3 * U, faces)
     turned_surface = replace(surface, points=surface.points @ R.T + shift)
     for a, b in (
-        (compare_points(points, MESH, U), compare_points(turned, moved, U @ R.T)),
-        (compare_surface(surface, MESH, U), compare_surface(turned_surface, moved, U @ R.T)),
+        (compare(points, MESH, U), compare(turned, moved, U @ R.T)),
+        (compare(surface, MESH, U), compare(turned_surface, moved, U @ R.T)),
     ):
         for one, other in ((a.before, b.before), (a.after, b.after), (a.reverse_after, b.reverse_after)):
             if one is not None:
@@ -107,25 +107,25 @@ def test_where_all_of_it_lies_changes_nothing(seed, faces):
 
 
 def test_noise():
-    assert compare_points(points_of(), MESH, U).noise is None
-    assert compare_points(points_of(sigma=0.001), MESH, U).noise == pytest.approx(np.sqrt(3) * 0.001)
+    assert compare(points_of(), MESH, U).noise is None
+    assert compare(points_of(sigma=0.001), MESH, U).noise == pytest.approx(np.sqrt(3) * 0.001)
     sigmas = np.full(20, 0.002)
-    assert compare_points(points_of(sigma=0.001, sigmas=sigmas), MESH, U).noise == pytest.approx(np.sqrt(3) * 0.002)
+    assert compare(points_of(sigma=0.001, sigmas=sigmas), MESH, U).noise == pytest.approx(np.sqrt(3) * 0.002)
     rng = np.random.default_rng(5)
     points = rng.uniform(0.02, 0.08, (20000, 3))
     noisy = locate(MESH.points, MESH.tetrahedra, points).interpolate(U) + 0.001 * rng.normal(size=points.shape)
-    compared = compare_points(points_of(noisy, points=points, sigma=0.001), MESH, U)
+    compared = compare(points_of(noisy, points=points, sigma=0.001), MESH, U)
     # Monte Carlo error of 60,000 numbers: 0.3 %
     assert compared.after.root_mean_square == pytest.approx(compared.noise, rel=0.005)
     surface = replace(surface_of(U), sigma=0.001)
-    assert compare_surface(surface, MESH, U).noise == 0.001
+    assert compare(surface, MESH, U).noise == 0.001
 
 
 def test_sets_without_faces():
     assert len(faces_of_set(MESH, "top", "test")) == 32
     for name, message in (("line", "no boundary triangle .* 'line'"), ("side", "no node set 'side', found all, line")):
         with pytest.raises(InputError, match=message):
-            compare_surface(replace(surface_of(U), nodes=name), MESH, U)
+            compare(replace(surface_of(U), nodes=name), MESH, U)
 
 
 def force(**keys) -> ForceRecording:
@@ -134,15 +134,15 @@ def force(**keys) -> ForceRecording:
 
 
 def test_forces():
-    compared = compare_force(force(sigma=0.1), [2, 7, 3.5])
+    compared = compare(force(sigma=0.1), [2, 7, 3.5])
     assert compared.unit == "N"
     assert compared.before.largest == pytest.approx(np.hypot(2, 3))
     assert compared.after.largest == pytest.approx(0.5)
     assert compared.noise == pytest.approx(np.sqrt(2) * 0.1)
-    assert compare_force(force(), [1, 0, 2], time=1.4).after.largest == 0
+    assert compare(force(), [1, 0, 2], time=1.4).after.largest == 0
     twisted = force(force=np.full((3, 3), np.nan), torque=np.array([0.0, 1, 2]), sigma=0.5)
     with pytest.raises(InputError, match="only the torque"):
-        compare_force(twisted, [0, 0, 0])
+        compare(twisted, [0, 0, 0])
 
 
 TIMES = np.array([0.0, 0, 1, 1, 2, 3, 4])

@@ -216,9 +216,9 @@ def test_a_case_of_every_kind(plan, small, tmp_path, monkeypatch):
     make.make_case(tmp_path, "case-001", plan, [7, 3])
     label = open_sealed(read_sealed(tmp_path / "labels" / "case-001.json.gz"))
     # a label tells all that its truth was made from
-    assert setting_of(label).told() == label["setting"]
+    assert setting_of(label).described() == label["setting"]
     for effect, told in zip(effects_of(label), label["effects"], strict=True):
-        assert json.loads(json.dumps(effect.told())) == {name: told[name] for name in effect.told()}
+        assert json.loads(json.dumps(effect.described())) == {name: told[name] for name in effect.described()}
     found = analysed({**label, "setting": {**label["setting"], "points": 40, "checks": 10}})
     if plan.kind == "two":
         np.testing.assert_allclose(found["conditional"], [e["conditional"] for e in label["effects"]], rtol=0.1)

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import sensitivities
+from mechanism_numbers import continuous, numbers_of, scales_of, with_numbers
 from numpy.typing import NDArray
 from shapes import cube, distorted
 from verification_rows import Row
 
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.continuous import continuous, numbers_of, scales_of, with_numbers
 from warpbrain.physics.laws import NeoHookean, Ogden
 from warpbrain.physics.load import NodalForce
 from warpbrain.physics.mechanism import Mechanism

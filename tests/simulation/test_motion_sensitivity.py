@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import sensitivities
+from mechanism_numbers import numbers_of, scales_of, with_numbers
 from numpy.typing import NDArray
 from shapes import cube
 from verification_rows import Row
 
 from warpbrain.errors import InputError
-from warpbrain.physics.continuous import numbers_of, scales_of, with_numbers
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.drainage import Drainage

@@ -33,19 +33,6 @@ STEPS = 20
 REPEATS = 3
 
 
-#: Of the command line.
-DESCRIPTION = "Times batches of the coarse single-tissue phantom, 20 steps from rest, over their size."
-OPTIONS: dict[str, command.Options] = {
-    "--device": command.DEVICE,
-    "--batches": {"metavar": "B,...", "help": "sizes (default: 1,2,4,8 on a CPU, 1,4,16,32,64,128,256,512 on a GPU)"},
-    "--precision": command.PRECISION,
-    "--processes": {"metavar": "P,...", "help": "on a CPU: also the rate of so many processes, as 1,2"},
-    "--samples": {"type": int, "default": 48, "help": "samples that the processes compute (default: 48)"},
-    "--sweep": {"choices": ("single", "multi"), "help": "also the paper's sweep to rest, 17 samples or 289 pairs"},
-    "--json": command.JSON,
-}
-
-
 def _sizes(name: str, text: str) -> list[int]:
     numbers = text.split(",")
     for number in numbers:

@@ -1,4 +1,4 @@
-"""What the commands of the bench share: options, checks, the machine that a recorded time must name, and its file."""
+"""What the commands of the bench share: checks, the machine that a recorded time must name, and its file."""
 
 from __future__ import annotations
 
@@ -6,42 +6,12 @@ import argparse
 import json
 import os
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 from warpbrain.errors import InputError
-from warpbrain.terminal.command import OneLineParser, exit_status
-
-Options = Mapping[str, Any]
-#: Options of several commands.
-DEVICE: Options = {"metavar": "NAME", "help": "cpu, cuda:0, ... (default: the GPU if there is one)"}
-PRECISION: Options = {"choices": ("double", "single"), "default": "double", "help": "default: double"}
-JSON: Options = {"type": Path, "metavar": "FILE", "help": "write every sample"}
-
-
-def run(
-    command: str,
-    description: str,
-    options: Mapping[str, Options],
-    bench: Callable[[argparse.Namespace], None],
-    arguments: Sequence[str],
-) -> int:
-    """Parse the arguments of a command and measure; returns the exit status."""
-    parser = OneLineParser(prog=f"python -m warpbrain.bench {command}".rstrip(), description=description)
-    for name, settings in options.items():
-        parser.add_argument(name, **settings)
-    parsed = parser.parse_args(arguments)
-
-    def measure() -> None:
-        for name, settings in options.items():
-            value = getattr(parsed, name.strip("-"))
-            if settings.get("type") is int and value < 1:
-                raise InputError(f"{name} {value}: expected a whole number of at least 1")
-        bench(parsed)
-
-    return exit_status(parser.prog, measure)
 
 
 def chosen(option: str, text: str | None, known: Sequence[str]) -> list[str]:

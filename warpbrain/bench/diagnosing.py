@@ -6,7 +6,6 @@ import argparse
 import platform
 import time
 from datetime import date
-from pathlib import Path
 
 from warpbrain.atomic import safe_name
 from warpbrain.bench import command
@@ -15,19 +14,6 @@ from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.estimation.options import Listener
 from warpbrain.simulation.system import find_device
 from warpbrain.terminal.progress import Progress
-
-#: Of the command line.
-DESCRIPTION = (
-    "Times each stage of a diagnosis with every mechanism: of 0529 with 289 points, if no other case is named. The "
-    "first run also loads kernels and makes what is kept of the mesh."
-)
-OPTIONS: dict[str, command.Options] = {
-    "--device": command.DEVICE,
-    "--case": {"default": "0529", "metavar": "NAME", "help": "0529, ... or the path of a case folder (default: 0529)"},
-    "--tissue": {"choices": ("single", "multi"), "default": "multi", "help": "one tissue, or grey and white (default)"},
-    "--runs": {"type": int, "default": 2, "help": "one after the other (default: 2)"},
-    "--out": {"type": Path, "metavar": "DIR", "help": "folder for a file with every run, diagnose_DEVICE_DATE.json"},
-}
 
 
 def bench(options: argparse.Namespace) -> None:

@@ -9,7 +9,6 @@ import argparse
 import time
 from collections.abc import Callable, Mapping, Sequence
 from datetime import date
-from pathlib import Path
 from statistics import median
 from typing import Any, TypeVar
 
@@ -41,25 +40,6 @@ WARMUP = 5
 def ratio(samples: Mapping[str, Sequence[float]]) -> float:
     """How much longer it took with a mechanism than without: the median over neighbours in time."""
     return median(b / a for a, b in zip(samples["plain"], samples["with"], strict=True))
-
-
-#: Of the command line.
-DESCRIPTION = (
-    "Times a step and an iteration of Newton's method with each mechanism's example on the phantom under a light "
-    "load, in turns with the plain model; the plain model beside itself says how exact that is."
-)
-OPTIONS: dict[str, command.Options] = {
-    "--device": command.DEVICE,
-    "--kinds": {"metavar": "KIND,...", "help": "mechanisms (default: all)"},
-    "--steps": {"type": int, "default": 100, "help": "time steps of each (default: 100)"},
-    "--equilibria": {"type": int, "default": 7, "help": "equilibria of each (default: 7)"},
-    "--precision": command.PRECISION,
-    "--out": {
-        "type": Path,
-        "metavar": "DIR",
-        "help": "folder for a file with every sample, mechanisms_DEVICE_DATE.json",
-    },
-}
 
 
 def bench(options: argparse.Namespace) -> None:

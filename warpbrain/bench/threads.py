@@ -23,22 +23,9 @@ from warpbrain.threads import MOST, processors
 
 #: Counts that are measured if none are named, as far as there are processors.
 COUNTS = (1, 2, 4, 8, 16)
-#: Steps from rest in a turn, and turns of each count after the first, which is not counted: counts take turns, so that
-#: what else the machine has to do is shared alike.
-STEPS, TURNS = 20, 5
-
-
-#: Of the command line.
-DESCRIPTION = (
-    "Times a step of the phantom's meshes and the equilibrium of 0529 on the CPU by the number of threads, in "
-    "turns; the answers must be the same to the bit."
-)
-OPTIONS: dict[str, command.Options] = {
-    "--row": {"default": "mt/fine", "metavar": "ROW", "help": "st/coarse, st/fine, mt/coarse or mt/fine (default)"},
-    "--counts": {"metavar": "N,...", "help": "threads (default: 1, 2, 4, 8, 16, as there are processors)"},
-    "--turns": {"type": int, "default": TURNS, "help": f"of {STEPS} steps and an equilibrium each (default: {TURNS})"},
-    "--json": command.JSON,
-}
+#: Steps from rest in a turn; the first turn of each count is not counted. Counts take turns, so that what else the
+#: machine has to do is shared alike.
+STEPS = 20
 
 
 def bench(options: argparse.Namespace) -> None:

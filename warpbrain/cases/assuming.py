@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,7 @@ from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.composition import require_composable, require_left
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, nearest
 
 #: Kinds of parameters whose values are names.
 _NAMES = ("text", "node set", "element set", "directions", "surface")
@@ -58,8 +57,7 @@ def _with(case: Case, said: str) -> Case:
     kind, _, rest = said.partition(":")
     known = mechanisms()
     if kind not in known:
-        near = difflib.get_close_matches(kind, known, 1)
-        raise InputError(f"no mechanism '{kind}': {f'did you mean {near[0]}?' if near else ', '.join(known)}")
+        raise InputError(f"no mechanism '{kind}': {nearest(kind, known)}")
     mechanism, keys = known[kind], MECHANISM.keys_of(kind)
     values: dict[str, Any] = {}
     named = Named(case.mesh, case.tissues, case.frame, Problems())

@@ -68,17 +68,7 @@ class Sliding(Boundary):
 
 @dataclass(frozen=True, kw_only=True)
 class Displaced(Boundary):
-    """Nodes that are moved.
-
-    Attributes
-    ----------
-    times : tuple of k floats
-        [s], increasing; one, if the displacement has no history.
-    values : tuple of k displacements
-        [m]; linear between the times, constant outside them.
-    file : str
-        Where the history came from, relative to the case folder; empty if case.toml gives it.
-    """
+    """Nodes that are moved."""
 
     kind: ClassVar[str] = "displacement"
     keys: ClassVar[tuple[Key, ...]] = (
@@ -92,9 +82,9 @@ class Displaced(Boundary):
         ),
         RAMP,
     )
-    times: tuple[float, ...]
-    values: tuple[tuple[float, float, float], ...]
-    file: str = ""
+    times: tuple[float, ...]  # [s], increasing; one, if the displacement has no history
+    values: tuple[tuple[float, float, float], ...]  # [m]; linear between the times, constant outside them
+    file: str = ""  # where the history came from, relative to the case folder; empty if case.toml gives it
 
     @property
     def final(self) -> Floats:

@@ -8,8 +8,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Int32s
 from warpbrain.cases.boundary import Boundary, Fixed, Sliding
 from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError
@@ -25,27 +25,14 @@ from warpbrain.shown import Shown
 
 @dataclass(frozen=True)
 class Tissue:
-    """A tissue of a case.
-
-    Attributes
-    ----------
-    name : str
-    law : Law or None
-        None if the generative model is to give it (``mu = "prior"``).
-    formulation : str
-    prior : str
-        Group of the generative model; may be empty.
-    model : str
-        Name of the law, which is known even where its parameters are not.
-    accuracy : float or None
-        Relative standard deviation of its modulus, where that was measured; None: as is believed of what is declared.
-    """
+    """A tissue of a case."""
 
     name: str
-    law: Law | None
+    law: Law | None  # None if the generative model is to give it (``mu = "prior"``)
     formulation: str = "coupled"
-    prior: str = ""
-    model: str = "neo-hookean"
+    prior: str = ""  # group of the generative model; may be empty
+    model: str = "neo-hookean"  # name of the law, which is known even where its parameters are not
+    #: Relative standard deviation of its modulus, where that was measured; None: as is believed of what is declared.
     accuracy: float | None = None
 
     @property
@@ -136,7 +123,7 @@ class Case(Shown):
         return next((m for m in self.mechanisms if isinstance(m, Resection)), None)
 
     @cached_property
-    def remaining(self) -> tuple[TetMesh, NDArray[np.int32]]:
+    def remaining(self) -> tuple[TetMesh, Int32s]:
         """The mesh without what was resected, and for each of its nodes the id in the whole mesh."""
         if self.resection is None:
             return self.mesh, np.arange(len(self.mesh.points), dtype=np.int32)

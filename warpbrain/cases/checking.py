@@ -36,29 +36,14 @@ SHARP = 5.0
 
 @dataclass(frozen=True)
 class Checked:
-    """What checking found.
-
-    Attributes
-    ----------
-    file : Path
-    problems : tuple of Problem
-        What is wrong: the case cannot be used.
-    remarks : tuple of str
-        What is allowed and should be looked at.
-    case : Case or None
-        As far as it could be read.
-    quality : Quality or None
-        Of its mesh.
-    plausible : str
-        A word on its volume.
-    """
+    """What checking found."""
 
     file: Path
-    problems: tuple[Problem, ...]
-    remarks: tuple[str, ...]
-    case: Case | None
-    quality: Quality | None
-    plausible: str
+    problems: tuple[Problem, ...]  # what is wrong: the case cannot be used
+    remarks: tuple[str, ...]  # what is allowed and should be looked at
+    case: Case | None  # as far as it could be read
+    quality: Quality | None  # of its mesh
+    plausible: str  # a word on its volume
 
 
 def check_case(file: str | os.PathLike[str]) -> Checked:

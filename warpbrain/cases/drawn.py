@@ -13,22 +13,12 @@ from warpbrain.gp.sampling import DrawnLaws, draw_laws, law_of_curve
 
 @dataclass(frozen=True)
 class FromPrior:
-    """Which laws of a case are the generative model's.
+    """Which laws of a case are the generative model's."""
 
-    Attributes
-    ----------
-    case : Case
-        With these laws.
-    model : Process
-    labels : tuple of int
-        Tissues whose laws they are.
-    drawn : DrawnLaws or None
-        With one law for each of these tissues; None if the laws are those of the middle curves.
-    """
-
-    case: Case
+    case: Case  # with these laws
     model: Process
-    labels: tuple[int, ...]
+    labels: tuple[int, ...]  # tissues whose laws they are
+    #: With one law for each of these tissues; None if the laws are those of the middle curves.
     drawn: DrawnLaws | None = None
 
 
@@ -83,10 +73,7 @@ def with_prior_draw(case: Case, number: int, seed: int = 0, model: Process | Non
 def with_prior_middle(case: Case, model: Process | None = None) -> FromPrior:
     """The case with the laws of tissues that say `mu = "prior"` from the middle curves of their groups.
 
-    Raises
-    ------
-    InputError
-        With file, tissue and key, if the model has seen no study of a group.
+    `InputError`: with file, tissue and key, if the model has seen no study of a group.
     """
     asked = _default(model)
     labels = tuple(label for label, tissue in sorted(case.tissues.items()) if tissue.law is None)

@@ -53,21 +53,11 @@ def _key(case: Case, time: float) -> tuple[Any, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Times, and the cases at them.
+    """Times, and the cases at them."""
 
-    Attributes
-    ----------
-    times : tuple of float
-        [s], increasing; infinity is the end.
-    cases : tuple of Case
-        What differs; the case itself if nothing does from its end.
-    numbers : tuple of int
-        For each time the number of its case.
-    """
-
-    times: tuple[float, ...]
-    cases: tuple[Case, ...]
-    numbers: tuple[int, ...]
+    times: tuple[float, ...]  # [s], increasing; infinity is the end
+    cases: tuple[Case, ...]  # what differs; the case itself if nothing does from its end
+    numbers: tuple[int, ...]  # for each time the number of its case
 
     @classmethod
     def of(cls, case: Case, times: Iterable[float]) -> Moments:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import os
 from pathlib import Path
@@ -20,7 +19,7 @@ from warpbrain.cases.parts.tissues import read_body, read_tissues
 from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
 from warpbrain.physics.composition import CompositionError, require_composable, require_left
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, nearest
 from warpbrain.recordings.registration import Registration
 
 
@@ -55,10 +54,7 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     names = [table.name for table in TABLES]
     for name in tables:
         if name not in names:
-            near = difflib.get_close_matches(name, names, 1)
-            problems.add(
-                file, name, "unknown key", f"did you mean '{near[0]}'?" if near else f"expected {', '.join(names)}"
-            )
+            problems.add(file, name, "unknown key", nearest(name, names))
     head = context.table(CASE)
     context.frame = Frame(head.get("units"), head.get("axes"))
     axis = head.si("gravity_axis")

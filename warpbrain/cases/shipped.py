@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpbrain.errors import InputError
+from warpbrain.problems import nearest
 
 if TYPE_CHECKING:
     from warpbrain.cases.case import Case
@@ -43,30 +43,18 @@ ALIASES = {"synthetic": "phantom", "synthetic-fine": "phantom-fine"}
 
 @dataclass(frozen=True)
 class Entry:
-    """What a shipped case is with one of its meshes.
-
-    Attributes
-    ----------
-    name : str
-    tissue : str
-        ``"multi"`` or ``"single"``.
-    title, origin : str
-        As `Case` has them.
-    nodes, tetrahedra : int
-        Of the imaged anatomy, whole.
-    volume_cm3 : float
-    recordings : dict of str to int
-        How many rows, points or instants each has.
-    """
+    """What a shipped case is with one of its meshes."""
 
     name: str
-    tissue: str
+    tissue: str  # ``"multi"`` or ``"single"``
+    #: As `Case` has them.
     title: str
     origin: str
+    #: Of the imaged anatomy, whole.
     nodes: int
     tetrahedra: int
     volume_cm3: float
-    recordings: dict[str, int]
+    recordings: dict[str, int]  # how many rows, points or instants each has
 
 
 def catalogue() -> list[Entry]:
@@ -77,10 +65,7 @@ def catalogue() -> list[Entry]:
 def files_of(name: str) -> list[Path]:
     """Every `case.toml` of a shipped case or of a folder: the one of many tissues, and that of one tissue if there.
 
-    Raises
-    ------
-    InputError
-        If there is no such case and no such folder.
+    `InputError` if there is no such case and no such folder.
     """
     name = ALIASES.get(name, name)
     if name in SHIPPED:
@@ -126,10 +111,7 @@ def find_case(name: str, tissue: str = "multi") -> Case:
 def as_case(case: Case | str | os.PathLike[str], tissue: str = "multi") -> Case:
     """A case that may be given itself, by name, or by its path.
 
-    Raises
-    ------
-    InputError
-        If it is none of these, there is no such case, or it is wrong.
+    `InputError` if it is none of these, there is no such case, or it is wrong.
     """
     from warpbrain.cases.case import Case
 
@@ -150,7 +132,6 @@ def _existing(name: str) -> Path:
     except (OSError, ValueError):  # a name that no file can have
         there = False
     if not there:
-        near = difflib.get_close_matches(name, SHIPPED, 1)
-        hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(SHIPPED)}"
+        hint = nearest(name, SHIPPED, f"there are: {', '.join(SHIPPED)}")
         raise InputError(f"case '{name}': no such case and no such folder ({hint})")
     return path

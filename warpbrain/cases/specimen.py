@@ -18,20 +18,11 @@ _SIX = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 
 
 @dataclass(frozen=True)
 class Specimen:
-    """What `[specimen]` says, in SI units.
+    """What `[specimen]` says, in SI units."""
 
-    Attributes
-    ----------
-    shape : {"cylinder", "block"}
-    size : (float, float, float)
-        Extent along x, y and z [m]; a cylinder's axis is z.
-    grips : {"glued", "lubricated"}
-        Whether its ends, the sets `bottom` and `top`, can widen.
-    """
-
-    shape: str
-    size: tuple[float, float, float]
-    grips: str
+    shape: str  # "cylinder" or "block"
+    size: tuple[float, float, float]  # extent along x, y and z [m]; a cylinder's axis is z
+    grips: str  # whether its ends, the sets `bottom` and `top`, can widen: "glued" or "lubricated"
 
     def mesh(self) -> TetMesh:
         """The shape in tetrahedra, z from 0, centred on the z axis.

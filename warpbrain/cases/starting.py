@@ -40,31 +40,20 @@ IN_PLACE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class StartedCase:
-    """What was written.
-
-    Attributes
-    ----------
-    folder, mesh, quality
-    tissues : dict of int to str
-        Names by number.
-    labelled, in_place : dict of int to float, or None
-        Of what was made from labels, for each tissue: volume [m3] of its labels, and the share of its voxels that lie
-        in that tissue of the mesh.
-    cavity, labelled_cavity : float
-        Volume [m3] of the closed cavities of the mesh, and of the labels of cavities.
-    notes : tuple of str
-        What was mended, left out or not reached.
-    """
+    """What was written."""
 
     folder: Path
     mesh: TetMesh
-    tissues: dict[int, str]
+    tissues: dict[int, str]  # names by number
     quality: Quality
+    #: Of what was made from labels, for each tissue: volume [m3] of its labels, and the share of its voxels that lie in
+    #: that tissue of the mesh.
     labelled: dict[int, float] | None
     in_place: dict[int, float] | None
+    #: Volume [m3] of the closed cavities of the mesh, and of the labels of cavities.
     cavity: float
     labelled_cavity: float
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was mended, left out or not reached
 
     @property
     def volumes(self) -> dict[int, float]:
@@ -85,25 +74,16 @@ def start_from_labels(
 ) -> StartedCase:
     """Make a case folder from a label volume.
 
-    Parameters
-    ----------
-    folder : Path
-        Must not be there yet, or be empty, unless mesh and `case.toml` that are in it may be overwritten.
-    labels : Path
-        See `read_labels`.
-    names, others
-        Arguments of `--tissue`, see `parse_names`, and the name of every label that they leave out.
-    size : float, optional
-        Wanted mean edge [mm]; by default what gives about 5,000 nodes.
-    progress : callable
-        Called with one line of text whenever something is begun.
-    program : str, optional
-        Whose labels they are, see `preset`; `names` take precedence, and labels that the volume lacks are no mistake.
+    `folder`: must not be there yet, or be empty, unless mesh and `case.toml` that are in it may be overwritten.
+    `labels`: see `read_labels`.
+    `names`, `others`: arguments of `--tissue`, see `parse_names`, and the name of every label that they leave out.
+    `size`: wanted mean edge [mm]; by default what gives about 5,000 nodes.
+    `progress`: called with one line of text whenever something is begun.
+    `program`: whose labels they are, see `preset`; `names` take precedence, and labels that the volume lacks are no
+    mistake.
 
-    Raises
-    ------
-    InputError
-        If the folder is not empty, or anything is wrong with the labels or their names; nothing is written then.
+    `InputError` if the folder is not empty, or anything is wrong with the labels or their names; nothing is written
+    then.
     """
     _check_folder(folder, overwrite)
     if size is not None and not 0 < size < np.inf:
@@ -164,20 +144,10 @@ def start_from_mesh(
 ) -> StartedCase:
     """Make a case folder from a volume mesh.
 
-    Parameters
-    ----------
-    folder, names, overwrite
-        As of `start_from_labels`; the labels are those of the mesh.
-    file, frame
-        Any tetrahedral mesh that meshio reads, with its unit and axes; its tissues are those of `read_regions`, its
-        node and element sets are kept.
-    array : str, optional
-        Cell array of the labels, where several could be it.
-
-    Raises
-    ------
-    InputError
-        If the folder is not empty or the mesh cannot be used; nothing is written then.
+    `folder`, `names`, `overwrite`: as of `start_from_labels`; the labels are those of the mesh. `file`, `frame`: any
+    tetrahedral mesh that meshio reads, with its unit and axes; its tissues are those of `read_regions`, its node and
+    element sets are kept. `array`: cell array of the labels, where several could be it. `InputError` if the folder is
+    not empty or the mesh cannot be used; nothing is written then.
     """
     _check_folder(folder, overwrite)
     parse_names(names)  # what is wrong with them is known before anything is read

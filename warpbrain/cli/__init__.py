@@ -5,60 +5,21 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from importlib import import_module
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from warpbrain import __version__
-from warpbrain.errors import InputError
+from warpbrain.terminal.arguments import add_commands, call, described_in
 from warpbrain.terminal.command import OneLineParser, exit_status
 from warpbrain.terminal.completing import complete
 from warpbrain.terminal.record import Record
 
-_TYPES = {"path": Path, "int": int, "float": float}
-
-
-@dataclass(frozen=True)
-class _Range:
-    """What the number of an argument can be, which is refused before anything is imported for it."""
-
-    argument: argparse.Action
-    least: float | None = None
-    above: float | None = None
-    below: float | None = None
-    expected: str = ""
-
-    def require(self, options: argparse.Namespace) -> None:
-        """`InputError` if a number is given that is outside."""
-        value = getattr(options, self.argument.dest)
-        inside = value is None or (
-            (self.least is None or value >= self.least)
-            and (self.above is None or value > self.above)
-            and (self.below is None or value < self.below)
-        )
-        if not inside:
-            shown = f"{value:g}" if isinstance(value, float) else value
-            expected = self.expected or f"a whole number of at least {self.least}"
-            raise InputError(f"{self.argument.option_strings[0]} {shown}: expected {expected}")
-
 
 class _GroupedParser(OneLineParser):
-    """A parser whose help lists its commands under titles.
+    """A parser whose help lists its commands under titles."""
 
-    Attributes
-    ----------
-    commands : argparse action
-        Of `add_subparsers`.
-    groups : mapping of str to sequence of str
-        Title and names of its commands, in their order.
-    """
-
-    commands: argparse._SubParsersAction[Any]
-    groups: Mapping[str, Sequence[str]]
+    commands: argparse._SubParsersAction[Any]  # of `add_subparsers`
+    groups: Mapping[str, Sequence[str]]  # title and names of its commands, in their order
 
     def format_help(self) -> str:
         """As `argparse` formats it, with a section for each group."""
@@ -92,15 +53,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _call(options: argparse.Namespace) -> None:
-    module, _, function = options.call.partition(":")
     with options.record.warnings_kept():
-        for number in options.ranges:
-            number.require(options)
-        getattr(import_module(f"warpbrain.cli.{module}"), function)(options)
+        call(options, "warpbrain.cli")
 
 
 def _parser() -> _GroupedParser:
-    described = tomllib.loads((files("warpbrain.cli") / "commands.toml").read_text(encoding="utf-8"))
+    described = described_in("warpbrain.cli")
     parser = _GroupedParser(
         prog="warpbrain",
         description="Simulates the deformation of the brain, and says what it left out.",
@@ -112,43 +70,5 @@ def _parser() -> _GroupedParser:
         dest="command", required=True, metavar="COMMAND", parser_class=OneLineParser
     )
     parser.groups = described["groups"]
-    _add_commands(parser.commands, described["commands"], described["arguments"])
+    add_commands(parser.commands, described["commands"], described["arguments"])
     return parser
-
-
-def _add_commands(
-    commands: argparse._SubParsersAction[Any], described: Mapping[str, Any], shared: Mapping[str, Any]
-) -> None:
-    """Add commands, or actions of one, as `commands.toml` describes them; `shared` are arguments of several."""
-    for name, command in described.items():
-        parser = commands.add_parser(name, help=command["help"], description=command.get("description"))
-        ranges: list[_Range] = []
-        parser.set_defaults(call=command.get("call"), ranges=ranges)
-        # sections of the help and exclusive groups, by their name
-        places: dict[str, argparse._ActionsContainer] = {"": parser}
-        for flags, changed in command.get("arguments", {}).items():
-            settings = dict(changed) if changed.get("apart") else {**shared.get(flags, {}), **changed}
-            settings.pop("apart", None)
-            section, group = settings.pop("under", ""), settings.pop("one_of", "")
-            required = settings.pop("required", False) if group else False
-            if section not in places:
-                places[section] = parser.add_argument_group(section)
-            if group not in places:
-                places[group] = parser.add_mutually_exclusive_group(required=required)
-            limits = {key: settings.pop(key) for key in ("least", "above", "below", "expected") if key in settings}
-            argument = _add_argument(places[group or section], flags.split(), settings)
-            ranges += [_Range(argument, **limits)] if limits else []
-        if "actions" in command:
-            # without an action a command that can be called is
-            actions = parser.add_subparsers(dest="action", required="call" not in command, metavar="ACTION")
-            _add_commands(actions, command["actions"], shared)
-
-
-def _add_argument(place: argparse._ActionsContainer, flags: Sequence[str], settings: dict[str, Any]) -> argparse.Action:
-    if "type" in settings:
-        settings["type"] = _TYPES[settings["type"]]
-    if settings.get("action") == "boolean":
-        settings["action"] = argparse.BooleanOptionalAction
-    if isinstance(settings.get("metavar"), list):
-        settings["metavar"] = tuple(settings["metavar"])
-    return place.add_argument(*flags, **settings)

@@ -25,12 +25,12 @@ from warpbrain.report import summary as tables
 from warpbrain.report.ensemble import (
     describe_ensemble,
     ensemble_lines,
+    file_of_fields,
     table_of,
-    write_fields,
     write_spread_picture,
     write_table,
 )
-from warpbrain.report.files import fingerprints, write_summary
+from warpbrain.report.files import fingerprints, write_body, write_summary
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.of_case import model_of
 from warpbrain.terminal.progress import Progress
@@ -108,7 +108,7 @@ def _write(
     """Write what an ensemble gave; returns the names of the files."""
     files = [*write_table(out, table_of(result)), "summary.json"]
     if result.fields is not None:
-        write_fields(out / "fields.vtu", result.fields)
+        write_body(out / "fields.vtu", file_of_fields(result.fields))
         write_spread_picture(
             out / "spread.png", result.fields, title, f"{result.fields.count} of {count} samples, {chosen}"
         )

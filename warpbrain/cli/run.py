@@ -181,10 +181,7 @@ def _from_prior(options: argparse.Namespace, case: Case) -> FromPrior | None:
 def parse_moduli(values: list[str]) -> tuple[float | None, dict[int, float]]:
     """Read the values of ``--mu``: one number for every tissue, or LABEL=PA for some.
 
-    Raises
-    ------
-    InputError
-        If a value is neither, is not positive, or both ways are mixed.
+    `InputError` if a value is neither, is not positive, or both ways are mixed.
     """
     every: float | None = None
     by_label: dict[int, float] = {}

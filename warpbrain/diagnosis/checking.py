@@ -73,10 +73,7 @@ def distance(sensors: Sensors, errors: Floats) -> float:
 
 
 class HeldOut:
-    """Predicts the rows of one case.
-
-    `local`: whether all that acts is local.
-    """
+    """Predicts the rows of one case. `local`: whether all that acts is local."""
 
     def __init__(self, sensors: Sensors, local: bool) -> None:
         self.sensors, self.blocks = sensors, blocks_of(sensors, local)
@@ -109,8 +106,10 @@ class HeldOut:
         A pattern is a random mixture of the modes of a smooth force with the size that fits best. The best of `tries`
         patterns is taken, as the mechanism is the best of its places.
 
-        `without`: of all else that acts. `residual` (n,). `modes` (n, m): as large as the noise. `freedom`:
-        coefficients of the mechanism.
+        `without`: of all else that acts.
+        `residual` (n,).
+        `modes` (n, m): as large as the noise.
+        `freedom`: coefficients of the mechanism.
         """
         sizes = beliefs("unknown.sizes")
         chosen = []

@@ -67,10 +67,7 @@ class _Checked:
 
 
 class Diagnosing:
-    """Diagnoses one case.
-
-    `InputError` if the case has too few recordings for any conclusion, or is a specimen.
-    """
+    """Diagnoses one case; `InputError` if the case has too few recordings for any conclusion, or is a specimen."""
 
     def __init__(
         self,
@@ -86,10 +83,7 @@ class Diagnosing:
         self.seconds = Seconds()
 
     def run(self) -> Diagnosis:
-        """Run every stage.
-
-        `SolveError` if the case as declared has no equilibrium.
-        """
+        """Run every stage; `SolveError` if the case as declared has no equilibrium."""
         with one_thread_of_blas():
             diagnosis = self._run()
         diagnosis.search.release()

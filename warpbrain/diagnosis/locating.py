@@ -39,33 +39,18 @@ _PATCH = 0.7
 
 @dataclass(frozen=True, eq=False)
 class ScoreMap:
-    """Scores of places.
+    """Scores of places."""
 
-    Attributes
-    ----------
-    sites : (s, 3) array
-        [m]
-    length : float
-        Standard deviation of a patch [m].
-    scores : (s,) array
-    threshold : float
-        Of the largest score, at the level `alpha`.
-    global_p, local_p : float
-        p-values of the largest score: corrected for all places, and at this place alone.
-    detectable : (s,) array
-        Smallest force [N] that would be detected there, in the direction of the least sensitivity.
-    region : (s,) bool array
-        Places that the data do not distinguish from the best.
-    """
-
-    sites: Floats
-    length: float
-    scores: Floats
-    threshold: float
+    sites: Floats  # (s, 3) [m]
+    length: float  # standard deviation of a patch [m]
+    scores: Floats  # (s,)
+    threshold: float  # of the largest score, at the level `alpha`
+    #: p-values of the largest score: corrected for all places, and at this place alone.
     global_p: float
     local_p: float
+    #: (s,), smallest force [N] that would be detected there, in the direction of the least sensitivity.
     detectable: Floats
-    region: Bools
+    region: Bools  # (s,), places that the data do not distinguish from the best
 
     @property
     def best(self) -> int:
@@ -129,8 +114,10 @@ def score_map(
 ) -> ScoreMap:
     """The map of residuals (n,).
 
-    `model`: of noise and nuisances. `residual` (n,). `draws` (n, b): of rows if no cause acts. `length`, `spacing`: of
-    patches and between them [m].
+    `model`: of noise and nuisances.
+    `residual` (n,).
+    `draws` (n, b): of rows if no cause acts.
+    `length`, `spacing`: of patches and between them [m].
     """
     from scipy.special import chdtrc, chdtri
 
@@ -174,35 +161,19 @@ def _noncentrality(threshold: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Traits:
-    """Of an unknown force.
+    """Of an unknown force."""
 
-    Attributes
-    ----------
-    force, force_sd : (3,) array
-        Net force [N].
-    moment, moment_sd : (3,) array
-        Net moment about `centre` [N m].
-    outside : bool
-        Whether there is a net force: it is exerted from outside the body.
-    turning : bool
-        Whether there is a net moment.
-    hidden : bool
-        Whether there seems to be a net force, which what holds the body may carry: it cannot be told.
-    surface_nats : float
-        Log Bayes factor of a force on the surface alone over one within the body alone.
-    centre : (3,) array
-        Where it is [m].
-    """
-
+    #: (3,), net force [N].
     force: Floats
     force_sd: Floats
+    #: (3,), net moment about `centre` [N m].
     moment: Floats
     moment_sd: Floats
-    outside: bool
-    turning: bool
-    hidden: bool
-    surface_nats: float
-    centre: Floats
+    outside: bool  # whether there is a net force: it is exerted from outside the body
+    turning: bool  # whether there is a net moment
+    hidden: bool  # whether there seems to be a net force, which what holds the body may carry: it cannot be told
+    surface_nats: float  # log Bayes factor of a force on the surface alone over one within the body alone
+    centre: Floats  # (3,), where it is [m]
 
     @property
     def size(self) -> tuple[float, float]:
@@ -217,8 +188,11 @@ def traits_of(
 ) -> Traits:
     """Traits of what residuals (n,) show beside noise and nuisances.
 
-    `model`: of noise and nuisances. `residual` (n,). `noise`: typical noise of displacements [m]. `length`: of patches
-    [m]. `centre` (3,): about which moments are taken [m].
+    `model`: of noise and nuisances.
+    `residual` (n,).
+    `noise`: typical noise of displacements [m].
+    `length`: of patches [m].
+    `centre` (3,): about which moments are taken [m].
     """
     sites, answers = force_patches(at, length)
     # patches on held nodes have no effect

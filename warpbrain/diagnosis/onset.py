@@ -47,35 +47,24 @@ class SizeOverTime:
 
 @dataclass(frozen=True)
 class Onset:
-    """When something set in.
+    """When something set in."""
 
-    Attributes
-    ----------
-    first, last : float
-        Interval [s] of onset; 0 is when the load came.
-    probability : float or None
-        Of that interval; None if it follows from the mechanism.
-    course : str
-        Its shape in time, in words; empty if these data do not tell.
-    intervals : tuple of (first, last, probability)
-        All intervals that were compared.
-    sizes : SizeOverTime or None
-        Of what was found with a size that is a function of time.
-    """
-
+    #: Interval [s] of onset; 0 is when the load came.
     first: float
     last: float
-    probability: float | None
-    course: str
-    intervals: tuple[tuple[float, float, float], ...] = ()
-    sizes: SizeOverTime | None = None
+    probability: float | None  # of that interval; None if it follows from the mechanism
+    course: str  # its shape in time, in words; empty if these data do not tell
+    intervals: tuple[tuple[float, float, float], ...] = ()  # all intervals that were compared
+    sizes: SizeOverTime | None = None  # of what was found with a size that is a function of time
 
 
 def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianModel, residual: Floats) -> Onset | None:
     """When a cause set in; None where nothing was recorded at several times.
 
-    `cause`: the best explanation, as if it acted all the time; None: an unknown force. `in_time`: whether it changes in
-    time under constant loads. `model`: of all else that acts. `residual` (n,): less what is expected of all else.
+    `cause`: the best explanation, as if it acted all the time; None: an unknown force.
+    `in_time`: whether it changes in time under constant loads.
+    `model`: of all else that acts.
+    `residual` (n,): less what is expected of all else.
     """
     times = np.array(base.states.times)
     if len(times) < 2:

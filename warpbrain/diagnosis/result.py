@@ -32,36 +32,17 @@ REFITTED, EXPLAINED = "refitted", "explained"
 
 @dataclass(frozen=True, eq=False)
 class Ranked:
-    """A cause with its probability, size and place.
-
-    Attributes
-    ----------
-    kind : str
-    physics : bool
-        Whether it is a mechanism, not something that is no physics.
-    log_evidence : float
-        Logarithm, against nothing missing.
-    probability : float
-        Among all that may be missing.
-    detectability : float
-        Length of its fitted effect in standard deviations of noise and nuisances.
-    heldout_rmse_change : float or None
-        Of held-out points [m] against the refitted case without it; negative is better. None where it was not fitted.
-    values : tuple of Value
-        Its parameters.
-    centre, radius : (3,) array and float, or None
-        Where it acts, if somewhere [m].
-    region : str
-    rejected_because : str
-    """
+    """A cause with its probability, size and place."""
 
     kind: str
-    physics: bool
-    log_evidence: float
-    probability: float
-    detectability: float
+    physics: bool  # whether it is a mechanism, not something that is no physics
+    log_evidence: float  # logarithm, against nothing missing
+    probability: float  # among all that may be missing
+    detectability: float  # length of its fitted effect in standard deviations of noise and nuisances
+    #: Of held-out points [m] against the refitted case without it; negative is better. None where it was not fitted.
     heldout_rmse_change: float | None
-    values: tuple[Value, ...]
+    values: tuple[Value, ...]  # its parameters
+    #: Where it acts, if somewhere: (3,) and a radius [m].
     centre: Floats | None
     radius: float | None
     region: str
@@ -70,70 +51,39 @@ class Ranked:
 
 @dataclass(frozen=True, eq=False)
 class Confusion:
-    """Confusion of mechanisms with other causes.
+    """Confusion of mechanisms with other causes."""
 
-    Attributes
-    ----------
-    rows : dict of str to dict of str to float
-        By mechanism, the part of its detectable effect that the best place of each other cause explains.
-    """
-
+    #: By mechanism, the part of its detectable effect that the best place of each other cause explains.
     rows: dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True)
 class Combination:
-    """A set of causes.
-
-    Attributes
-    ----------
-    causes : tuple of str
-    kinds : tuple of Kind
-        Of each.
-    log_evidence, log_prior : float
-    probability : float
-    fitted : bool
-        Whether it was fitted without linearising.
-    gross_errors : int
-        Points that are more probably gross errors than not under it.
-    """
+    """A set of causes."""
 
     causes: tuple[str, ...]
-    kinds: tuple[Kind, ...]
+    kinds: tuple[Kind, ...]  # of each
     log_evidence: float
     log_prior: float
     probability: float
-    fitted: bool
-    gross_errors: int
+    fitted: bool  # whether it was fitted without linearising
+    gross_errors: int  # points that are more probably gross errors than not under it
 
 
 @dataclass(frozen=True)
 class Fit:
-    """How well hypotheses agree with recorded displacements: root mean squares of 3-D distances [m], all points.
+    """How well hypotheses agree with recorded displacements: root mean squares of 3-D distances [m], all points."""
 
-    Attributes
-    ----------
-    declared, refitted, explained : (rmse, held-out rmse)
-        Of the case as declared, after its tissue was refitted, and with what was named; the last is None if nothing is.
-    improvement : (part, low, high) or None
-        Part of the refitted case's held-out error that is removed, and its 95 % interval.
-    placebo_p : float or None
-        p-value of the held-out error among random patterns.
-    placebo : (low, high) or None
-        Quantiles of 5 and 95 % of the held-out errors with these.
-    ceiling : float or None
-        Held-out error with any smooth force.
-    check : tuple of float, or None
-        RMSE at the recordings with role `check`: declared, refitted, explained; see `warpbrain.diagnosis.checking`.
-    """
-
+    #: Of the case as declared, after its tissue was refitted, and with what was named; the last is None if nothing is.
     declared: tuple[float, float]
     refitted: tuple[float, float]
     explained: tuple[float, float] | None
+    #: Part of the refitted case's held-out error that is removed, and its 95 % interval.
     improvement: tuple[float, float, float] | None
-    placebo_p: float | None
-    placebo: tuple[float, float] | None
-    ceiling: float | None
+    placebo_p: float | None  # p-value of the held-out error among random patterns
+    placebo: tuple[float, float] | None  # quantiles of 5 and 95 % of the held-out errors with these
+    ceiling: float | None  # held-out error with any smooth force
+    #: RMSE at the recordings with role `check`: declared, refitted, explained; see `warpbrain.diagnosis.checking`.
     check: tuple[float, ...] | None = None
 
 

@@ -21,17 +21,10 @@ _BATCH = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class DisplacementField:
-    """Vectors on a grid, linear between the centres of voxels and zero beyond the grid, as ITK reads them.
-
-    Attributes
-    ----------
-    grid : Grid
-    vectors : (i, j, k, 3) float32 array
-        [mm, RAS]
-    """
+    """Vectors on a grid, linear between the centres of voxels and zero beyond the grid, as ITK reads them."""
 
     grid: Grid
-    vectors: Singles
+    vectors: Singles  # (i, j, k, 3) [mm, RAS]
 
     def on(self, grid: Grid) -> DisplacementField:
         """The same field on another grid."""
@@ -66,24 +59,14 @@ class DisplacementField:
 
 @dataclass(frozen=True, eq=False)
 class Inverse:
-    """A displacement field the other way, and how good it is.
-
-    Attributes
-    ----------
-    field : DisplacementField
-    error_99 : float
-        Of what the field makes of where its inverse leads, halfway between the centres of voxels, where linear
-        interpolation is worst, in moved tissue: the 99th percentile of the distance from where one began [mm].
-    error_largest : float
-        The largest of these [mm].
-    unsolved : int
-        Voxels, of all, at whose centre the error is not below a thousandth of a millimetre.
-    """
+    """A displacement field the other way, and how good it is."""
 
     field: DisplacementField
+    #: Of what the field makes of where its inverse leads, halfway between the centres of voxels, where linear
+    #: interpolation is worst, in moved tissue: the 99th percentile of the distance from where one began [mm].
     error_99: float
-    error_largest: float
-    unsolved: int
+    error_largest: float  # the largest of these [mm]
+    unsolved: int  # voxels, of all, at whose centre the error is not below a thousandth of a millimetre
 
 
 def displacement_field(inside: VoxelsInside, u: Floats, middles: Floats | None = None) -> DisplacementField:

@@ -22,12 +22,8 @@ _SKEW = 1e-3
 class Grid:
     """A lattice of voxels.
 
-    Parameters
-    ----------
-    shape : (i, j, k)
-        How many there are along each axis.
-    affine : (4, 4) array
-        From voxel numbers to positions [mm, RAS]; voxel numbers mean voxel centres.
+    `shape`: how many there are along each axis. `affine` (4, 4): from voxel numbers to positions [mm, RAS]; voxel
+    numbers mean voxel centres.
     """
 
     shape: tuple[int, int, int]

@@ -23,25 +23,13 @@ _PAIRS = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class VoxelsInside:
-    """Voxels whose centre is in a mesh.
-
-    Attributes
-    ----------
-    grid : Grid
-    mesh : TetMesh
-    voxels : (k,) int array
-        Their numbers in a raveled array of the grid's shape, increasing.
-    elements : (k,) int array
-        The tetrahedron that each is in.
-    weights : (k, 4) array
-        Barycentric coordinates in it.
-    """
+    """Voxels whose centre is in a mesh."""
 
     grid: Grid
     mesh: TetMesh
-    voxels: Ints
-    elements: Ints
-    weights: Floats
+    voxels: Ints  # (k,), their numbers in a raveled array of the grid's shape, increasing
+    elements: Ints  # (k,), the tetrahedron that each is in
+    weights: Floats  # (k, 4), barycentric coordinates in it
 
     @property
     def mask(self) -> Bools:

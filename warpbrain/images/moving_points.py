@@ -30,23 +30,12 @@ _HEADER = (
 
 @dataclass(frozen=True, eq=False)
 class PointFile:
-    """A file of points.
-
-    Attributes
-    ----------
-    path : Path
-    labels : tuple of str
-    points : (n, 3) array
-        Before [mm, RAS].
-    moved_text : callable
-        From positions after (n, 3) [mm, RAS] to the text of the file that has them.
-    remarks : tuple of str
-    """
+    """A file of points."""
 
     path: Path
     labels: tuple[str, ...]
-    points: Floats
-    moved_text: Callable[[Floats], str]
+    points: Floats  # (n, 3), before [mm, RAS]
+    moved_text: Callable[[Floats], str]  # from positions after (n, 3) [mm, RAS] to the text of the file that has them
     remarks: tuple[str, ...]
 
     @property
@@ -61,36 +50,21 @@ class PointFile:
 
 @dataclass(frozen=True, eq=False)
 class MovedPoints:
-    """Points of a file and where they have gone.
-
-    Attributes
-    ----------
-    file : PointFile
-    points : (n, 3) array
-        After [mm, RAS].
-    outside : (n,) array
-        How far outside the mesh they were before [mm].
-    beyond : (n,) bool array
-        Beyond the grid: they are taken not to move.
-    apart : (n,) array
-        How far from here the field, and so the transform that is written, puts them [mm]: it is linear between the
-        centres of voxels, and at a wall of tissue the displacement has a kink.
-    """
+    """Points of a file and where they have gone."""
 
     file: PointFile
-    points: Floats
-    outside: Floats
-    beyond: Bools
+    points: Floats  # (n, 3), after [mm, RAS]
+    outside: Floats  # (n,), how far outside the mesh they were before [mm]
+    beyond: Bools  # (n,), beyond the grid: they are taken not to move
+    #: (n,), how far from here the field, and so the transform that is written, puts them [mm]: it is linear between the
+    #: centres of voxels, and at a wall of tissue the displacement has a kink.
     apart: Floats
 
 
 def read_point_file(path: Path) -> PointFile:
     """Read a 3D Slicer markup (`.mrk.json`, `.fcsv`) or a BIDS `electrodes.tsv`.
 
-    Raises
-    ------
-    InputError
-        Naming the file, what was found and what was expected.
+    `InputError`, naming the file, what was found and what was expected.
     """
     if not (is_electrodes(path) or is_markup(path)):
         raise InputError(f"{path}: found ending '{path.suffix}', expected .mrk.json, .fcsv or a BIDS electrodes.tsv")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.errors import InputError
 from warpbrain.images.grid import Grid
 
@@ -31,23 +31,12 @@ _DISAGREEMENT = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """Values and where they are.
+    """Values and where they are."""
 
-    Attributes
-    ----------
-    path : Path
-        The file they came from.
-    values : (i, j, k) array
-        As the file has them, scaled as it says.
-    grid : Grid
-    notes : tuple of str
-        What the user should know about how the file was read.
-    """
-
-    path: Path
-    values: NDArray[Any]
+    path: Path  # the file they came from
+    values: NDArray[Any]  # (i, j, k), as the file has them, scaled as it says
     grid: Grid
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what the user should know about how the file was read
 
 
 def require(module: str, distribution: str, what: str) -> None:
@@ -59,10 +48,7 @@ def require(module: str, distribution: str, what: str) -> None:
 def read_image(path: Path) -> Image:
     """Read one volume of real or whole numbers; any orientation, any voxel size.
 
-    Raises
-    ------
-    InputError
-        Naming the file, what was found and what was expected.
+    `InputError`, naming the file, what was found and what was expected.
     """
     if path.is_dir():
         raise InputError(
@@ -73,13 +59,10 @@ def read_image(path: Path) -> Image:
     return _with_itk(path) if path.suffix.lower() in BY_ITK else _with_nibabel(path)
 
 
-def labels_of(image: Image) -> NDArray[np.int32]:
+def labels_of(image: Image) -> Int32s:
     """The labels (i, j, k) of an image, zero is background.
 
-    Raises
-    ------
-    InputError
-        If its values are not all whole numbers of zero or more.
+    `InputError` if its values are not all whole numbers of zero or more.
     """
     path, values = image.path, image.values
     with np.errstate(invalid="ignore"):

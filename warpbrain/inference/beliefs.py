@@ -41,10 +41,7 @@ def _values(key: str) -> tuple[float, ...]:
 
 
 def belief(key: str) -> float:
-    """One number [SI] by `table.name`.
-
-    `KeyError` if the file has no such entry.
-    """
+    """One number [SI] by `table.name`; `KeyError` if the file has no such entry."""
     [value] = _values(key)
     return value
 

@@ -188,9 +188,11 @@ def after_checks(
     Causes that fail are not named. Without any other name, or where the held-out error grows, nothing can be said.
     Where a check shows that something is left the verdict says so.
 
-    `decision`: of the posterior alone. `confirmations`: of each mechanism of the fit. `p_left`: p-value of the rows
-    under the model of the fit. `grown`, `doubts`: in words: errors that are larger with the causes than without and
-    forbid any name, and further doubts.
+    `decision`: of the posterior alone.
+    `confirmations`: of each mechanism of the fit.
+    `p_left`: p-value of the rows under the model of the fit.
+    `grown`, `doubts`: in words: errors that are larger with the causes than without and forbid any name, and further
+    doubts.
     """
     remarks = list(doubts)
     if decision.verdict not in (NAMED, NAMED_AND_REST):

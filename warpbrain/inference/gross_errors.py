@@ -42,7 +42,6 @@ class GrossErrors:
 
     #: Log density of the rows, summed over the inflation of each point with all others at their most probable ones.
     log_density: float
-    log_odds: Floats  # (g,), of each point to be a gross error, given the others
     inflation: Floats  # (g,), the most probable one of each point, 1 of a sound one
     weighted: Floats  # (n,), the inverse of the covariance with these, times the rows
 
@@ -60,8 +59,9 @@ class _Group:
 class PointRows:
     """Rows of recorded points under a model: what hypotheses with further columns have in common.
 
-    `residual` (n,): less what is expected of the causes. `points`: rows of each point; rows of none are never gross
-    errors. `weighted` (n,): `S^-1 r`, if it is known.
+    `residual` (n,): less what is expected of the causes.
+    `points`: rows of each point; rows of none are never gross errors.
+    `weighted` (n,): `S^-1 r`, if it is known.
     """
 
     def __init__(
@@ -97,7 +97,9 @@ class PointRows:
         """Density of the rows where some points may be gross errors.
 
         `start` (g,): the most probable inflation of each point under a hypothesis that is nearly the same; all are
-        sound by default. `further`: of these rows. `length`: a factor on these.
+        sound by default.
+        `further`: of these rows.
+        `length`: a factor on these.
         """
         search = _Search(self, prior, further, length)
         if start is not None and (start > 1.0).any():
@@ -115,8 +117,7 @@ class PointRows:
             search.change(worst, int(best[worst]))
         sums = np.logaddexp.reduce(logs, axis=1)
         log_density = search.log_density + float(log_prior[search.kinds].sum() + sums.sum())
-        odds = np.logaddexp.reduce(logs[:, 1:], axis=1) - logs[:, 0]
-        return GrossErrors(log_density, odds, prior.inflations[search.kinds], search.weighted)
+        return GrossErrors(log_density, prior.inflations[search.kinds], search.weighted)
 
 
 class FurtherColumns:
@@ -308,8 +309,10 @@ class RowsAtScales:
 
     What neither changes is computed once.
 
-    `model`: the causes of the hypothesis among its columns. `residual` (n,): less what is expected of the causes.
-    `points`: rows of each point. `further` (n, k).
+    `model`: the causes of the hypothesis among its columns.
+    `residual` (n,): less what is expected of the causes.
+    `points`: rows of each point.
+    `further` (n, k).
     """
 
     def __init__(
@@ -324,7 +327,8 @@ class RowsAtScales:
     def summed(self, length: float = 1.0, scale: float = 1.0, inflation: Floats | None = None) -> Summed:
         """The evidence with the further columns multiplied by a factor.
 
-        `length`: that factor. `scale`: a factor on the noise near the most probable one, where the sum begins.
+        `length`: that factor.
+        `scale`: a factor on the noise near the most probable one, where the sum begins.
         `inflation` (g,): of gross errors under a hypothesis that is nearly the same.
         """
         values = self._values

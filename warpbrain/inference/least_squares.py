@@ -34,29 +34,15 @@ def minimise(
 ) -> tuple[Floats, float]:
     """Go downhill from a point to where the next step is not worth it.
 
-    Parameters
-    ----------
-    rows : callable
-        From coordinates (k,) to rows (n,); may raise one of `cannot_be`, but not at the start.
-    columns : callable
-        Derivatives (n, k) of the rows, called at the start and after each step that was taken, at its end.
-    start : (k,) array
-        The first step goes about as far as this is long, or one unit from zero.
-    tolerance : float
-        Length of a step, in standard deviations of the posterior, that is not worth it.
-    bounds : pair of (k,) arrays, optional
-    cannot_be : tuple of exception types
-    on_step : callable, optional
-        After each step: how long the whole one would have been, and the part of it that was taken.
-    evaluations : int
-        At most.
+    `rows`: from coordinates (k,) to rows (n,); may raise one of `cannot_be`, but not at the start.
+    `columns`: derivatives (n, k) of the rows, called at the start and after each step that was taken, at its end.
+    `start` (k,): the first step goes about as far as this is long, or one unit from zero.
+    `tolerance`: length of a step, in standard deviations of the posterior, that is not worth it.
+    `on_step`: after each step: how long the whole one would have been, and the part of it that was taken.
+    `evaluations`: at most.
 
-    Returns
-    -------
-    z : (k,) array
-        Best coordinates.
-    left : float
-        Length of the next step [standard deviations]; above `tolerance` if nothing better lies that way.
+    Returns `z` (k,): best coordinates; `left`: length of the next step [standard deviations]; above `tolerance` if
+    nothing better lies that way.
     """
     from scipy.optimize import least_squares
 

@@ -25,21 +25,13 @@ def noise_covariance(
 ) -> Floats:
     """Covariance `R` (n, n) of the noise of rows at a scale of 1.
 
-    Parameters
-    ----------
-    positions : (n, 3) array
-        Where [m]; not read of rows without a direction.
-    directions : (n, 3) array
-        Unit vectors along which a displacement was recorded; zero of all else.
-    times : (n,) array
-        When [s]; infinite of the end.
-    sigma : (n,) array
-        Standard deviation of the independent part, in the unit of the row.
-    radius : float
-        Of the sphere of the body's volume [m].
-    unresolved : (n, 3) array, optional
-        Error of a row if its place is off by one standard deviation along each axis, in the unit of the row; a place is
-        off alike for all rows of a point.
+    `positions` (n, 3): where [m]; not read of rows without a direction.
+    `directions` (n, 3): unit vectors along which a displacement was recorded; zero of all else.
+    `times` (n,): when [s]; infinite of the end.
+    `sigma` (n,): standard deviation of the independent part, in the unit of the row.
+    `radius`: of the sphere of the body's volume [m].
+    `unresolved` (n, 3): error of a row if its place is off by one standard deviation along each axis, in the unit of
+    the row; a place is off alike for all rows of a point.
     """
     from scipy.spatial.distance import cdist
 

@@ -49,10 +49,7 @@ class Prediction:
 
 
 def predict(model: GaussianModel, residual: Floats, blocks: Ints) -> Prediction:
-    """Predict every block of rows.
-
-    `residual` (n,), `blocks` (n,).
-    """
+    """Predict every block of rows. `residual` (n,), `blocks` (n,)."""
     return predict_with(model, residual, blocks, [np.zeros((len(model), 0))])[0]
 
 
@@ -87,8 +84,9 @@ def predict_with(
 class FieldFactors:
     """Log Bayes factor of a mixture of fields and sizes over none; what depends on the fields alone is computed once.
 
-    `fields` (n, k). `sizes` (s,): factors on the columns of a field, all equally probable. `weights` (f,): log
-    probability of each field; equal unless given.
+    `fields` (n, k).
+    `sizes` (s,): factors on the columns of a field, all equally probable.
+    `weights` (f,): log probability of each field; equal unless given.
     """
 
     def __init__(

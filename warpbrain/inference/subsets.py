@@ -37,8 +37,10 @@ class ActingColumns:
 class Blocks:
     """Blocks of columns, one a place, those of a cause one after the other, wide causes first.
 
-    `model`: of the rows without a cause. `residual` (n,). `causes`: all with equally many sizes. `cause`, `place` (p,):
-    which cause and which of its places each block is.
+    `model`: of the rows without a cause.
+    `residual` (n,).
+    `causes`: all with equally many sizes.
+    `cause`, `place` (p,): which cause and which of its places each block is.
     """
 
     def __init__(self, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> None:
@@ -298,7 +300,9 @@ def posterior(
 def likely_places(model: GaussianModel, residual: Floats, causes: Sequence[Cause], most: int) -> dict[str, Ints]:
     """Numbers of the most probable places of each cause by its name, if it acts alone, at the scale of a model.
 
-    `model`: of rows (n,) on which no cause acts. `residual` (n,). `most`: places of each cause at most.
+    `model`: of rows (n,) on which no cause acts.
+    `residual` (n,).
+    `most`: places of each cause at most.
     """
     blocks = Blocks(model, residual, causes)
     chosen = _best_places(blocks, blocks.log_factors() + blocks.log_weights, most)

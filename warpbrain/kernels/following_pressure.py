@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.ten_nodes import UNROLL
@@ -107,7 +107,7 @@ def pressure_kernels(precision: Precision, nodes: int, rule: tuple[tuple[float, 
 
 
 #: Shape functions and their derivatives by `r = L_1` and `s = L_2` at each point.
-Tables = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
+Tables = tuple[Floats, Floats, Floats]
 
 
 def _linear(rule: tuple[tuple[float, ...], ...]) -> Tables:

@@ -257,7 +257,7 @@ class ConjugateGradient(abc.ABC):
         preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
         beyond: Callable[[wp.array, float, wp.array], None] | None = None,
-        nodes: tuple[NDArray[np.float64], wp.array] | None = None,
+        nodes: tuple[Floats, wp.array] | None = None,
     ) -> None:
         if preconditioner not in PRECONDITIONERS:
             raise ValueError(f"preconditioner {preconditioner!r}: expected one of {', '.join(PRECONDITIONERS)}")

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 from warp.sparse import BsrMatrix
 
+from warpbrain.arrays import Int32s
 from warpbrain.errors import SolveError
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
@@ -128,7 +128,7 @@ def shared_memory(device: wp.Device) -> int:
     return int(device.max_shared_memory_per_block - _RESERVED) // 8 * 8
 
 
-def share_rows(offsets: NDArray[np.int32], blocks: int) -> tuple[NDArray[np.int32], int, int]:
+def share_rows(offsets: Int32s, blocks: int) -> tuple[Int32s, int, int]:
     """First row of each block, by the entries (n + 1,) of rows; how many threads share a row; messages for a thread."""
     starts = np.searchsorted(offsets, np.linspace(0, offsets[-1], blocks + 1)).astype(np.int32)
     starts[0], starts[-1] = 0, len(offsets) - 1
@@ -138,30 +138,17 @@ def share_rows(offsets: NDArray[np.int32], blocks: int) -> tuple[NDArray[np.int3
 
 
 class Meetings:
-    """Where blocks leave what others read.
-
-    Parameters
-    ----------
-    rows, blocks : int
-    device : Device
-
-    Attributes
-    ----------
-    exchange : wp.array of double
-        Two places that take turns, and one for the solution, with four numbers a row.
-    messages : wp.array of uint64
-        Two places that take turns, with a message for each sum of a block.
-    scratch : wp.array of double
-        What has no room on the chip.
-    control : wp.array of int
-        The number of the last meeting, and whether one failed.
-    """
+    """Where blocks leave what others read."""
 
     def __init__(self, rows: int, blocks: int, device: wp.Device) -> None:
         self._device = device
+        # two places that take turns, and one for the solution, with four numbers a row
         self.exchange = wp.zeros(12 * rows, dtype=wp.float64, device=device)
+        # two places that take turns, with a message for each sum of a block
         self.messages = wp.zeros(4 * _SUMS * blocks, dtype=wp.uint64, device=device)
+        # what has no room on the chip
         self.scratch = wp.zeros(_NUMBERS * rows, dtype=wp.float64, device=device)
+        # the number of the last meeting, and whether one failed
         self.control = wp.zeros(2, dtype=int, device=device)
 
     def check(self) -> None:
@@ -180,17 +167,8 @@ class Meetings:
 class PersistentSolve:
     """Solves ``matrix x = b`` by one launch; its parameters are those of `warpbrain.kernels.linear.ConjugateGradient`.
 
-    Parameters
-    ----------
-    matrix : warp.sparse.BsrMatrix
-    diagonal : wp.array of int, shape (n,)
-    b, x : wp.array of vec3, shape (n,)
-    precision : Precision
-    max_iterations : int
-    jacobi : bool
-        Precondition by inverse diagonal blocks.
-    watch : bool
-        End where the smallest curvature is not positive.
+    `diagonal`, `b`, `x` (n,). `jacobi`: precondition by inverse diagonal blocks. `watch`: end where the smallest
+    curvature is not positive.
     """
 
     def __init__(
@@ -232,10 +210,7 @@ class PersistentSolve:
     def outcome(self) -> tuple[int, float, float, float]:
         """Iterations, residual, the norm that was to be reached and the smallest curvature of the last solve.
 
-        Raises
-        ------
-        SolveError
-            If a block did not hear from another.
+        `SolveError` if a block did not hear from another.
         """
         self._meetings.check()
         iterations, residual, goal, curvature = self._outcome.numpy()

@@ -24,24 +24,15 @@ MATERIAL_SETS = "material sets"
 
 @dataclass
 class AbaqusSets:
-    """What a file names.
+    """What a file names."""
 
-    Attributes
-    ----------
-    nodes : list of int
-        Numbers of the nodes in the order of the file, which is meshio's.
-    elements : list of lists of int
-        Numbers of the elements of each `*ELEMENT` line, which is a block of meshio's.
-    node_sets, element_sets : dict of str to list of int
-        Numbers of the members.
-    sections, of_elements : list of str
-        Names of the sets that `*SOLID SECTION` gives a material, and of those that `*ELEMENT` lines make.
-    """
-
-    nodes: list[int] = field(default_factory=list)
+    nodes: list[int] = field(default_factory=list)  # numbers of the nodes in the order of the file, which is meshio's
+    #: Numbers of the elements of each `*ELEMENT` line, which is a block of meshio's.
     elements: list[list[int]] = field(default_factory=list)
+    #: Numbers of the members.
     node_sets: dict[str, list[int]] = field(default_factory=dict)
     element_sets: dict[str, list[int]] = field(default_factory=dict)
+    #: Names of the sets that `*SOLID SECTION` gives a material, and of those that `*ELEMENT` lines make.
     sections: list[str] = field(default_factory=list)
     of_elements: list[str] = field(default_factory=list)
 
@@ -49,10 +40,7 @@ class AbaqusSets:
 def read_abaqus(path: Path) -> Any:
     """Read a file: a `meshio.Mesh` with its sets; `info[MATERIAL_SETS]` lists which of them may be the materials.
 
-    Raises
-    ------
-    MeshError
-        If a set cannot be understood or has what is not there, or the file includes another one.
+    `MeshError` if a set cannot be understood or has what is not there, or the file includes another one.
     """
     import meshio
 

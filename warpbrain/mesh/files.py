@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.atomic import is_full, whole_file
 from warpbrain.errors import require_kind
 from warpbrain.frame import METRES
@@ -44,20 +45,11 @@ _IGNORED = ("vertex", "line", "line3", "triangle", "triangle6", "quad", "quad8",
 
 @dataclass(frozen=True, eq=False)
 class MeshInFile:
-    """A mesh as a file has it.
-
-    Attributes
-    ----------
-    mesh : TetMesh
-    node_numbers : (n,) int array
-        For each node of the mesh its number in the file, from 0.
-    file_nodes : int
-        How many nodes the file has: more than the mesh, if its tetrahedra are of second order.
-    """
+    """A mesh as a file has it."""
 
     mesh: TetMesh
-    node_numbers: NDArray[np.int64]
-    file_nodes: int
+    node_numbers: Ints  # (n,), for each node of the mesh its number in the file, from 0
+    file_nodes: int  # how many nodes the file has: more than the mesh, if its tetrahedra are of second order
 
 
 def read_mesh(path: str | os.PathLike[str], unit: str = "m", tissue: str | None = None) -> TetMesh:
@@ -94,10 +86,7 @@ def read_mesh_file(path: str | os.PathLike[str], unit: str = "m", tissue: str | 
 def read_raw(path: Path) -> Any:
     """What meshio reads of a file: a `meshio.Mesh` with cells of any kind.
 
-    Raises
-    ------
-    MeshError
-        Naming the file, what was found and what was expected.
+    `MeshError`, naming the file, what was found and what was expected.
     """
     import meshio
 
@@ -190,7 +179,7 @@ def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
 
 def _vectors(
     of_points: Mapping[str, Any], of_cells: Mapping[str, Any], tetrahedra: NDArray[np.integer]
-) -> dict[str, NDArray[np.float64]]:
+) -> dict[str, Floats]:
     vectors = {}
     for name, data in of_points.items():
         if _is_vectors(data):
@@ -206,7 +195,7 @@ def _is_vectors(data: Any) -> bool:
     return array.ndim == 2 and array.shape[1] == 3 and array.dtype.kind == "f"
 
 
-def _named(sets: Mapping[str, Any], count: int) -> dict[str, NDArray[np.bool_]]:
+def _named(sets: Mapping[str, Any], count: int) -> dict[str, Bools]:
     """Sets that a file holds as lists of nodes, as Abaqus' NSET."""
     node_sets = {}
     for name, ids in (sets or {}).items():
@@ -216,7 +205,7 @@ def _named(sets: Mapping[str, Any], count: int) -> dict[str, NDArray[np.bool_]]:
     return node_sets
 
 
-def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, NDArray[np.bool_]]:
+def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, Bools]:
     sets = {}
     for name, data in arrays.items():
         flag = np.asarray(data)

@@ -7,20 +7,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.errors import InputError
-from warpbrain.mesh.surface import (
-    Bools,
-    Floats,
-    Ints,
-    closed_surfaces,
-    face_vectors,
-    in_rows,
-    interface_faces,
-    node_vectors,
-    nodes_of,
-)
+from warpbrain.mesh.surface import closed_surfaces, face_vectors, in_rows, interface_faces, node_vectors, nodes_of
 from warpbrain.mesh.tet_mesh import TetMesh
 
 #: The outside of a body, the wall of a void within it, and what was inside until tetrahedra were taken out.
@@ -30,46 +21,25 @@ _ORIGINS: tuple[Origin, ...] = ("outer", "inner", "cut")
 
 @dataclass(frozen=True, eq=False)
 class FreeSurface:
-    """A part of the surface on which something can act.
+    """A part of the surface on which something can act."""
 
-    Attributes
-    ----------
-    name : str
-        Of the node set that stands for it: what acts on that acts on its triangles, and on none that can move beside.
-    words : str
-        What people call it.
-    members : (n,) bool array
-        Nodes of that set.
-    faces : (k, 3) int array
-        Triangles of the set that are not held, oriented outwards.
-    """
-
+    #: Of the node set that stands for it: what acts on that acts on its triangles, and on none that can move beside.
     name: str
-    words: str
-    members: Bools
-    faces: Ints
+    words: str  # what people call it
+    members: Bools  # (n,), nodes of that set
+    faces: Int32s  # (k, 3), triangles of the set that are not held, oriented outwards
 
 
 @dataclass(frozen=True, eq=False)
 class FreePart:
-    """A connected free surface.
+    """A connected free surface."""
 
-    Attributes
-    ----------
-    origin : str
-        One of `Origin`.
-    faces : (k, 3) int array
-        Triangles, oriented outwards.
-    centre : (3,) array
-        Of its area [m].
-    """
-
-    origin: Origin
-    faces: Ints
-    centre: Floats
+    origin: Origin  # one of `Origin`
+    faces: Int32s  # (k, 3), triangles, oriented outwards
+    centre: Floats  # (3,), of its area [m]
 
 
-def free_faces(mesh: TetMesh, members: Bools, held: Bools) -> Ints:
+def free_faces(mesh: TetMesh, members: Bools, held: Bools) -> Int32s:
     """Triangles (k, 3) of the boundary that a set of nodes holds and that can move: not all of their nodes are held."""
     faces = faces_of(mesh, members)
     return np.asarray(faces[~held[faces].all(axis=1)])
@@ -81,21 +51,10 @@ def free_parts(mesh: TetMesh, held: Bools, inner: ArrayLike, smallest: float = 0
     The boundary without triangles whose nodes are all held falls into pieces that hang together through edges; the
     wall of a cut, the walls of voids and the outside are apart even where they touch.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-    held : (n,) bool array
-        Nodes that cannot move, or not along the normal.
-    inner : (n,) bool array
-        Nodes on the walls of voids, as the body was before anything was cut out.
-    smallest : float
-        Part of the area of all pieces of one origin on one closed surface. A piece of less, such as a gap in what is
-        held, belongs to the largest of them.
-
-    Returns
-    -------
-    list of FreePart
-        Outside, voids, cuts; of each the largest area first.
+    `held` (n,): nodes that cannot move, or not along the normal. `inner` (n,): nodes on the walls of voids, as the body
+    was before anything was cut out. `smallest`: part of the area of all pieces of one origin on one closed surface. A
+    piece of less, such as a gap in what is held, belongs to the largest of them. Returns outside, voids, cuts; of each
+    the largest area first.
     """
     faces = mesh.boundary
     free = ~held[faces].all(axis=1)
@@ -116,7 +75,7 @@ def free_parts(mesh: TetMesh, held: Bools, inner: ArrayLike, smallest: float = 0
     return parts
 
 
-def _pieces(faces: Ints, areas: Floats, rows: NDArray[np.int64], smallest: float) -> Iterator[NDArray[np.int64]]:
+def _pieces(faces: Int32s, areas: Floats, rows: Ints, smallest: float) -> Iterator[Ints]:
     """Rows of each piece of some triangles of one closed surface."""
     piece = closed_surfaces(faces[rows])
     size = np.bincount(piece, areas[rows])
@@ -130,27 +89,19 @@ def set_of(mesh: TetMesh, part: FreePart) -> Bools:
     return nodes_of(part.faces, len(mesh.points))
 
 
-def rim_corners(mesh: TetMesh) -> Ints:
+def rim_corners(mesh: TetMesh) -> Int32s:
     """Triangles (k, 3) of the cut whose nodes are all on its rim: a set of nodes of the surface beside holds them."""
     beside = mesh.boundary[~in_rows(mesh.boundary, mesh.cut)]
     return np.asarray(mesh.cut[nodes_of(beside, len(mesh.points))[mesh.cut].all(axis=1)])
 
 
-def faces_of(mesh: TetMesh, members: Bools) -> Ints:
+def faces_of(mesh: TetMesh, members: Bools) -> Int32s:
     """Triangles of the boundary that a set of nodes holds.
 
     A triangle of the surface beside a cut can have all its nodes on the cut's rim. It is no part of the wall: where all
     members on the boundary are nodes of the cut, the set has triangles of the cut alone.
 
-    Parameters
-    ----------
-    mesh : TetMesh
-    members : (n,) bool array
-
-    Returns
-    -------
-    (k, 3) int32 array
-        Node ids, oriented outwards: triangles all of whose nodes are members.
+    `members` (n,). Returns (k, 3): node ids, oriented outwards: triangles all of whose nodes are members.
     """
     faces = mesh.boundary
     held = faces[members[faces].all(axis=1)]
@@ -160,13 +111,10 @@ def faces_of(mesh: TetMesh, members: Bools) -> Ints:
     return np.asarray(held[in_rows(held, mesh.cut)])
 
 
-def faces_of_set(mesh: TetMesh, name: str, who: str) -> Ints:
+def faces_of_set(mesh: TetMesh, name: str, who: str) -> Int32s:
     """Boundary triangles (k, 3) all of whose nodes are in a node set; `who` asks for them, for the message.
 
-    Raises
-    ------
-    InputError
-        If there is no such set or no such triangle.
+    `InputError` if there is no such set or no such triangle.
     """
     if name not in mesh.node_sets:
         known = ", ".join(sorted(mesh.node_sets)) or "none"

@@ -13,12 +13,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Ints
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.mesh.integrals import shape_values, triangle_rule
 from warpbrain.mesh.quadratic import QuadraticMesh
-from warpbrain.mesh.surface import Floats
 from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Barycentric points of a rule of degree 2 on a tetrahedron, of equal weights (Keast 1986); exact for quadratic shapes.
@@ -40,18 +39,8 @@ def integrals_of_shapes(mesh: TetMesh | QuadraticMesh) -> Floats:
 def integrals_above(mesh: TetMesh | QuadraticMesh, up: ArrayLike, level: float) -> Floats:
     """`int N_a dV` over the part of each tetrahedron where `x . up > level`.
 
-    Parameters
-    ----------
-    mesh : TetMesh or QuadraticMesh
-    up : (3,) array
-        Unit normal of the plane.
-    level : float
-        Its distance from the origin along `up` [m].
-
-    Returns
-    -------
-    (m, 4) or (m, 10) array
-        [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`.
+    `up` (3,): unit normal of the plane. `level`: its distance from the origin along `up` [m]. Returns (m, 4) or
+    (m, 10) [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`.
     """
     cut = _Cut(mesh, np.asarray(up, dtype=np.float64), level)
     whole = integrals_of_shapes(mesh)
@@ -72,17 +61,8 @@ def integrals_on_plane(
 ) -> Floats:
     """`int N_a w dA` over the part of the plane `x . up = level` inside each tetrahedron.
 
-    Parameters
-    ----------
-    mesh, up, level
-        See `integrals_above`.
-    weight : callable
-        From points (k, 3) [m] on the plane to values (k,); exact for polynomials of degree 2.
-
-    Returns
-    -------
-    (m, 4) or (m, 10) array
-        [m2] times the unit of the weight.
+    `mesh`, `up`, `level`: see `integrals_above`. `weight`: from points (k, 3) [m] on the plane to values (k,); exact
+    for polynomials of degree 2. Returns (m, 4) or (m, 10) [m2] times the unit of the weight.
     """
     cut = _Cut(mesh, np.asarray(up, dtype=np.float64), level)
     rule, shares = triangle_rule()
@@ -97,7 +77,7 @@ def integrals_on_plane(
     return integrals
 
 
-def elements_of_nodes(mesh: TetMesh | QuadraticMesh) -> NDArray[np.int32]:
+def elements_of_nodes(mesh: TetMesh | QuadraticMesh) -> Int32s:
     """Nodes of each tetrahedron, (m, 4) or (m, 10), in the order of the integrals."""
     return mesh.tetrahedra if isinstance(mesh, TetMesh) else mesh.elements
 

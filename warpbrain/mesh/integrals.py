@@ -8,8 +8,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.mesh.quadratic import QuadraticMesh
-from warpbrain.mesh.surface import Floats, face_vectors
+from warpbrain.mesh.surface import face_vectors
 from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Values (k, 3) of a field at points (k, 3).

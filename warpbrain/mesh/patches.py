@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.mesh.surface import SIDES, Floats, closed_surfaces, face_vectors
+from warpbrain.arrays import Floats, Ints
+from warpbrain.mesh.surface import SIDES, closed_surfaces, face_vectors
 
 #: Cosine of the angle between two triangles that face different ways: a right angle, but for rounding.
 _ASIDE = 1e-6
 
 
-def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius: float) -> NDArray[np.int64]:
+def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius: float) -> Ints:
     """Triangles that belong to the patch of a surface around the point of it that is nearest to a centre.
 
     Those that come within the radius, face the same way as the triangle at that point (less than a right angle from
@@ -20,21 +21,8 @@ def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius:
     surface would tell these apart as well where the way around is long, but not at an edge or a crest; paths along the
     edges of triangles are as much too long as the mesh is coarse, and what they select jumps as a centre moves.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions [m].
-    faces : (b, 3) array
-        Triangles of the surface, oriented outwards.
-    centre : (3,) array
-        [m]
-    radius : float
-        [m]
-
-    Returns
-    -------
-    (k,) int64 array
-        Numbers of triangles, increasing; empty if none comes within the radius.
+    `points` (n, 3): node positions [m]. `faces` (b, 3): triangles of the surface, oriented outwards. `centre` (3,) and
+    `radius` [m]. Returns (k,): numbers of triangles, increasing; empty if none comes within the radius.
     """
     triangles = np.asarray(faces)
     corners = np.asarray(points, dtype=np.float64)[triangles] - np.asarray(centre, dtype=np.float64)

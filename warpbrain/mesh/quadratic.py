@@ -12,8 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.mesh.refinement import finer_mesh, inherited
-from warpbrain.mesh.surface import EDGES, Bools, Floats, Ints, nodes_of
+from warpbrain.mesh.surface import EDGES, nodes_of
 from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Parts of a tetrahedron's mass for each corner and each midside node: the diagonal of the consistent mass matrix,
@@ -23,29 +24,17 @@ CORNER_MASS, MIDSIDE_MASS = 1.0 / 36.0, 4.0 / 27.0
 
 @dataclass(frozen=True, eq=False)
 class QuadraticMesh:
-    """A mesh with midside nodes.
-
-    Parameters
-    ----------
-    corners : TetMesh
-        What it is of; its n nodes come first.
-
-    Attributes
-    ----------
-    node_mesh : TetMesh
-        Linear tetrahedra with a corner at each of the N nodes: every element cut into eight. Sets are those of
-        `corners`, see `warpbrain.mesh.refinement.refined`; made once for a mesh.
-    ends : (N, 2) int array
-        Corners between which each node lies in the middle; a corner lies between itself and itself.
-    elements : (m, 10) int array
-        Nodes of each tetrahedron, ascending: its corners, then its midside nodes in the order of
-        `warpbrain.mesh.surface.EDGES`.
-    """
+    """A mesh with midside nodes. `corners`: what it is of; its n nodes come first."""
 
     corners: TetMesh
+    #: Linear tetrahedra with a corner at each of the N nodes: every element cut into eight. Sets are those of
+    #: `corners`, see `warpbrain.mesh.refinement.refined`; made once for a mesh.
     node_mesh: TetMesh = field(init=False)
-    ends: Ints = field(init=False)
-    elements: Ints = field(init=False)
+    #: (N, 2), corners between which each node lies in the middle; a corner lies between itself and itself.
+    ends: Int32s = field(init=False)
+    #: (m, 10), nodes of each tetrahedron, ascending: its corners, then its midside nodes in the order of
+    #: `warpbrain.mesh.surface.EDGES`.
+    elements: Int32s = field(init=False)
 
     def __post_init__(self) -> None:
         node_mesh, ends = finer_mesh(self.corners)
@@ -56,7 +45,7 @@ class QuadraticMesh:
         for name, value in (("node_mesh", node_mesh), ("ends", ends), ("elements", self.corners.shared["ten nodes"])):
             object.__setattr__(self, name, value)
 
-    def middles(self, edges: NDArray[np.integer]) -> NDArray[np.int64]:
+    def middles(self, edges: NDArray[np.integer]) -> Ints:
         """Node in the middle of each edge (..., 2), its ends ascending."""
         return _middles(len(self.corners.points), self.ends, edges)
 
@@ -86,11 +75,11 @@ class QuadraticMesh:
         return nodes_of(self.node_mesh.boundary, len(self.ends))
 
     @cached_property
-    def faces(self) -> Ints:
+    def faces(self) -> Int32s:
         """Triangles of the boundary (b, 6), oriented outwards: corners 0, 1, 2, then the middles of 01, 02 and 12."""
         return self.six_nodes(self.corners.boundary)
 
-    def six_nodes(self, triangles: ArrayLike) -> Ints:
+    def six_nodes(self, triangles: ArrayLike) -> Int32s:
         """Triangles (k, 3) of corners with their midside nodes, (k, 6)."""
         corners = np.asarray(triangles)
         sides = np.sort(corners[:, [[0, 1], [0, 2], [1, 2]]], axis=2)
@@ -118,24 +107,15 @@ class QuadraticMesh:
 def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> Floats:
     """A field of quadratic tetrahedra with straight sides at points in them.
 
-    Parameters
-    ----------
-    weights : (n, 4) array
-        Barycentric coordinates of each point.
-    corners : (n, 4, c) array
-        Values at the corners of its tetrahedron.
-    middles : (n, 6, c) array
-        Values in the middle of the edges, in the order of `warpbrain.mesh.surface.EDGES`.
-
-    Returns
-    -------
-    (n, c) array
+    `weights` (n, 4): barycentric coordinates of each point. `corners` (n, 4, c): values at the corners of its
+    tetrahedron. `middles` (n, 6, c): values in the middle of the edges, in the order of `warpbrain.mesh.surface.EDGES`.
+    Returns (n, c).
     """
     of_corners = np.einsum("na,nac->nc", weights * (2.0 * weights - 1.0), corners)
     return np.asarray(of_corners + np.einsum("na,nac->nc", 4.0 * weights[:, EDGES].prod(axis=2), middles))
 
 
-def _middles(corners: int, ends: Ints, edges: NDArray[np.integer]) -> NDArray[np.int64]:
+def _middles(corners: int, ends: Int32s, edges: NDArray[np.integer]) -> Ints:
     """Node in the middle of each edge (..., 2), its ends ascending, of all nodes with their `ends`, corners first."""
     factors = np.array([corners, 1])
     edge_numbers = np.searchsorted(ends[corners:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.mesh.surface import EDGES, FACES, Floats, Ints, connected, edges_of, paired_faces
+from warpbrain.arrays import Floats, Int32s, Ints
+from warpbrain.mesh.surface import EDGES, FACES, connected, edges_of, paired_faces
 from warpbrain.mesh.tet_mesh import TetMesh, signed_volumes
 
 # the two faces that meet at each of `EDGES`, by the corner each face is opposite to
@@ -18,19 +19,10 @@ _OPPOSITE = np.array([[2, 3], [1, 3], [1, 2], [0, 3], [0, 2], [0, 1]])
 def dihedral_angles(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
     """Angles between the faces of tetrahedra.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions, any unit.
-    tetrahedra : (m, 4) array
-        Node ids, positively oriented.
-
-    Returns
-    -------
-    (m, 6) array
-        Interior dihedral angle [degrees] at edges 01, 02, 03, 12, 13, 23. A regular tetrahedron has
-        arccos(1/3) = 70.53 degrees at every edge. The angle is made from the sine and the cosine, so that
-        flat tetrahedra are measured as well as good ones.
+    `points` (n, 3): node positions, any unit. `tetrahedra` (m, 4): node ids, positively oriented. Returns (m, 6):
+    interior dihedral angle [degrees] at edges 01, 02, 03, 12, 13, 23. A regular tetrahedron has arccos(1/3) = 70.53
+    degrees at every edge. The angle is made from the sine and the cosine, so that flat tetrahedra are measured as well
+    as good ones.
     """
     corner = np.asarray(points, dtype=np.float64)[np.asarray(tetrahedra)]
     start, end = corner[:, EDGES[:, 0]], corner[:, EDGES[:, 1]]
@@ -43,20 +35,11 @@ def dihedral_angles(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
     return np.asarray(np.degrees(np.arctan2(sine, cosine)))
 
 
-def components(tetrahedra: ArrayLike, tissue: ArrayLike | None = None) -> Ints:
+def components(tetrahedra: ArrayLike, tissue: ArrayLike | None = None) -> Int32s:
     """Number of the face-connected piece that each tetrahedron belongs to.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids.
-    tissue : (m,) array, optional
-        If given, faces between different labels do not connect: pieces are then pieces of one tissue.
-
-    Returns
-    -------
-    (m,) int32 array
-        Piece numbers 0, 1, ... in order of each piece's first tetrahedron.
+    `tetrahedra` (m, 4): node ids. `tissue` (m,): if given, faces between different labels do not connect: pieces are
+    then pieces of one tissue. Returns (m,): piece numbers 0, 1, ... in order of each piece's first tetrahedron.
     """
     tets = np.asarray(tetrahedra)
     pair = paired_faces(tets)[0] // len(FACES)
@@ -97,7 +80,7 @@ def measure(mesh: TetMesh) -> Quality:
     return measure_arrays(mesh.points, mesh.tetrahedra, mesh.tissue)
 
 
-def measure_arrays(points: Floats, tetrahedra: Ints, tissue: Ints) -> Quality:
+def measure_arrays(points: Floats, tetrahedra: Int32s, tissue: Int32s) -> Quality:
     """As `measure`, of arrays that need not be a valid mesh: points (n, 3) [m], tetrahedra (m, 4), tissue (m,)."""
     angles = dihedral_angles(points, tetrahedra)
     volumes = signed_volumes(points, tetrahedra)
@@ -127,7 +110,7 @@ def extent(points: NDArray[np.floating[Any]]) -> float:
     return 2.0 * float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
 
 
-def principal_axes(points: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+def principal_axes(points: NDArray[np.floating[Any]]) -> Floats:
     """Unit vectors, rows of (3, 3), along which points (n, 3) spread the least, more and the most.
 
     They turn with a body; of one that spreads alike along several axes these are any.
@@ -140,7 +123,7 @@ def principal_axes(points: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
 SAME_PLACE = 1e-9
 
 
-def coincident_nodes(points: ArrayLike) -> NDArray[np.int64]:
+def coincident_nodes(points: ArrayLike) -> Ints:
     """Pairs (k, 2) of nodes of points (n, 3) at the same place: there the body is torn, though it looks whole."""
     from scipy.spatial import cKDTree
 
@@ -149,7 +132,7 @@ def coincident_nodes(points: ArrayLike) -> NDArray[np.int64]:
     return np.asarray(pairs[np.lexsort(pairs.T[::-1])], dtype=np.int64)
 
 
-def open_edges(faces: ArrayLike) -> NDArray[np.int64]:
+def open_edges(faces: ArrayLike) -> Ints:
     """Edges (k, 2) that do not belong to exactly two of the triangles (b, 3): none on a closed surface."""
     unique, count = np.unique(edges_of(faces), axis=0, return_counts=True)
     return np.asarray(unique[count != 2], dtype=np.int64)

@@ -7,9 +7,9 @@ from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.mesh.surface import EDGES, Bools, Floats, Ints, in_rows, nodes_of
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
+from warpbrain.mesh.surface import EDGES, in_rows, nodes_of
 from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Corners 0 to 3 and the midpoints of edges 01, 02, 03, 12, 13, 23 as 4 to 9: what is cut off at each corner.
@@ -19,19 +19,15 @@ _DIAGONALS = np.array([[4, 9], [5, 8], [6, 7]])
 _RINGS = np.array([[5, 6, 8, 7], [4, 7, 9, 6], [4, 5, 9, 8]])
 
 
-def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
+def refined(mesh: TetMesh) -> tuple[TetMesh, Int32s]:
     """Cut every tetrahedron into eight, through the midpoints of its edges.
 
     The four at the corners are similar to the whole; the octahedron between them is cut along its shortest diagonal, so
     that elements do not become worse without limit (Bey 1995, Computing 55, 355).
 
-    Returns
-    -------
-    mesh : TetMesh
-        Nodes 0 to n - 1 are those of the mesh it is of, elements 8 e to 8 e + 7 are in element e. Midpoints are in
-        node sets by the rule of `inherited`.
-    ends : (n', 2) int array
-        For each node the two between which it lies in the middle; an old one lies between itself and itself.
+    Returns `mesh`: nodes 0 to n - 1 are those of the mesh it is of, elements 8 e to 8 e + 7 are in element e. Midpoints
+    are in node sets by the rule of `inherited`; `ends` (n', 2): for each node the two between which it lies in the
+    middle; an old one lies between itself and itself.
     """
     sides = np.sort(mesh.tetrahedra[:, EDGES], axis=2).reshape(-1, 2)
     edges, number = np.unique(sides, axis=0, return_inverse=True)
@@ -49,10 +45,10 @@ def refined(mesh: TetMesh) -> tuple[TetMesh, Ints]:
 
 
 #: Finer meshes by those they are of.
-_FINER: WeakKeyDictionary[TetMesh, tuple[TetMesh, Ints]] = WeakKeyDictionary()
+_FINER: WeakKeyDictionary[TetMesh, tuple[TetMesh, Int32s]] = WeakKeyDictionary()
 
 
-def finer_mesh(mesh: TetMesh) -> tuple[TetMesh, Ints]:
+def finer_mesh(mesh: TetMesh) -> tuple[TetMesh, Int32s]:
     """What `refined` returns, made once: elements are shared by meshes that differ in their node sets only."""
     if mesh not in _FINER:
         if "finer" not in mesh.shared:
@@ -63,7 +59,7 @@ def finer_mesh(mesh: TetMesh) -> tuple[TetMesh, Ints]:
     return _FINER[mesh]
 
 
-def _finer_cut(cut: Ints, ends: Ints, finer: TetMesh) -> Ints:
+def _finer_cut(cut: Int32s, ends: Int32s, finer: TetMesh) -> Int32s:
     """Triangles of the finer boundary that lie in triangles of a cut: four of each."""
     faces = finer.boundary
     # of a part at a corner the ends are a, a, a, b, a, c; of that in the middle a, b, b, c, c, a
@@ -73,7 +69,7 @@ def _finer_cut(cut: Ints, ends: Ints, finer: TetMesh) -> Ints:
     return np.asarray(faces[in_rows(np.concatenate([first, between, last], axis=1), cut)])
 
 
-def inherited_sets(sets: Mapping[str, Bools], ends: Ints, finer: TetMesh) -> dict[str, Bools]:
+def inherited_sets(sets: Mapping[str, Bools], ends: Int32s, finer: TetMesh) -> dict[str, Bools]:
     """Sets of nodes of a mesh on the finer one, by the rule of `inherited`.
 
     The wall of a cut stays one: a set that has no node of the surface beside it gains none (`faces_of`).
@@ -87,26 +83,22 @@ def inherited_sets(sets: Mapping[str, Bools], ends: Ints, finer: TetMesh) -> dic
     return {name: inherited(members, ends, where(members)) for name, members in sets.items()}
 
 
-def inherited(members: Bools, ends: Ints, surface: Bools) -> Bools:
+def inherited(members: Bools, ends: Int32s, surface: Bools) -> Bools:
     """A set of nodes once there are midpoints.
 
     A midpoint is in it if both ends of its edge are; of a set of nodes of the surface only if the edge lies on the
     surface too.
 
-    Parameters
-    ----------
-    members : (n,) bool array
-    ends : (n', 2) int array
-        The two nodes between which each node lies in the middle.
-    surface : (n',) bool array
-        Nodes, midpoints among them, that are of the boundary.
+    `members` (n,).
+    `ends` (n', 2): the two nodes between which each node lies in the middle.
+    `surface` (n',): nodes, midpoints among them, that are of the boundary.
     """
     both = members[ends].all(axis=1)
     inside = members & ~surface[: len(members)]
     return np.asarray(both if inside.any() else both & surface)
 
 
-def _octahedra(points: Floats, nodes: NDArray[np.int64]) -> Ints:
+def _octahedra(points: Floats, nodes: Ints) -> Int32s:
     """The four tetrahedra (m, 4, 4) about the shortest diagonal of each octahedron, positively oriented."""
     ends = points[nodes[:, _DIAGONALS]]
     shortest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).argmin(axis=1)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools
+from warpbrain.arrays import Bools, Int32s, Ints
 from warpbrain.mesh.abaqus import MATERIAL_SETS
 from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_in_file, read_raw
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
@@ -35,37 +35,19 @@ _DIMENSION = {"vertex": 0, "line": 1, "line3": 1}
 
 @dataclass(frozen=True, eq=False)
 class MeshWithRegions:
-    """A mesh with what its file names.
-
-    Attributes
-    ----------
-    mesh : TetMesh
-    names : dict of int to str
-        Names of tissues that the file has.
-    notes : tuple of str
-        Where tissues and sets are from.
-    """
+    """A mesh with what its file names."""
 
     mesh: TetMesh
-    names: dict[int, str]
-    notes: tuple[str, ...]
+    names: dict[int, str]  # names of tissues that the file has
+    notes: tuple[str, ...]  # where tissues and sets are from
 
 
 def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithRegions:
     """Read a mesh with its tissues and sets.
 
-    Parameters
-    ----------
-    path : Path
-    unit : {"m", "mm"}
-        Of its coordinates.
-    array : str, optional
-        Cell array of the tissues, or `SETS`; by default ``tissue`` if there is one, else the only one that can be it.
-
-    Raises
-    ------
-    MeshError
-        Naming the file, if it is no mesh, or several arrays could be the tissues; the message lists them.
+    `unit` ("m" or "mm"): of its coordinates. `array`: cell array of the tissues, or `SETS`; by default ``tissue`` if
+    there is one, else the only one that can be it. `MeshError`, naming the file, if it is no mesh, or several arrays
+    could be the tissues; the message lists them.
     """
     raw = read_raw(path)
     if not any(block.type in TETRAHEDRA for block in raw.cells):
@@ -117,7 +99,7 @@ def _of_tetrahedra(raw: Any, name: str) -> NDArray[Any]:
     return np.concatenate([np.asarray(raw.cell_data[name][b]) for b in _blocks(raw)])
 
 
-def _whole(values: NDArray[Any]) -> NDArray[np.int64] | None:
+def _whole(values: NDArray[Any]) -> Ints | None:
     """Values (n,) as whole numbers, None if they are not."""
     if values.ndim == 2 and values.shape[1] == 1:
         values = values[:, 0]
@@ -186,7 +168,7 @@ def _members(raw: Any, name: str) -> list[Bools]:
     return all_members
 
 
-def _numbered(raw: Any, names: list[str]) -> list[NDArray[np.int32]]:
+def _numbered(raw: Any, names: list[str]) -> list[Int32s]:
     values = [np.zeros(len(block.data), dtype=np.int32) for block in raw.cells]
     for number, name in enumerate(names, 1):
         for each, members in zip(values, _members(raw, name), strict=True):
@@ -196,7 +178,7 @@ def _numbered(raw: Any, names: list[str]) -> list[NDArray[np.int32]]:
 
 def _name_nodes(raw: Any, chosen: str | None, physical: Mapping[tuple[int, int], str]) -> list[str]:
     """Add node sets of faces, edges and points, and of the values of point arrays; says which."""
-    added: dict[str, list[NDArray[np.int64]]] = {}
+    added: dict[str, list[Ints]] = {}
     for number, block in enumerate(raw.cells):
         if block.type in TETRAHEDRA:
             continue

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 
 # corners of the four faces of a positive tetrahedron, each seen counter-clockwise from outside; face i is opposite i
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -17,7 +15,7 @@ EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 SIDES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
-def connected(links: NDArray[np.integer], count: int) -> NDArray[np.int32]:
+def connected(links: NDArray[np.integer], count: int) -> Int32s:
     """Number (count,) of the connected part that each of some things is in, by pairs (k, 2) of things that touch."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -26,30 +24,17 @@ def connected(links: NDArray[np.integer], count: int) -> NDArray[np.int32]:
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def edges_of(faces: ArrayLike) -> NDArray[np.int64]:
+def edges_of(faces: ArrayLike) -> Ints:
     """Sides (3 b, 2) of triangles (b, 3), one triangle after the other, ends ascending."""
     return np.sort(np.asarray(faces, dtype=np.int64)[:, SIDES].reshape(-1, 2), axis=1)
 
 
-def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def paired_faces(tetrahedra: ArrayLike) -> tuple[Ints, Ints]:
     """Which faces of which tetrahedra coincide.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids.
-
-    Returns
-    -------
-    pairs : (k, 2) int64 array
-        Faces shared by two tetrahedra; face number = 4 * tetrahedron + local face.
-    single : (b,) int64 array
-        Faces that only one tetrahedron has.
-
-    Raises
-    ------
-    ValueError
-        If a face belongs to three or more tetrahedra.
+    `tetrahedra` (m, 4): node ids. Returns `pairs` (k, 2): faces shared by two tetrahedra; face number = 4 * tetrahedron
+    + local face; `single` (b,): faces that only one tetrahedron has. `ValueError` if a face belongs to three or more
+    tetrahedra.
     """
     tets = np.asarray(tetrahedra)
     faces = np.sort(tets[:, FACES].reshape(-1, 3), axis=1)
@@ -67,58 +52,34 @@ def paired_faces(tetrahedra: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.i
     return pairs[np.argsort(pairs[:, 0])], np.sort(order[~same & ~follows])
 
 
-def _corners(tetrahedra: ArrayLike, faces: NDArray[np.int64]) -> Ints:
+def _corners(tetrahedra: ArrayLike, faces: Ints) -> Int32s:
     tets = np.asarray(tetrahedra)
     return np.asarray(tets[faces[:, None] // 4, FACES[faces % 4]], dtype=np.int32)
 
 
-def all_faces(tetrahedra: ArrayLike) -> Ints:
+def all_faces(tetrahedra: ArrayLike) -> Int32s:
     """Every triangle of a mesh once, inside and on the boundary.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids.
-
-    Returns
-    -------
-    (k, 3) int32 array
-        Node ids.
+    `tetrahedra` (m, 4): node ids. Returns (k, 3): node ids.
     """
     pairs, single = paired_faces(tetrahedra)
     return _corners(tetrahedra, np.concatenate([pairs[:, 0], single]))
 
 
-def boundary_faces(tetrahedra: ArrayLike) -> Ints:
+def boundary_faces(tetrahedra: ArrayLike) -> Int32s:
     """Triangles of the boundary, oriented outwards.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids, positively oriented.
-
-    Returns
-    -------
-    (b, 3) int32 array
-        Node ids; ``(p1 - p0) x (p2 - p0)`` points out of the body, into a cavity where there is one.
+    `tetrahedra` (m, 4): node ids, positively oriented. Returns (b, 3): node ids; ``(p1 - p0) x (p2 - p0)`` points out
+    of the body, into a cavity where there is one.
     """
     return _corners(tetrahedra, paired_faces(tetrahedra)[1])
 
 
-def interface_faces(tetrahedra: ArrayLike, tissue: ArrayLike) -> Ints:
+def interface_faces(tetrahedra: ArrayLike, tissue: ArrayLike) -> Int32s:
     """Triangles between tetrahedra of different labels.
 
-    Parameters
-    ----------
-    tetrahedra : (m, 4) array
-        Node ids, positively oriented.
-    tissue : (m,) array
-        Labels; a boolean element set works as well.
-
-    Returns
-    -------
-    (k, 3) int32 array
-        Node ids; the normal points away from the smaller label.
+    `tetrahedra` (m, 4): node ids, positively oriented. `tissue` (m,): labels; a boolean element set works as well.
+    Returns (k, 3): node ids; the normal points away from the smaller label.
     """
     pairs = paired_faces(tetrahedra)[0]
     labels = np.asarray(tissue)[pairs // 4]
@@ -134,19 +95,11 @@ def in_rows(faces: ArrayLike, others: ArrayLike) -> Bools:
     return np.asarray(np.isin(number[: len(rows[0])], number[len(rows[0]) :]))
 
 
-def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
+def rim_edges(faces: ArrayLike) -> Ints:
     """Edges at which an oriented surface ends.
 
-    Parameters
-    ----------
-    faces : (b, 3) array
-        Triangles, all oriented to one side.
-
-    Returns
-    -------
-    (k, 2) int64 array
-        Edges that triangles do not run along as often one way as the other: none on a closed surface, even one that
-        touches itself.
+    `faces` (b, 3): triangles, all oriented to one side. Returns (k, 2): edges that triangles do not run along as often
+    one way as the other: none on a closed surface, even one that touches itself.
     """
     triangles = np.asarray(faces, dtype=np.int64)
     sides = triangles[:, SIDES].reshape(-1, 2)
@@ -155,20 +108,11 @@ def rim_edges(faces: ArrayLike) -> NDArray[np.int64]:
     return np.asarray(edges[along != 0.0])
 
 
-def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Ints:
+def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Int32s:
     """Number of the edge-connected surface each triangle belongs to.
 
-    Parameters
-    ----------
-    faces : (b, 3) array
-        Node ids.
-    joins : (3 b,) bool array, optional
-        Which of their sides, see `edges_of`, connect; all by default.
-
-    Returns
-    -------
-    (b,) int32 array
-        Surface numbers 0, 1, ...
+    `faces` (b, 3): node ids. `joins` (3 b,): which of their sides, see `edges_of`, connect; all by default. Returns
+    (b,): surface numbers 0, 1, ...
     """
     count = len(np.asarray(faces))
     number = np.unique(edges_of(faces), axis=0, return_inverse=True)[1].ravel()
@@ -178,19 +122,11 @@ def closed_surfaces(faces: ArrayLike, joins: Bools | None = None) -> Ints:
     return np.asarray(np.unique(labels, return_inverse=True)[1].ravel(), dtype=np.int32)
 
 
-def pinched_nodes(faces: ArrayLike) -> Ints:
+def pinched_nodes(faces: ArrayLike) -> Int32s:
     """Nodes where closed surfaces touch themselves or each other.
 
-    Parameters
-    ----------
-    faces : (b, 3) array
-        Node ids; every edge belongs to an even number of triangles.
-
-    Returns
-    -------
-    (k,) int32 array
-        Ids of nodes on an edge of more than two triangles, and of nodes whose triangles form more than one fan.
-        Empty for smooth closed surfaces.
+    `faces` (b, 3): node ids; every edge belongs to an even number of triangles. Returns (k,): ids of nodes on an edge
+    of more than two triangles, and of nodes whose triangles form more than one fan. Empty for smooth closed surfaces.
     """
     triangles = np.asarray(faces)
     sides = triangles[:, SIDES].reshape(-1, 2)
@@ -209,22 +145,12 @@ def pinched_nodes(faces: ArrayLike) -> Ints:
     return np.asarray(np.union1d(nodes[fans > 1], edges[owners > 2].ravel()), dtype=np.int32)
 
 
-def split_boundary(points: ArrayLike, tetrahedra: ArrayLike) -> tuple[Ints, list[Ints]]:
+def split_boundary(points: ArrayLike, tetrahedra: ArrayLike) -> tuple[Int32s, list[Int32s]]:
     """Outer surface and cavity walls.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions.
-    tetrahedra : (m, 4) array
-        Node ids, positively oriented.
-
-    Returns
-    -------
-    outer : (b, 3) int32 array
-        Triangles of the surfaces that enclose volume: one surface for a body in one piece.
-    cavities : list of (c, 3) int32 arrays
-        Triangles of each closed surface that excludes volume, largest volume first; normals point into the cavity.
+    `points` (n, 3): node positions. `tetrahedra` (m, 4): node ids, positively oriented. Returns `outer` (b, 3):
+    triangles of the surfaces that enclose volume: one surface for a body in one piece; `cavities` (c, 3): triangles of
+    each closed surface that excludes volume, largest volume first; normals point into the cavity.
     """
     faces = boundary_faces(tetrahedra)
     surface = closed_surfaces(faces)
@@ -266,17 +192,8 @@ def tangents(normals: ArrayLike) -> Floats:
 def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
     """Surface area lumped to nodes: a third of every triangle's area goes to each of its corners.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions [m].
-    faces : (b, 3) array
-        Triangles.
-
-    Returns
-    -------
-    (n,) array
-        Area [m2]; zero for nodes that `faces` does not name.
+    `points` (n, 3): node positions [m]. `faces` (b, 3): triangles. Returns (n,): area [m2]; zero for nodes that `faces`
+    does not name.
     """
     share = np.linalg.norm(face_vectors(points, faces), axis=1) / 3.0
     triangles = np.asarray(faces)
@@ -284,22 +201,13 @@ def node_areas(points: ArrayLike, faces: ArrayLike) -> Floats:
     return np.asarray(lumped, dtype=np.float64)
 
 
-def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, NDArray[np.bool_]]:
+def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats, Bools]:
     """Angle-weighted normals (Baerentzen and Aanaes 2005) of each triangle's features, and which are on a rim.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-    faces : (k, 3) int array
-        Oriented outwards.
-
-    Returns
-    -------
-    normals : (k, 7, 3) array
-        Unit normals of the face, of its edges ab, bc, ca and of its corners. The closest point `p` of a closed surface
-        to `x` has `x` outside if `(x - p) . n > 0` with the normal of the feature that `p` is on.
-    on_rim : (k, 7) bool array
-        True for an edge of one triangle only and its corners, whose normal is that of the face.
+    `points` (n, 3). `faces` (k, 3): oriented outwards. Returns `normals` (k, 7, 3): unit normals of the face, of its
+    edges ab, bc, ca and of its corners, and `on_rim` (k, 7): True for an edge of one triangle only and its corners,
+    whose normal is that of the face. The closest point `p` of a closed surface to `x` has `x` outside if
+    `(x - p) . n > 0` with the normal of the feature that `p` is on.
     """
     normals = np.empty((len(faces), 7, 3))
     normals[:, 0] = _unit(face_vectors(points, faces))

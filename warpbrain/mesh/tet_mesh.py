@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.errors import InputError
-from warpbrain.mesh.surface import EDGES, FACES, Bools, Floats, Ints, boundary_faces, in_rows, interface_faces
+from warpbrain.mesh.surface import EDGES, FACES, boundary_faces, in_rows, interface_faces
 
 #: A coordinate [m] beyond this is no place.
 LARGEST = 1e12
@@ -45,7 +46,7 @@ def _ids(mask_or_ids: ArrayLike, limit: int = 5) -> str:
     return f"{text}, ... ({len(ids)} in all)" if len(ids) > limit else text
 
 
-def _integers(values: ArrayLike, what: str) -> Ints:
+def _integers(values: ArrayLike, what: str) -> Int32s:
     """`values` as int32; floats are accepted only where they are whole numbers."""
     array = np.asarray(values)
     if array.dtype == bool or not (np.issubdtype(array.dtype, np.integer) or np.issubdtype(array.dtype, np.floating)):
@@ -120,12 +121,12 @@ class TetMesh:
     """
 
     points: Floats
-    tetrahedra: Ints
-    tissue: Ints = None  # type: ignore[assignment]  # filled in below
+    tetrahedra: Int32s
+    tissue: Int32s = None  # type: ignore[assignment]  # filled in below
     node_sets: Mapping[str, Bools] = field(default_factory=dict)
     element_sets: Mapping[str, Bools] = field(default_factory=dict)
     element_vectors: Mapping[str, Floats] = field(default_factory=dict)
-    cut: Ints = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int32))
+    cut: Int32s = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int32))
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points, dtype=np.float64)
@@ -177,7 +178,7 @@ class TetMesh:
         return np.asarray(self.points[self.tetrahedra].mean(axis=1))
 
     @cached_property
-    def boundary(self) -> Ints:
+    def boundary(self) -> Int32s:
         """Triangles (b, 3) of the boundary, oriented outwards; found once."""
         return boundary_faces(self.tetrahedra)
 
@@ -231,7 +232,7 @@ class TetMesh:
         lumped = np.bincount(self.tetrahedra.ravel(), weights=quarters, minlength=len(self.points))
         return lumped.astype(np.float64)
 
-    def without(self, elements: ArrayLike) -> tuple[TetMesh, Ints, Ints]:
+    def without(self, elements: ArrayLike) -> tuple[TetMesh, Int32s, Int32s]:
         """The mesh that is left when some tetrahedra are removed.
 
         Parameters
@@ -274,7 +275,7 @@ class TetMesh:
             {name: vectors[elements] for name, vectors in self.element_vectors.items()},
         )
 
-    def _left(self, kept: Bools) -> tuple[TetMesh, Ints, Ints]:
+    def _left(self, kept: Bools) -> tuple[TetMesh, Int32s, Int32s]:
         element_ids = np.flatnonzero(kept).astype(np.int32)
         tetrahedra = self.tetrahedra[element_ids]
         node_ids = np.unique(tetrahedra).astype(np.int32)
@@ -300,24 +301,15 @@ class TetMesh:
 def signed_volumes(points: ArrayLike, tetrahedra: ArrayLike) -> Floats:
     """Signed volume of tetrahedra, in the cube of the unit of `points`.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-        Node positions.
-    tetrahedra : (m, 4) array
-        Node ids.
-
-    Returns
-    -------
-    (m,) array
-        Positive where the tetrahedron is positively oriented.
+    `points` (n, 3): node positions. `tetrahedra` (m, 4): node ids. Returns (m,): positive where the tetrahedron is
+    positively oriented.
     """
     corner = np.asarray(points, dtype=np.float64)[np.asarray(tetrahedra)]
     a, b, c = (corner[:, i] - corner[:, 0] for i in (1, 2, 3))
     return np.asarray(np.einsum("ij,ij->i", np.cross(a, b), c) / 6.0)
 
 
-def _defects(points: Floats, tetrahedra: Ints) -> list[str]:
+def _defects(points: Floats, tetrahedra: Int32s) -> list[str]:
     """Everything that makes points and tetrahedra no body, one line each."""
     defects = []
     bad = np.asarray(~(np.abs(points) <= LARGEST).all(axis=1))
@@ -342,7 +334,7 @@ def _defects(points: Floats, tetrahedra: Ints) -> list[str]:
     return defects + _flat_or_inverted(points, tetrahedra[whole], whole, bad)
 
 
-def _flat_or_inverted(points: Floats, tetrahedra: Ints, numbers: NDArray[np.int64], bad: Bools) -> list[str]:
+def _flat_or_inverted(points: Floats, tetrahedra: Int32s, numbers: Ints, bad: Bools) -> list[str]:
     corner = points[tetrahedra]
     measurable = ~bad[tetrahedra].any(axis=1)
     with np.errstate(invalid="ignore", over="ignore"):

@@ -24,13 +24,7 @@ _HEAD = 2**16
 def write_vtu(path: Path, mesh: Any, axes: str = "RAS") -> None:
     """Write a `meshio.Mesh` as compressed VTU that says its axes.
 
-    Parameters
-    ----------
-    path : Path
-        Written in place: see `warpbrain.atomic.whole_file`.
-    mesh : meshio.Mesh
-    axes : {"RAS", "LPS"}
-        Of its points.
+    `path`: written in place: see `warpbrain.atomic.whole_file`. `axes` ("RAS" or "LPS"): of its points.
     """
     import meshio
 
@@ -42,12 +36,7 @@ def write_vtu(path: Path, mesh: Any, axes: str = "RAS") -> None:
 
 
 def read_vtu(path: Path) -> Any:
-    """Read a VTU file with meshio, without the fields of text that it has no type for.
-
-    Returns
-    -------
-    meshio.Mesh
-    """
+    """Read a VTU file with meshio, without the fields of text that it has no type for."""
     import meshio
 
     data = path.read_bytes()

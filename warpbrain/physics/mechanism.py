@@ -31,9 +31,8 @@ from functools import cached_property
 from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Expectation
@@ -48,6 +47,8 @@ from warpbrain.physics.words import Smallest, Values, clauses, label, number
 #: an array of directions, a closed surface, a position, a vector that is no length, or numbers. Users may say a tissue
 #: for an element set, and files for directions and surfaces (`warpbrain.cases.parts.named`).
 KINDS = ("number", "text", "node set", "element set", "directions", "surface", "position", "vector", "numbers")
+#: Of these, what a state changes smoothly with.
+NUMBERS = ("number", "position", "vector", "numbers")
 
 
 @dataclass(frozen=True)
@@ -56,13 +57,13 @@ class ClosedSurface:
 
     file: str  # where it came from, for people
     points: Floats = field(repr=False, compare=False)  # (n, 3) [m]
-    faces: NDArray[np.int32] = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
+    faces: Int32s = field(repr=False, compare=False)  # (k, 3), oriented in one way, inwards or outwards
 
     def __str__(self) -> str:
         return self.file
 
     @property
-    def outward(self) -> NDArray[np.int32]:
+    def outward(self) -> Int32s:
         """The triangles, all turned if they enclose a negative volume."""
         a, b, c = (self.points[self.faces[:, i]] - self.points.mean(axis=0) for i in range(3))
         return self.faces if np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0 else self.faces[:, ::-1]
@@ -193,6 +194,19 @@ class Mechanism(Ramped, abc.ABC):
     def with_body_turned(self, rotation: Floats) -> Mechanism:
         """As it acts on a body that is turned in the room by a rotation (3, 3); itself if it turns with the body."""
         return self
+
+    def differs_in_numbers_only(self, other: Mechanism) -> bool:
+        """Whether another one is the same but for numbers, settings of the method and the ramp."""
+        if type(other) is not type(self):
+            return False
+        for name in (f.name for f in dataclasses.fields(self) if f.name != "ramp"):
+            says, mine, its = self.parameters().get(name), getattr(self, name), getattr(other, name)
+            if says is not None and says.kind in NUMBERS:
+                if not says.method and ((mine is None) != (its is None) or np.shape(mine) != np.shape(its)):
+                    return False
+            elif not (says is not None and says.method) and mine != its:
+                return False
+        return True
 
     @classmethod
     def required(cls) -> tuple[str, ...]:
@@ -412,5 +426,5 @@ class Relaxing(Protocol):
 class Removing(Protocol):
     """A mechanism that takes elements away before anything is computed."""
 
-    def remaining(self, mesh: TetMesh) -> tuple[TetMesh, NDArray[np.int32]]:
+    def remaining(self, mesh: TetMesh) -> tuple[TetMesh, Int32s]:
         """The mesh that is left, and for each of its nodes the id in the whole mesh."""

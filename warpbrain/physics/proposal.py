@@ -12,9 +12,8 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Int32s
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.free_surfaces import FreeSurface
 
@@ -76,14 +75,14 @@ class Situation:
     #: How x, y and z run, for people
     axes: tuple[str, str, str] = ("from left to right", "from posterior to anterior", "from inferior to superior")
     #: Every part of the surface that can move, with what people call it: what something acts on already, too
-    named: tuple[tuple[str, NDArray[np.int32]], ...] = ()
+    named: tuple[tuple[str, Int32s], ...] = ()
 
     @cached_property
     def _names(self) -> tuple[Any, list[str]]:
         """A tree of the middles of triangles, and the name of each: that of the smallest part that it belongs to."""
         from scipy.spatial import cKDTree
 
-        names: dict[bytes, tuple[NDArray[np.int32], str]] = {}
+        names: dict[bytes, tuple[Int32s, str]] = {}
         for words, faces in sorted(self.named, key=lambda part: -len(part[1])):
             names.update({row.tobytes(): (row, words) for row in np.sort(faces, axis=1)})
         rows = np.array([row for row, _ in names.values()], dtype=np.int64).reshape(-1, 3)

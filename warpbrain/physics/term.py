@@ -17,7 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Int32s
 from warpbrain.kernels.extra_energy import extra_kernels
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
@@ -25,7 +25,6 @@ from warpbrain.kernels.ten_nodes import TEN_NODES
 from warpbrain.kernels.tetrahedron import FOUR_NODES
 from warpbrain.mesh import QuadraticMesh, TetMesh
 
-Ints = NDArray[np.int32]
 T = TypeVar("T")
 
 
@@ -35,11 +34,11 @@ class Body(Protocol):
     mesh: TetMesh  # the reference shape
     device: Any  # of Warp
     precision: Precision  # of every array
-    tetrahedra: Ints  # corners (m, 4) of each element, ascending
+    tetrahedra: Int32s  # corners (m, 4) of each element, ascending
     nodes: wp.array  # the same on the device
     quadratic: QuadraticMesh | None  # the reference shape with its midside nodes, if elements have some
     node_mesh: TetMesh  # linear tetrahedra with a corner at every node: the mesh, or its elements cut into eight
-    stencils: Ints  # nodes of each element, ascending, (m, 4), or (m, 10) with midside nodes
+    stencils: Int32s  # nodes of each element, ascending, (m, 4), or (m, 10) with midside nodes
     element_nodes: wp.array  # the same on the device: (m,) vec4i, or (m, 10) int
     inverse_edges: wp.array  # gradients of the shape functions of nodes 1 to 3 as rows, (m,) mat33 [1/m]
     constrained: Bools  # components (n, 3) of the displacement that are prescribed

@@ -35,10 +35,7 @@ def lengths(residuals: ArrayLike) -> Floats:
 def by_unit(each: Iterable[tuple[str, ArrayLike]]) -> Mapping[str, float]:
     """The root mean square over all rows of several recordings together, by their unit.
 
-    Parameters
-    ----------
-    each : iterable of (str, array)
-        Unit, and residuals (n, d) or distances (n,) of each recording.
+    `each`: unit, and residuals (n, d) or distances (n,) of each recording.
 
     Examples
     --------

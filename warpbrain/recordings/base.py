@@ -10,13 +10,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.atomic import whole_file
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.surface import Ints
 from warpbrain.mesh.vtu import write_vtu
 from warpbrain.problems import Problems
 from warpbrain.recordings.text import collected
@@ -40,23 +39,7 @@ REFERENCE = Key(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Recording:
-    """What all recordings have; `warpbrain.recordings.recording.RECORDINGS` has the kinds.
-
-    Attributes
-    ----------
-    name : str
-    file : str
-        File it came from, relative to the case folder.
-    role : {"fit", "check"}
-        A ``"check"`` recording is never fitted, only scored.
-    sigma : float or None
-        Noise of one component, one standard deviation, in the unit of what was recorded (m, N, Pa or N m); None: to be
-        estimated.
-    reference: float or None
-        Time [s] of the loaded state from which displacements and forces are counted; None: rest.
-    time : (n,) array or None
-        [s]
-    """
+    """What all recordings have; `warpbrain.recordings.recording.RECORDINGS` has the kinds."""
 
     kind: ClassVar[str]
     #: What `case.toml` says of this kind besides name, file, role and sigma.
@@ -64,11 +47,14 @@ class Recording:
     #: Whether it belongs to a laboratory specimen and not to a body.
     of_specimen: ClassVar[bool] = False
     name: str
-    file: str
-    role: str = "fit"
+    file: str  # it came from, relative to the case folder
+    role: str = "fit"  # "fit" or "check", which is never fitted, only scored
+    #: Noise of one component, one standard deviation, in the unit of what was recorded (m, N, Pa or N m); None: to be
+    #: estimated.
     sigma: float | None = None
+    #: Time [s] of the loaded state from which displacements and forces are counted; None: rest.
     reference: float | None = None
-    time: Floats | None = None
+    time: Floats | None = None  # (n,) [s], increasing
 
     @classmethod
     def read(
@@ -76,25 +62,14 @@ class Recording:
     ) -> Self | None:
         """Read a file.
 
-        Parameters
-        ----------
-        path : Path
-        frame : Frame
-            Unit and axes of the file, unless it states its own.
-        problems : Problems
-            Gets everything that is wrong with the file.
-        name, file, role
-            As in `Recording`.
-        sigma : float, optional
-            As `case.toml` has it: noise of one component in the unit of the file.
-        **given
-            The `keys` of the kind in SI units and RAS axes, None where `case.toml` says nothing; of a key that names a
-            file its path, with the text as `KEY_file`.
+        `frame`: unit and axes of the file, unless it states its own.
+        `problems`: gets everything that is wrong with the file.
+        `name`, `file`, `role`: as in `Recording`.
+        `sigma`: as `case.toml` has it: noise of one component in the unit of the file.
+        `**given`: the `keys` of the kind in SI units and RAS axes, None where `case.toml` says nothing; of a key that
+        names a file its path, with the text as `KEY_file`.
 
-        Returns
-        -------
-        Recording or None
-            None if there were problems.
+        Returns None if there were problems.
         """
         with collected(path, problems) as of_file:
             values, unit = cls._read(path, frame, of_file, given)
@@ -143,10 +118,7 @@ class Recording:
     def check(self, mesh: TetMesh, path: Path, problems: Problems) -> None:
         """Note as problems what cannot have been recorded of a body (its mesh at rest, without what was resected).
 
-        Raises
-        ------
-        InputError
-            If the mesh has nothing that it could have been recorded of.
+        `InputError` if the mesh has nothing that it could have been recorded of.
         """
 
     @property
@@ -164,16 +136,8 @@ class Recording:
         Numbers are written with all their digits: in metres reading gives the same ones back, in mm the same to
         rounding. What stands in `case.toml` (name, role, sigma, node set, boundary, mode) is not in the file.
 
-        Parameters
-        ----------
-        path : Path
-        frame : Frame
-            Unit and axes of the file.
-
-        Raises
-        ------
-        InputError
-            If the ending is not that of such a recording, or the file cannot be written.
+        `frame`: unit and axes of the file. `InputError` if the ending is not that of such a recording, or the file
+        cannot be written.
         """
         path = Path(path)
         if path.suffix.lower() != self.ending:
@@ -187,26 +151,16 @@ class Recording:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TrackedPoints:
-    """What a file tells of tracked points: where each was and how far it went.
+    """What a file tells of tracked points: where each was and how far it went."""
 
-    Attributes
-    ----------
-    points, displacement : (n, 3) array
-        [m], RAS.
-    time : (n,) array or None
-        [s]
-    ids : tuple of n str, or None
-    sigmas : (n,) array or None
-        Noise of one component of each point [m]; takes precedence over that of the recording.
-    weights : (n,) array or None
-    """
-
+    #: (n, 3) [m], RAS.
     points: Floats
     displacement: Floats
-    time: Floats | None = None
+    time: Floats | None = None  # (n,) [s]
     ids: tuple[str, ...] | None = None
+    #: (n,), noise of one component of each point [m]; takes precedence over that of the recording.
     sigmas: Floats | None = None
-    weights: Floats | None = None
+    weights: Floats | None = None  # (n,)
 
 
 def write_columns(path: Path, columns: Columns) -> None:
@@ -217,7 +171,7 @@ def write_columns(path: Path, columns: Columns) -> None:
         csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC).writerows(zip(*values, strict=True))
 
 
-def write_triangles(path: Path, points: Floats, faces: Ints, frame: Frame) -> None:
+def write_triangles(path: Path, points: Floats, faces: Int32s, frame: Frame) -> None:
     """Write a surface with points (n, 3) [m, RAS] and triangles (k, 3) as VTU."""
     import meshio
 

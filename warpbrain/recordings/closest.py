@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.errors import InputError
-
-Ints = NDArray[np.int32]
 
 #: Barycentric coordinates up to this are none.
 _ON = 1e-12
@@ -25,10 +23,7 @@ class Spheres:
 
     They are sorted by size so that few large ones do not widen the search for all others.
 
-    Parameters
-    ----------
-    centres : (m, 3) array
-    radii : (m,) array
+    `centres` (m, 3). `radii` (m,).
     """
 
     def __init__(self, centres: Floats, radii: Floats) -> None:
@@ -43,12 +38,12 @@ class Spheres:
             ids = np.flatnonzero(sizes == size)
             self._classes.append((cKDTree(centres[ids]), ids, float(radii[ids].max())))
 
-    def nearest(self, points: Floats, count: int) -> NDArray[np.int64]:
+    def nearest(self, points: Floats, count: int) -> Ints:
         """The `count` spheres, or all if there are fewer, whose centres are nearest to each point: (n, count)."""
         count = min(count, len(self._radii))
         return np.asarray(self._all.query(points, k=count)[1], dtype=np.int64).reshape(len(points), count)
 
-    def touching(self, points: Floats, reach: Floats) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    def touching(self, points: Floats, reach: Floats) -> Iterator[tuple[Ints, Ints]]:
         """All pairs (point, sphere) no farther apart than `reach` (n,) of the point, a batch at a time."""
         reach = reach * (1.0 + 1e-9)
         for tree, ids, largest in self._classes:
@@ -67,27 +62,15 @@ class Spheres:
 
 @dataclass(frozen=True, eq=False)
 class ClosestPoints:
-    """Closest points of a surface.
+    """Closest points of a surface."""
 
-    Attributes
-    ----------
-    position : (n, 3) array
-        Where they are.
-    face : (n,) int32 array
-        Triangle on which each lies; of several, the one with the smallest number.
-    weights : (n, 3) array
-        Barycentric coordinates there: not negative, their sum is 1.
-    distance : (n,) array
-        From the given point.
-    """
-
-    position: Floats
-    face: Ints
-    weights: Floats
-    distance: Floats
+    position: Floats  # (n, 3), where they are
+    face: Int32s  # (n,), triangle on which each lies; of several, the one with the smallest number
+    weights: Floats  # (n, 3), barycentric coordinates there: not negative, their sum is 1
+    distance: Floats  # (n,), from the given point
 
     @property
-    def features(self) -> NDArray[np.int64]:
+    def features(self) -> Ints:
         """On which feature (n,) of its triangle each lies, as `warpbrain.mesh.surface` numbers them."""
         zero = self.weights <= _ON
         edges = np.select([zero[:, 2], zero[:, 0], zero[:, 1]], [1, 2, 3], 0)
@@ -97,17 +80,11 @@ class ClosestPoints:
 def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> ClosestPoints:
     """Closest points of a surface, exact to rounding; triangles without area count as the segments they are.
 
-    Parameters
-    ----------
-    points : (n, 3) array
-    vertices : (v, 3) array
-    faces : (k, 3) array
-        Ids of vertices.
+    `points` (n, 3).
+    `vertices` (v, 3).
+    `faces` (k, 3): ids of vertices.
 
-    Raises
-    ------
-    InputError
-        If there are no faces.
+    `InputError` if there are no faces.
     """
     xyz = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     triangles = np.asarray(faces)
@@ -144,11 +121,11 @@ def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
 
 
 def _improve(
-    which: NDArray[np.int64],
-    candidates: NDArray[np.int64],
+    which: Ints,
+    candidates: Ints,
     points: Floats,
     corners: Floats,
-    face: NDArray[np.int64],
+    face: Ints,
     distance: Floats,
     weights: Floats,
 ) -> None:

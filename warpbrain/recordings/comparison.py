@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.tet_mesh import TetMesh
 from warpbrain.recordings.agreement import lengths, root_mean_square
 from warpbrain.recordings.closest import closest_points
-from warpbrain.recordings.location import Location, locate
+from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
-from warpbrain.recordings.times import rows_at
-
-Ints = NDArray[np.int32]
 
 
 def legacy_error(distances: ArrayLike) -> float:
@@ -27,33 +25,18 @@ def legacy_error(distances: ArrayLike) -> float:
     Its unit is the square root of a mm, not mm: it is the root of the mean distance, and no root mean square. It is
     here to stand beside published numbers, and for nothing else.
 
-    Parameters
-    ----------
-    distances : (n,) array or (n, 3) array
-        Distances or residual vectors [m].
-
-    Returns
-    -------
-    float
-        [sqrt(mm)]
+    `distances` (n,) or residual vectors (n, 3) [m]. Returns [sqrt(mm)].
     """
     return float(np.sqrt(np.mean(1000.0 * lengths(distances))))
 
 
 @dataclass(frozen=True)
 class Error:
-    """Distances in four numbers.
+    """Distances in four numbers."""
 
-    Attributes
-    ----------
-    root_mean_square, percentile_95, largest : float
-        In the unit of the comparison.
-    legacy : float or None
-        `legacy_error` [sqrt(mm)], of lengths only.
-    """
-
+    #: In the unit of the comparison.
     root_mean_square: float
-    legacy: float | None
+    legacy: float | None  # `legacy_error` [sqrt(mm)], of lengths only
     percentile_95: float
     largest: float
 
@@ -69,79 +52,53 @@ class Error:
         )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
-    """A recording beside a state.
+    """A recording beside a state."""
 
-    Attributes
-    ----------
-    name, kind, role : str
-        Of the recording.
-    unit : {"m", "N", "N m", "Pa"}
-        Of errors and residuals.
-    rows : (n,) int array
-        Rows of the recording that were compared.
-    before, after : Error
-        With nothing moved (or no force), and with the state. Of a surface: from each recorded point to the surface.
-    residuals_before, residuals_after : (n, 3) array
-        Recorded less computed, for each row. Of a surface: from its closest point to the recorded one. A component that
-        was not recorded is NaN.
-    reverse_before, reverse_after : Error or None
-        Of a surface: from each of its nodes to what was recorded; large where only a part of it was recorded.
-    noise : float or None
-        What the noise alone would leave of the root mean square; None if it is not known.
-    """
-
+    #: Of the recording.
     name: str
     kind: str
     role: str
-    unit: str
-    rows: NDArray[np.int64]
-    before: Error
-    after: Error
+    unit: str  # of errors and residuals: "m", "N", "N m" or "Pa"
+    rows: Ints  # (n,), rows of the recording that were compared
+    #: (n, 3), recorded less computed, for each row, with nothing moved (or no force), and with the state. Of a surface:
+    #: from its closest point to the recorded one. A component that was not recorded is NaN.
     residuals_before: Floats
     residuals_after: Floats
+    #: Of a surface: from each of its nodes to what was recorded; large where only a part of it was recorded.
     reverse_before: Error | None = None
     reverse_after: Error | None = None
-    noise: float | None = None
+    noise: float | None = None  # what the noise alone would leave of the root mean square; None if it is not known
 
     @property
     def count(self) -> int:
         """Rows that were compared."""
         return len(self.rows)
 
+    @cached_property
+    def before(self) -> Error:
+        """With nothing moved; of a surface: from each recorded point to the surface."""
+        return self._error(self.residuals_before)
 
-def compare_points(
-    recording: PointsRecording,
-    mesh: TetMesh,
-    u: ArrayLike,
-    time: float | None = None,
-    location: Location | None = None,
-    rows: NDArray[np.int64] | None = None,
-) -> Comparison:
+    @cached_property
+    def after(self) -> Error:
+        """With the state."""
+        return self._error(self.residuals_after)
+
+    def _error(self, residuals: Floats) -> Error:
+        # components count that were recorded throughout
+        return Error.of(residuals[:, np.isfinite(self.residuals_before).all(axis=0)], self.unit)
+
+
+def compare_points(recording: PointsRecording, mesh: TetMesh, u: ArrayLike, rows: Ints) -> Comparison:
     """Compare displacements of tracked points.
 
-    Parameters
-    ----------
-    recording : PointsRecording
-    mesh : TetMesh
-        At rest.
-    u : (N, 3) array
-        Displacement of the nodes [m].
-    time : float, optional
-        Of the state [s]; the recording's end if left out, see `rows_at`.
-    location : Location, optional
-        Of all points of the recording in the mesh, if it is known already.
-    rows : (n,) int array, optional
-        Those that are compared, whatever the time.
-
-    Raises
-    ------
-    InputError
-        If nothing was recorded at that time.
+    `mesh`: at rest.
+    `u` (N, 3): displacement of the nodes [m].
+    `rows` (n,): those that are compared, see `rows_at`.
     """
-    rows = rows_at(recording, time) if rows is None else rows
-    place = locate(mesh.points, mesh.tetrahedra, recording.points[rows]) if location is None else location.at(rows)
+    place = locate(mesh.points, mesh.tetrahedra, recording.points[rows])
     before = recording.displacement[rows]
     after = before - place.interpolate(u)
     squares = recording.sigma**2 if recording.sigma is not None else None
@@ -151,25 +108,14 @@ def compare_points(
     return _comparison(recording, rows, before, after, noise)
 
 
-def compare_surface(
-    recording: SurfaceRecording,
-    mesh: TetMesh,
-    u: ArrayLike,
-    time: float | None = None,
-    rows: NDArray[np.int64] | None = None,
-) -> Comparison:
+def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, rows: Ints) -> Comparison:
     """Compare a recorded surface with the moved faces of its node set, both ways.
 
     Parameters are those of `compare_points`. The way back goes from the nodes of these faces to the recorded triangles,
     or to the nearest recorded points if no triangles were recorded.
 
-    Raises
-    ------
-    InputError
-        If the mesh has no such node set, no boundary triangle has all its nodes in it, or nothing was recorded at that
-        time.
+    `InputError` if the mesh has no such node set, or no boundary triangle has all its nodes in it.
     """
-    rows = rows_at(recording, time) if rows is None else rows
     points = recording.points[rows]
     faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
     members = np.unique(faces)
@@ -182,28 +128,12 @@ def compare_surface(
     return replace(compared, reverse_before=reverse[0], reverse_after=reverse[1])
 
 
-def compare_force(
-    recording: ForceRecording,
-    reaction: ArrayLike,
-    time: float | None = None,
-    rows: NDArray[np.int64] | None = None,
-) -> Comparison:
+def compare_force(recording: ForceRecording, reaction: ArrayLike, rows: Ints) -> Comparison:
     """Compare the resultant of a boundary; components that were not recorded do not count.
 
-    Parameters
-    ----------
-    recording : ForceRecording
-    reaction : (3,) array
-        Force of the boundary on the tissue [N].
-    time, rows : optional
-        As in `compare_points`.
-
-    Raises
-    ------
-    InputError
-        If no component of the force was recorded, or nothing at that time.
+    `reaction` (3,): force of the boundary on the tissue [N]. `rows`: as in `compare_points`. `InputError` if no
+    component of the force was recorded.
     """
-    rows = rows_at(recording, time) if rows is None else rows
     before = recording.force[rows]
     recorded = np.isfinite(before).all(axis=0)
     if not recorded.any():
@@ -213,49 +143,26 @@ def compare_force(
     return _comparison(recording, rows, before, after, noise)
 
 
-def _comparison(
-    recording: Recording, rows: NDArray[np.int64], before: Floats, after: Floats, noise: float | None
-) -> Comparison:
-    """The comparison of residuals (n, 3), of whose components those count that were recorded throughout."""
-    unit, recorded = recording.noise_unit, np.isfinite(before).all(axis=0)
-    return Comparison(
-        name=recording.name,
-        kind=recording.kind,
-        role=recording.role,
-        unit=unit,
-        rows=rows,
-        before=Error.of(before[:, recorded], unit),
-        after=Error.of(after[:, recorded], unit),
-        residuals_before=before,
-        residuals_after=after,
-        noise=noise,
-    )
+def _comparison(recording: Recording, rows: Ints, before: Floats, after: Floats, noise: float | None) -> Comparison:
+    unit = recording.noise_unit
+    return Comparison(recording.name, recording.kind, recording.role, unit, rows, before, after, noise=noise)
 
 
 def joined(parts: Sequence[Comparison]) -> Comparison:
     """Comparisons of one recording with states of several times as one; of a surface the way back is of the last."""
     if len(parts) == 1:
         return parts[0]
-    before, after = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("residuals_before", "residuals_after")
-    )
-    recorded = np.isfinite(before).all(axis=0)
-    unit = parts[-1].unit
     noises = [part.noise for part in parts]
     squares = [part.count * noise**2 for part, noise in zip(parts, noises, strict=True) if noise is not None]
-    rows = np.concatenate([part.rows for part in parts])
-    return replace(
-        parts[-1],
-        rows=rows,
-        before=Error.of(before[:, recorded], unit),
-        after=Error.of(after[:, recorded], unit),
-        residuals_before=before,
-        residuals_after=after,
-        noise=float(np.sqrt(sum(squares) / len(rows))) if len(squares) == len(parts) else None,
+    rows, before, after = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("rows", "residuals_before", "residuals_after")
     )
+    noise = float(np.sqrt(sum(squares) / len(rows))) if len(squares) == len(parts) else None
+    return replace(parts[-1], rows=rows, residuals_before=before, residuals_after=after, noise=noise)
 
 
-def _to_recorded(nodes: Floats, points: Floats, faces: Ints | None) -> Floats:
+def _to_recorded(nodes: Floats, points: Floats, faces: Int32s | None) -> Floats:
     if faces is not None:
         return closest_points(nodes, points, faces).distance
     from scipy.spatial import cKDTree

@@ -20,29 +20,17 @@ FORCE = ("fx", "fy", "fz")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceRecording(Recording):
-    """The resultant with which a boundary acts on the tissue.
-
-    Attributes
-    ----------
-    boundary : str
-        Name of the boundary.
-    time : (n,) array
-        [s], increasing.
-    force : (n, 3) array
-        [N]; a component that was not recorded is NaN throughout.
-    torque : (n,) array or None
-        [N m]
-    """
+    """The resultant with which a boundary acts on the tissue."""
 
     kind: ClassVar[str] = "force"
     keys: ClassVar[tuple[Key, ...]] = (
         Key("boundary", "text", "Name of the boundary that acts with it.", needed=True),
         REFERENCE,
     )
-    boundary: str
-    time: Floats
-    force: Floats
-    torque: Floats | None = None
+    boundary: str  # name of the boundary
+    time: Floats  # (n,) [s], increasing
+    force: Floats  # (n, 3) [N]; a component that was not recorded is NaN throughout
+    torque: Floats | None = None  # (n,) [N m]
 
     @classmethod
     def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content:

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.mesh.surface import EDGES, FACES, paired_faces
 from warpbrain.recordings.closest import Spheres, closest_points
-
-Ints = NDArray[np.int32]
 
 # how far outside a tetrahedron a point is still inside: as a weight, and as a length in parts of the longest edge.
 # Rounding alone puts a point on a common face outside both of its tetrahedra
@@ -21,28 +19,16 @@ _WEIGHT, _LENGTH = 1e-9, 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Location:
-    """Points as weighted nodes.
+    """Points as weighted nodes."""
 
-    Attributes
-    ----------
-    nodes : (n, 4) int32 array
-        Nodes of the tetrahedron that each point is in, or that has the nearest face of the boundary.
-    weights : (n, 4) array
-        Values of the shape functions, their sum is 1. Outside the mesh they are those of the closest point of its
-        boundary.
-    distance : (n,) array
-        Distance to the mesh [m], zero inside.
-    edge : (n,) array
-        Mean length of the edges of the tetrahedron [m].
-    element : (n,) int64 array
-        Number of the tetrahedron; inside the mesh `nodes` are in the order of its corners.
-    """
-
-    nodes: Ints
+    nodes: Int32s  # (n, 4), of the tetrahedron that each point is in, or that has the nearest face of the boundary
+    #: (n, 4), values of the shape functions, their sum is 1. Outside the mesh they are those of the closest point of
+    #: its boundary.
     weights: Floats
-    distance: Floats
-    edge: Floats
-    element: NDArray[np.int64]
+    distance: Floats  # (n,), distance to the mesh [m], zero inside
+    edge: Floats  # (n,), mean length of the edges of the tetrahedron [m]
+    #: (n,), number of the tetrahedron; inside the mesh `nodes` are in the order of its corners.
+    element: Ints
 
     def __len__(self) -> int:
         return len(self.nodes)
@@ -58,23 +44,13 @@ class Location:
         rows = np.repeat(np.arange(len(self)), 4)
         return csr_matrix((self.weights.ravel(), (rows, self.nodes.ravel())), shape=(len(self), count))
 
-    def at(self, rows: ArrayLike) -> Location:
-        """The location of some of the points, by their numbers."""
-        chosen = np.asarray(rows)
-        return Location(*(values[chosen] for values in vars(self).values()))
-
 
 def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> Location:
     """Find points in a mesh, or the closest points of its boundary.
 
-    Parameters
-    ----------
-    mesh_points : (N, 3) array
-        Nodes [m].
-    tetrahedra : (m, 4) array
-        Node ids.
-    points : (n, 3) array
-        What to find [m].
+    `mesh_points` (N, 3): nodes [m].
+    `tetrahedra` (m, 4): node ids.
+    `points` (n, 3): what to find [m].
     """
     nodes = np.asarray(mesh_points, dtype=np.float64)
     tets = np.asarray(tetrahedra)
@@ -104,13 +80,13 @@ def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> 
     return Location(members, weights, distance, edge, owner)
 
 
-def _containing(corners: Floats, points: Floats) -> NDArray[np.int64]:
+def _containing(corners: Floats, points: Floats) -> Ints:
     """Number of a tetrahedron (m, 4, 3) that each point is in, -1 if it is in none."""
     centres = corners.mean(axis=1)
     spheres = Spheres(centres, np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1))
     element = np.full(len(points), -1, dtype=np.int64)
 
-    def depth(which: NDArray[np.int64], candidates: NDArray[np.int64]) -> Floats:
+    def depth(which: Ints, candidates: Ints) -> Floats:
         """The least weight, -inf if the point is not inside."""
         # of most meshes few tetrahedra are near any point
         near, of = np.unique(candidates, return_inverse=True)

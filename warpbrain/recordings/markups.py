@@ -31,20 +31,11 @@ COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 
 @dataclass(frozen=True, eq=False)
 class Markup:
-    """Control points of a file, or electrodes.
+    """Control points of a file, or electrodes."""
 
-    Attributes
-    ----------
-    points : (n, 3) array
-        [m, RAS]
-    labels : tuple of str
-        May be empty.
-    moved_text : callable
-        From other positions (n, 3) [m, RAS] to the text of the file that has them; all else in it stays as it is.
-    """
-
-    points: Floats
-    labels: tuple[str, ...]
+    points: Floats  # (n, 3) [m, RAS]
+    labels: tuple[str, ...]  # may be empty
+    #: From other positions (n, 3) [m, RAS] to the text of the file that has them; all else in it stays as it is.
     moved_text: Callable[[Floats], str]
 
 

@@ -32,15 +32,7 @@ from warpbrain.recordings.tracked_points import tracked_points
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PointsRecording(TrackedPoints, Recording):
-    """Tracked points of a case.
-
-    Attributes
-    ----------
-    outside : {"error", "nearest"}
-        What a point farther outside the mesh than a local edge is: a mistake, or observed at the nearest point of it.
-    moved_file : str or None
-        Where the second positions came from, if start and end are files of their own (Slicer markups).
-    """
+    """Tracked points of a case."""
 
     kind: ClassVar[str] = "points"
     keys: ClassVar[tuple[Key, ...]] = (
@@ -54,7 +46,10 @@ class PointsRecording(TrackedPoints, Recording):
         ),
         REFERENCE,
     )
+    #: What a point farther outside the mesh than a local edge is: a mistake, or observed at the nearest point of it:
+    #: "error" or "nearest".
     outside: str = "error"
+    #: Where the second positions came from, if start and end are files of their own (Slicer markups).
     moved_file: str | None = None
 
     @classmethod
@@ -109,18 +104,8 @@ def distinct_rows(recording: PointsRecording, rows: Ints) -> tuple[Ints, Floats]
     of their own, two of half a weight would not be one: a gross error would have to strike each by itself, and what
     neighbours share grows with the noise of each.
 
-    Parameters
-    ----------
-    recording : PointsRecording
-    rows : (k,) int array
-        Those to look at.
-
-    Returns
-    -------
-    rows : (m,) int64 array
-        The first of each, in the order in which they were given.
-    weights : (m,) array
-        Sums of the weights of each and its copies; rows without a weight have that of one.
+    `rows` (k,): those to look at. Returns `rows` (m,): the first of each, in the order in which they were given;
+    `weights` (m,): sums of the weights of each and its copies; rows without a weight have that of one.
     """
     weights = np.ones(len(rows)) if recording.weights is None else recording.weights[rows]
     columns_of = [recording.points, recording.displacement, recording.time, recording.sigmas]

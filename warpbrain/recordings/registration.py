@@ -15,21 +15,11 @@ from warpbrain.errors import InputError
 class Registration:
     """How far a registration may be wrong: one standard deviation each, normal.
 
-    Attributes
-    ----------
-    shift : float
-        Of each component of a shift [m].
-    turn : float
-        Of each component of a rotation vector [rad].
-
-    Raises
-    ------
-    InputError
-        If one is not a positive number.
+    `InputError` if one is not a positive number.
     """
 
-    shift: float
-    turn: float
+    shift: float  # of each component of a shift [m]
+    turn: float  # of each component of a rotation vector [rad]
 
     def __post_init__(self) -> None:
         for name, value in (("shift", self.shift), ("turn", self.turn)):

@@ -8,12 +8,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.surface import Ints
 from warpbrain.problems import Problems
 from warpbrain.recordings.base import (
     POSITION,
@@ -35,29 +34,17 @@ NORMAL = ("nx", "ny", "nz")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SurfaceRecording(Recording):
-    """Points on a moved surface, unpaired: compared with the moved faces of a node set.
-
-    Attributes
-    ----------
-    points : (n, 3) array
-        [m]
-    nodes : str
-        Name of the node set whose faces are the surface.
-    normals : (n, 3) array or None
-        Unit normals.
-    faces : (k, 3) int array or None
-        Triangles, if a surface mesh was recorded.
-    """
+    """Points on a moved surface, unpaired: compared with the moved faces of a node set."""
 
     kind: ClassVar[str] = "surface"
     keys: ClassVar[tuple[Key, ...]] = (
         Key("nodes", "text", "Node set whose faces are compared with it.", needed=True),
         REFERENCE,
     )
-    points: Floats
-    nodes: str
-    normals: Floats | None = None
-    faces: Ints | None = None
+    points: Floats  # (n, 3) [m]
+    nodes: str  # name of the node set whose faces are the surface
+    normals: Floats | None = None  # (n, 3), unit normals
+    faces: Int32s | None = None  # (k, 3), triangles, if a surface mesh was recorded
 
     @classmethod
     def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content:

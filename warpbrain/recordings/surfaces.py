@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.frame import AXES
 from warpbrain.mesh.files import LARGEST_FILE, ends_inside_a_number
 from warpbrain.mesh.patience import patience
@@ -17,8 +16,6 @@ from warpbrain.mesh.vtu import axes_of_vtu, read_vtu
 from warpbrain.problems import Problems, Unreadable
 from warpbrain.recordings.tables import LARGEST
 from warpbrain.recordings.text import require_readable, shown
-
-Ints = NDArray[np.int32]
 
 # cells that have no area: markers, outlines and the points of point clouds
 _WITHOUT_AREA = ("vertex", "line", "line3", "polyline")
@@ -39,7 +36,7 @@ class SurfaceMesh:
     """Points (n, 3) as the file has them, triangles (k, 3) or None for a cloud of points, and the axes it states."""
 
     points: Floats
-    faces: Ints | None
+    faces: Int32s | None
     axes: str | None
 
 

@@ -27,16 +27,9 @@ LARGEST = 1e12
 class Table:
     """A table as it was read: cells that are asked for are checked, and what is wrong is added to `problems`.
 
-    Parameters
-    ----------
-    path : Path
-    header : list of str
-        Names of the columns.
-    cells : list of rows
-        Each as long as the header.
-    rows : list of int
-        Line in the file of each row, counted from 1.
-    problems : Problems
+    `header`: names of the columns.
+    `cells`: each as long as the header.
+    `rows`: line in the file of each row, counted from 1.
     """
 
     def __init__(
@@ -63,9 +56,9 @@ class Table:
         missing = [name for name in names if name not in self.header]
         for name in missing:
             near = _nearest(name, self.header)
-            found = ", ".join(f"{column}" for column in self.header[:8]) + (", ..." if len(self.header) > 8 else "")
+            columns = ", ".join(self.header[:8]) + (", ..." if len(self.header) > 8 else "")
             cure = f"is {shown(near)} meant?" if near else ""
-            self._problems.add(self.path, "header", f"found no column '{name}', found {found[:100]}", cure)
+            self._problems.add(self.path, "header", f"found no column '{name}', found {columns[:100]}", cure)
         return not missing
 
     def require(self, *names: str) -> None:
@@ -144,18 +137,9 @@ class Table:
 def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table:
     """Read a CSV file.
 
-    Parameters
-    ----------
-    path : Path
-    problems : Problems
-        Gets everything that is wrong; rows that are too long or too short are left out of the table.
-    known : sequence of str
-        Columns that mean something: none of them may be there twice.
-
-    Raises
-    ------
-    Unreadable
-        If there is no table to speak of: no readable text, no header or no rows.
+    `problems`: gets everything that is wrong; rows that are too long or too short are left out of the table. `known`:
+    columns that mean something: none of them may be there twice. `Unreadable` if there is no table to speak of: no
+    readable text, no header or no rows.
     """
     text = read_text(path, problems)
     remark_open_end(path, text, problems)

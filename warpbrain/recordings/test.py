@@ -32,27 +32,7 @@ Z = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TestRecording(Recording):
-    """A laboratory test on a specimen: what was imposed and what it answered.
-
-    Attributes
-    ----------
-    mode : {"axial", "shear", "torsion", "confined", "biaxial"}
-        Confined: axial between lubricated walls that let it widen nowhere. Biaxial: stretched alike along x and y, its
-        thickness along z free; its stress is along x.
-    quantities : (str, str)
-        ``("displacement", "force")`` [m, N], ``("stretch", "stress")`` [1, Pa nominal] or ``("angle", "torque")``
-        [rad, N m].
-    imposed, response : (n,) array
-    time : (n,) array or None
-        [s], increasing.
-    specimen : str
-        Which one was tested, where tests of a case are of several of one shape; empty: the one.
-    axis, sheared : (float, float, float)
-        Directions of the tissue along the machine's axis z, and along its x, in which it shears; of any length but
-        zero. Of `sheared` what is across the axis counts.
-    control : {"displacement", "force"}
-        What the machine imposed; `sigma` is of what answered.
-    """
+    """A laboratory test on a specimen: what was imposed and what it answered."""
 
     # not a test of pytest's
     __test__ = False
@@ -80,14 +60,20 @@ class TestRecording(Recording):
         Key("axis", "vector", "Direction of the tissue along the machine's axis z; z if absent."),
         Key("sheared", "vector", "Direction of the tissue along the machine's x, in which it shears; x if absent."),
     )
+    #: Confined: axial between lubricated walls that let it widen nowhere. Biaxial: stretched alike along x and y, its
+    #: thickness along z free; its stress is along x.
     mode: str
+    #: ``("displacement", "force")`` [m, N], ``("stretch", "stress")`` [1, Pa nominal] or ``("angle", "torque")``
+    #: [rad, N m].
     quantities: tuple[str, str]
-    imposed: Floats
-    response: Floats
-    specimen: str = ""
+    imposed: Floats  # (n,)
+    response: Floats  # (n,)
+    specimen: str = ""  # which one was tested, where tests of a case are of several of one shape; empty: the one
+    #: Directions of the tissue along the machine's axis z, and along its x, in which it shears; of any length but zero.
+    #: Of `sheared` what is across the axis counts.
     axis: tuple[float, float, float] = Z
     sheared: tuple[float, float, float] | None = None
-    control: str = "displacement"
+    control: str = "displacement"  # what the machine imposed, or "force"; `sigma` is of what answered
 
     @classmethod
     def _read(cls, path: Path, frame: Frame, problems: Problems, given: dict[str, Any]) -> Content:
@@ -202,10 +188,7 @@ def turn_of(axis: tuple[float, float, float], sheared: tuple[float, float, float
 
     Without `sheared` the machine's x is what of the tissue's is across the axis, or of its y where that is little.
 
-    Raises
-    ------
-    InputError
-        If one of them is zero, or they are one direction.
+    `InputError` if one of them is zero, or they are one direction.
     """
     z = np.array(axis, dtype=np.float64)
     if not np.linalg.norm(z) > 0.0:

@@ -57,16 +57,8 @@ def require_readable(path: Path, problems: Problems) -> None:
 def read_text(path: Path, problems: Problems) -> str:
     """The text of a UTF-8 file, with or without byte order mark.
 
-    Parameters
-    ----------
-    path : Path
-    problems : Problems
-        Gets what is wrong: no such file, a folder, no permission, nothing in it, larger than `LIMIT`, not UTF-8.
-
-    Raises
-    ------
-    Unreadable
-        If there was a problem.
+    `problems`: gets what is wrong: no such file, a folder, no permission, nothing in it, larger than `LIMIT`, not
+    UTF-8. `Unreadable` if there was a problem.
     """
     require_readable(path, problems)
     try:

@@ -35,28 +35,15 @@ def compared_rows(recording: Recording) -> Ints:
 
 
 def rows_at(recording: Recording, time: float | None = None) -> Ints:
-    """Ints that say what was so at a time.
+    """Rows that say what was so at a time.
 
     Without a time it is the end: every row of points or of a surface that has no times; of points with ids the last row
     of each; else the rows of the last time. At a time it is the rows of the recorded time nearest to it, the earlier of
     two, and of each id its own. They count if that is no farther away than half the median interval between the
     recording's times; a recording of one time must have that very time.
 
-    Parameters
-    ----------
-    recording : Recording
-    time : float, optional
-        [s]
-
-    Returns
-    -------
-    (k,) int64 array
-        Row numbers, increasing, at least one.
-
-    Raises
-    ------
-    InputError
-        If nothing was recorded at that time, or the recording has no times.
+    `time` [s]. Returns (k,): row numbers, increasing, at least one. `InputError` if nothing was recorded at that time,
+    or the recording has no times.
     """
     times = recording.time
     if times is None:

@@ -31,20 +31,11 @@ def added_readers() -> dict[str, Reader]:
 def tracked_points(path: Path, frame: Frame, moved: Path | None, problems: Problems) -> TrackedPoints:
     """Points of a file.
 
-    Parameters
-    ----------
-    path : Path
-    frame : Frame
-        Unit and axes of a CSV file; all others state theirs.
-    moved : Path or None
-        The second markup of a pair.
-    problems : Problems
-        Gets what is wrong.
+    `frame`: unit and axes of a CSV file; all others state theirs.
+    `moved`: the second markup of a pair.
+    `problems`: gets what is wrong.
 
-    Raises
-    ------
-    Unreadable
-        If there is nothing to be had of the file.
+    `Unreadable` if there is nothing to be had of the file.
     """
     ending = path.suffix.lower()
     if is_markup(path):

@@ -14,29 +14,24 @@ from xml.etree import ElementTree as XML
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.mesh.files import LARGEST_FILE
-
-Ints = NDArray[np.int32]
 
 _TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}
 _TYPES |= {"Float32": "f4", "Float64": "f8", "String": "i1"}
 _APPENDED = re.compile(rb"<AppendedData[^>]*?encoding=\"(\w+)\"[^>]*>\s*_")
 
 
-def read_vtp(path: Path) -> tuple[Floats, Ints, str | None]:
+def read_vtp(path: Path) -> tuple[Floats, Int32s, str | None]:
     """Points (n, 3), triangles (k, 3) and the axes that the file states (a field ``SPACE``, as Slicer writes it).
 
     Polygons are cut into fans of triangles, strips into their triangles; vertices and lines are left out.
 
-    Raises
-    ------
-    ValueError
-        With what is wrong, if it is no such file.
+    `ValueError`: with what is wrong, if it is no such file.
     """
     file = _File(path.read_bytes())
     points: list[Floats] = [np.empty((0, 3))]
-    triangles: list[Ints] = [np.empty((0, 3), dtype=np.int32)]
+    triangles: list[Int32s] = [np.empty((0, 3), dtype=np.int32)]
     first = 0
     for piece in file.root.findall("./PolyData/Piece"):
         array = piece.find("./Points/DataArray")
@@ -117,7 +112,7 @@ def _take(data: bytes, count: int, coded: bool) -> bytes:
     return content
 
 
-def _fans(ids: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.int64]:
+def _fans(ids: Ints, ends: Ints) -> Ints:
     lengths = np.diff(ends, prepend=0)
     extra = np.maximum(lengths - 2, 0)
     start = np.repeat(ends - lengths, extra)
@@ -125,7 +120,7 @@ def _fans(ids: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.stack([ids[start], ids[start + step + 1], ids[start + step + 2]], axis=1)
 
 
-def _strips(ids: NDArray[np.int64], ends: NDArray[np.int64]) -> NDArray[np.int64]:
+def _strips(ids: Ints, ends: Ints) -> Ints:
     lengths = np.diff(ends, prepend=0)
     extra = np.maximum(lengths - 2, 0)
     step = np.arange(extra.sum()) - np.repeat(np.cumsum(extra) - extra, extra)

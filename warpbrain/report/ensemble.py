@@ -13,7 +13,7 @@ from warpbrain.atomic import whole_file
 from warpbrain.ensemble.results import EnsembleResult, Fields, Row, Spread
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
-from warpbrain.report.files import MILLIMETRES, body_file, sets_of, write_body, write_csv
+from warpbrain.report.files import MILLIMETRES, body_file, sets_of, write_csv
 from warpbrain.report.page import lines
 from warpbrain.report.summary import SET_TITLES, sizes_mm
 
@@ -103,17 +103,12 @@ def write_table(folder: Path, rows: list[dict[str, Any]]) -> list[str]:
     return ["samples.csv", "samples.parquet"]
 
 
-def write_fields(path: Path, fields: Fields) -> None:
-    """Write the fields as compressed VTU, coordinates and displacement in mm.
+def file_of_fields(fields: Fields) -> Any:
+    """The fields as a `meshio.Mesh`, coordinates and displacement in mm.
 
     Point arrays: ``displacement_mean``, ``displacement_sd`` and ``displacement_pNN``, of each component; ``size_mean``
     and so on, of the displacement's size; and the node sets. Cell array: ``tissue``.
     """
-    write_body(path, file_of_fields(fields))
-
-
-def file_of_fields(fields: Fields) -> Any:
-    """What `write_fields` writes, as a `meshio.Mesh`."""
     arrays = sets_of(fields.mesh.node_sets)
     for name, spread in (("displacement", fields.components), ("size", fields.size)):
         percentiles = {f"p{level:02d}": values for level, values in spread.percentiles.items()}

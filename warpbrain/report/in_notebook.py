@@ -38,21 +38,21 @@ def html(what: Any) -> str:
     InputError
         If it is none of these.
     """
-    return str(part("notebook", *_told(what)))
+    return str(part("notebook", *_table(what)))
 
 
 @singledispatch
-def _told(what: Any) -> tuple[str, Rows]:
+def _table(what: Any) -> tuple[str, Rows]:
     raise InputError(f"what: expected a result or a case, found {type(what).__name__}")
 
 
-@_told.register
+@_table.register
 def _(what: Case) -> tuple[str, Rows]:
     title, *lines = show_lines(what)
     return title, [(line.strip().split("  ")[0], " ".join(line.split()[1:])) for line in lines]
 
 
-@_told.register
+@_table.register
 def _(what: Result) -> tuple[str, Rows]:
     rows = [
         (SET_TITLES.get(name, name), f"mean {s['mean']:.3g} mm, at most {s['largest']:.3g} mm, {s['nodes']} nodes")
@@ -65,7 +65,7 @@ def _(what: Result) -> tuple[str, Rows]:
     return "Displacement", rows
 
 
-@_told.register
+@_table.register
 def _(what: Run) -> tuple[str, Rows]:
     largest = MILLIMETRES * float(np.linalg.norm(what.u, axis=1).max())
     rows = [("state", what.followed.solution["kind"]), ("moves by at most", f"{largest:.3g} mm")]
@@ -73,20 +73,20 @@ def _(what: Run) -> tuple[str, Rows]:
     return what.case.title, rows + [("left out", sentence) for sentence in left_out(what.model)]
 
 
-@_told.register
+@_table.register
 def _(what: SpecimenRun) -> tuple[str, Rows]:
     fits = ((t, "" if math.isnan(t.result.r_squared) else f"; R² {t.result.r_squared:.4f}") for t in what.tests)
     return what.case.title, [(t.recording.name, _before_after(t.comparison) + fit) for t, fit in fits]
 
 
-@_told.register
+@_table.register
 def _(what: Posterior) -> tuple[str, Rows]:
     rows = [(m.parameter.tissue, _marginal(m)) for m in what.marginals]
     rows += [("recordings", sentence) for sentence in what.identifiability.sentences]
     return f"Tissue of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
 
 
-@_told.register
+@_table.register
 def _(what: Diagnosis | SpecimenDiagnosis) -> tuple[str, Rows]:
     rows = [("verdict", what.sentence)]
     rows += [
@@ -96,7 +96,7 @@ def _(what: Diagnosis | SpecimenDiagnosis) -> tuple[str, Rows]:
     return f"Diagnosis of: {what.case.title}", rows + [("doubt", doubt) for doubt in what.doubts]
 
 
-@_told.register
+@_table.register
 def _(what: EnsembleResult) -> tuple[str, Rows]:
     first, *rest = ensemble_lines(describe_ensemble(what))
     return first, [("", line) for line in rest if line]

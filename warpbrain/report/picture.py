@@ -78,10 +78,7 @@ def pictures_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str],
     `whole` is the anatomy before anything was resected, `mesh` what is left of it, of whose nodes u (n, 3) [m] is the
     displacement; `names` are those of the tissues by label.
 
-    Raises
-    ------
-    RenderingError
-        If nothing can be rendered here.
+    `RenderingError` if nothing can be rendered here.
     """
     scene = scene_of(whole, mesh, u, names, moved)
     cameras = cameras_of(scene)

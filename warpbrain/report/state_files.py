@@ -44,10 +44,7 @@ class SavedState:
 def read_state(result: Path) -> SavedState:
     """Open the deformed body of a result: of a folder that a command has written, or a file of `FILES`.
 
-    Raises
-    ------
-    InputError
-        Naming the file, what was found and what was expected.
+    `InputError`, naming the file, what was found and what was expected.
     """
     path = result
     if result.is_dir():

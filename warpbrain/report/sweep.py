@@ -49,10 +49,7 @@ def write_sweep(path: Path, header: list[str], points: Iterable[SweepPoint]) -> 
 def read_sweep(path: Path, header: list[str], tissues: int) -> tuple[dict[Steps, SweepPoint], int]:
     """Points of a file that an interrupted sweep left, by their `k`, and how many of its lines are damaged.
 
-    Raises
-    ------
-    InputError
-        If it is not such a file, or is of other inputs.
+    `InputError` if it is not such a file, or is of other inputs.
     """
     if not path.exists():
         return {}, 0
@@ -99,10 +96,7 @@ Estimated = tuple[float, float, float]
 def estimated_in(path: Path) -> dict[str, Estimated]:
     """Shear moduli of tissues, by name, that an `estimate.json` says; none if there is no such file.
 
-    Raises
-    ------
-    InputError
-        If it is not what `describe_estimate` says.
+    `InputError` if it is not what `describe_estimate` says.
     """
     if not path.exists():
         return {}

@@ -83,13 +83,7 @@ class SavedResult:
 
 
 def read_result(folder: Path) -> SavedResult:
-    """Open a folder of results.
-
-    Raises
-    ------
-    InputError
-        If it holds none, or they cannot be read.
-    """
+    """Open a folder of results; `InputError` if it holds none, or they cannot be read."""
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder")
     name = next((name for name in _KINDS if (folder / name).is_file()), None)
@@ -129,10 +123,7 @@ def difference(first: SavedState, second: SavedState) -> dict[str, Any]:
     Over the ``nodes`` that are in both bodies, ``outside`` those that are not in the second: root mean squares, by the
     volume that belongs to each node, of the difference and of either displacement there, and where it is largest (RAS).
 
-    Raises
-    ------
-    InputError
-        If they are nowhere in one place.
+    `InputError` if they are nowhere in one place.
     """
     mesh, second_mesh = first.mesh, second.mesh
     size = float(np.ptp(mesh.points, axis=0).max())

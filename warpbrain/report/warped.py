@@ -68,13 +68,7 @@ class WarpRequest:
 
 
 def read_request(image: Path | None, labels: Path | None, points: Sequence[Path]) -> WarpRequest:
-    """Read what is to be warped.
-
-    Raises
-    ------
-    InputError
-        Naming the file, what was found and what was expected.
-    """
+    """Read what is to be warped. `InputError`, naming the file, what was found and what was expected."""
     require("nibabel", "nibabel", "writing of images")
     request = WarpRequest(
         None if image is None else read_image(image),
@@ -111,10 +105,7 @@ def write_warped(
 ) -> tuple[list[str], list[str]]:
     """Write all that a state and what is asked for give; returns what a user should read, and names of the files.
 
-    Raises
-    ------
-    InputError
-        If the image is not of the body.
+    `InputError` if the image is not of the body.
     """
     source = request.grid_of
     check_place(request, state.mesh, state.path)

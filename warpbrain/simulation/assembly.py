@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh
 
@@ -97,7 +97,7 @@ class Assembly:
         #: Node ids (m, 4), ascending: every stored block then belongs to an upper block of the matrix. Odd permutations
         #: turn an element inside out, which nothing notices: gradients do not depend on the order, volumes are taken
         #: before it.
-        self.tetrahedra: NDArray[np.int32] = np.sort(mesh.tetrahedra, axis=1)
+        self.tetrahedra: Int32s = np.sort(mesh.tetrahedra, axis=1)
         edges = mesh.points[self.tetrahedra[:, 1:]] - mesh.points[self.tetrahedra[:, :1]]
         #: Inverse edge matrices (m, 3, 3); their rows are the gradients of the shape functions of nodes 1 to 3.
         self.shape_gradients: Floats = np.linalg.inv(edges.transpose(0, 2, 1)).astype(np.float64, copy=False)

@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.assembly import dynamics_kernels
 from warpbrain.kernels.linear import LinearResult
@@ -161,7 +161,7 @@ class Simulator:
             self.system.external.assign(model.external_forces(self.time + self._h))
             self._external_factor, self._external_of = factors, model
 
-    def prescribe(self, displacement: NDArray[np.float64]) -> None:
+    def prescribe(self, displacement: Floats) -> None:
         """Move the constrained components to a displacement [m], shape (n, 3), in the coming step; then they rest."""
         velocity = (displacement - self.system.u.numpy()) / self._h
         velocity[~self.system.model.constrained] = 0.0
@@ -174,7 +174,7 @@ class Simulator:
         self.restore(rest, rest, 0.0)
         self.system.forget()
 
-    def restore(self, u: NDArray[np.float64], v: NDArray[np.float64], time: float) -> None:
+    def restore(self, u: Floats, v: Floats, time: float) -> None:
         """Set displacement [m] and velocity [m/s], both (n, 3), and time [s].
 
         Of terms with a memory this is for a step back only: the last step is taken to be undone.

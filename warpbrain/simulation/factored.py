@@ -12,9 +12,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.simulation.sparse_factors import SparseFactors
 
 #: Iterations of a solve with factors that are near, and how many beyond these a factorisation takes as long as.
@@ -25,11 +24,11 @@ class KeptFactors:
     """Of the stiffness of the last state that they were renewed at; of none at first."""
 
     def __init__(self) -> None:
-        self._free: NDArray[np.bool_] | None = None
+        self._free: Bools | None = None
         self._factors: Any = None
         self._wasted = 0
 
-    def serve(self, free: NDArray[np.bool_]) -> bool:
+    def serve(self, free: Bools) -> bool:
         """Whether there are any for these free components (3 n,), near enough to be worth keeping."""
         return self._free is not None and self._wasted <= _WORTH and np.array_equal(self._free, free)
 
@@ -37,7 +36,7 @@ class KeptFactors:
         """Take notice of how many iterations a solve took with them."""
         self._wasted += max(iterations - _NEAR, 0)
 
-    def renew(self, stiffness: Any, free: NDArray[np.bool_]) -> bool:
+    def renew(self, stiffness: Any, free: Bools) -> bool:
         """Factorise a stiffness [N/m], SciPy (3 n, 3 n), on its free components (3 n,); False if it is singular."""
         self._free, self._wasted = None, 0
         try:

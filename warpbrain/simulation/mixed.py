@@ -26,7 +26,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats, Ints
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.kernels.nodal_volume import nodal_volume_kernels
 from warpbrain.physics.term import Body, Term
 
@@ -48,7 +48,7 @@ class NodalVolumeTerm(_PatchTerm):
     2`; `kinds` (m,) are `warpbrain.simulation.model.Model.element_kinds`.
     """
 
-    def __init__(self, body: Body, logarithmic: NDArray[np.bool_], kinds: Ints) -> None:
+    def __init__(self, body: Body, logarithmic: Bools, kinds: Ints) -> None:
         assert body.quadratic is not None
         super().__init__(body, body.quadratic.elements)
         p, mesh = body.precision, body.mesh

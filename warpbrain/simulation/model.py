@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.errors import InputError, require_kind
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
 from warpbrain.mesh.surface import connected
@@ -231,7 +231,7 @@ class Model:
         return part
 
     @cached_property
-    def element_kinds(self) -> NDArray[np.int64]:
+    def element_kinds(self) -> Ints:
         """Number (m,) by which elements are alike that are of one tissue and are taken out by the same mechanisms.
 
         A mean over elements of several kinds would hold the wall of a cavity, however little of it is left.
@@ -372,7 +372,7 @@ def require_held(model: Model) -> None:
 
 
 @lru_cache(maxsize=4)
-def _connected_parts(mesh: TetMesh) -> tuple[int, NDArray[np.int32]]:
+def _connected_parts(mesh: TetMesh) -> tuple[int, Int32s]:
     """How many there are, and which of them each node (n,) belongs to; a mesh is asked for every state of it."""
     links = np.column_stack([np.repeat(mesh.tetrahedra[:, 0], 3), mesh.tetrahedra[:, 1:].ravel()])
     part = connected(links, len(mesh.points))

@@ -71,7 +71,7 @@ def observe(
 def _rows_by_time(
     case: Case, recording: Recording, time: float | None, states: Mapping[float, State]
 ) -> list[tuple[float, Ints]]:
-    """Ints of a recording that are compared, by the time of the state that they are compared with."""
+    """Rows of a recording that are compared, by the time of the state that they are compared with."""
     assert isinstance(recording, PointsRecording | SurfaceRecording | ForceRecording)
     times = times_of(recording)
     rows = compared_rows(recording)
@@ -118,15 +118,15 @@ def _compared(
 ) -> Comparison:
     u = state.u if before is None else state.u - before.u
     if isinstance(recording, PointsRecording):
-        return compare_points(recording, state.mesh, u, rows=rows)
+        return compare_points(recording, state.mesh, u, rows)
     if isinstance(recording, SurfaceRecording):
-        return compare_surface(recording, state.mesh, u, rows=rows)
+        return compare_surface(recording, state.mesh, u, rows)
     assert isinstance(recording, ForceRecording)  # tests belong to specimens, which have no such state
     force = _resultant(case, recording, state, time)
     if before is not None:
         assert recording.reference is not None
         force = force - _resultant(case, recording, before, recording.reference)
-    return compare_force(recording, force, rows=rows)
+    return compare_force(recording, force, rows)
 
 
 def _resultant(case: Case, recording: ForceRecording, result: State, time: float) -> Floats:

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError, require_kind
 from warpbrain.kernels.precision import Precision
 from warpbrain.simulation.dynamics import PhaseClock, Simulator
@@ -39,8 +39,8 @@ class RelaxationStep:
 class Relaxed:
     """A state at rest."""
 
-    u: NDArray[np.float64]  # displacement (n, 3) [m]
-    internal: NDArray[np.float64]  # forces (n, 3) [N]
+    u: Floats  # displacement (n, 3) [m]
+    internal: Floats  # forces (n, 3) [N]
     residual: float  # relative out-of-balance force
     tolerance: float  # what that was to be in this precision
     history: tuple[RelaxationStep, ...]

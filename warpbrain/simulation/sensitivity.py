@@ -26,7 +26,7 @@ phantom's 4187 nodes (2-core CPU, 2026-11), longer than two parameters take by c
 device, and its fill grows faster than the mesh.
 
 Contact that is stuck, slides or lifts off, a falx or a resection that is there or not: nothing lies between two such
-states, and so there is no derivative. The whole difference stands where a derivative would (`secant`).
+states, and so there is no derivative. The whole difference stands where a derivative would.
 """
 
 from __future__ import annotations
@@ -40,13 +40,12 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import SolveError
 from warpbrain.kernels.linear import LinearSolver
 from warpbrain.physics.term import Term
-from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.system import System
 
@@ -222,8 +221,7 @@ class SensitivitySolver:
 
         `u` (n, 3) [m] is in equilibrium under the model of `theta` (p,) at full load. `models`, from parameters (p,) to
         a model that differs from the system's in numbers only, is smooth and defined a little around `theta`. `scales`
-        (p,) say by how much each must change to change much, as `warpbrain.physics.continuous.scales_of` does; by
-        default its size, or 1 if that is less or nothing.
+        (p,) say by how much each must change to change much; by default its size, or 1 if that is less or nothing.
 
         `SolveError` if the equilibrium is unstable, so that it has no derivative, or a linear solve does not converge;
         or if it is that of a step in which unknowns of a term's own follow the displacement.
@@ -387,31 +385,3 @@ def _least(columns: Floats, values: Floats) -> Floats:
     sizes = np.linalg.norm(columns, axis=0)
     sizes[sizes == 0.0] = 1.0
     return np.asarray(np.linalg.lstsq(columns / sizes, values, rcond=1e-12)[0] / sizes)
-
-
-@dataclass(frozen=True, eq=False)
-class Secant:
-    """A difference of two equilibria."""
-
-    nodes: NDArray[np.int64]  # (n,), ids, in the model without, of the nodes that both models have
-    u: Floats  # (n, 3), displacement with less that without [m]
-    reactions: Floats  # (n, 3), of what holds them [N]
-
-
-def secant(
-    without: Model,
-    present: Model,
-    nodes: NDArray[np.integer] | None = None,
-) -> Secant:
-    """The difference that a switch makes: between two models that are alike but for it.
-
-    `nodes` (n,) are, for each node of `present`, its id in `without`; the same ones by default. A resection leaves
-    some. `SolveError` if one of the two has no equilibrium.
-    """
-    shared = np.arange(len(present.mesh.points)) if nodes is None else np.asarray(nodes, dtype=np.int64)
-    states = []
-    for model in (present, without):
-        state = solve_equilibrium(System(model))
-        states.append((state.u, model.reactions(state.internal, model.external_forces())))
-    (u, reactions), (u_without, reactions_without) = states
-    return Secant(shared, u - u_without[shared], reactions - reactions_without[shared])

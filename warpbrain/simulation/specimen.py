@@ -23,7 +23,7 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.recordings.comparison import Comparison, Error
+from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.shown import Shown
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
@@ -327,18 +327,8 @@ def compare_test(recording: TestRecording, result: TestResult) -> Comparison:
     unit = "m" if quantity == "displacement" else SHOWN[quantity][1]
     rest = 1.0 if quantity == "stretch" else 0.0
     before, after = (recorded - rest)[:, None], result.residuals[:, None]
-    return Comparison(
-        name=recording.name,
-        kind=recording.kind,
-        role=recording.role,
-        unit=unit,
-        rows=np.arange(len(recorded)),
-        before=Error.of(before, unit),
-        after=Error.of(after, unit),
-        residuals_before=before,
-        residuals_after=after,
-        noise=recording.sigma,
-    )
+    rows, about = np.arange(len(recorded)), (recording.name, recording.kind, recording.role, unit)
+    return Comparison(*about, rows, before, after, noise=recording.sigma)
 
 
 def imposed_values(imposed: Floats, rest: float, steps: int) -> tuple[Floats, Floats]:
@@ -464,14 +454,7 @@ class Tested:
 
 @dataclass(frozen=True, eq=False)
 class SpecimenRun(Shown):
-    """The simulated tests of a specimen.
-
-    Attributes
-    ----------
-    case : Case
-    rig : Rig
-    tests : tuple of Tested
-    """
+    """The simulated tests of a specimen."""
 
     case: Case
     rig: Rig

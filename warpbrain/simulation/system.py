@@ -24,7 +24,6 @@ from warpbrain.kernels.precision import PRECISIONS, Precision
 from warpbrain.kernels.ten_nodes import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.mesh.surface import EDGES
-from warpbrain.physics.continuous import differ_in_numbers_only
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.device import grown
 from warpbrain.physics.mechanism import Following
@@ -334,7 +333,7 @@ class System:
                 "that were pre-processed"
             )
         for was, now in zip(before.mechanisms, model.mechanisms, strict=True):
-            if was != now and not differ_in_numbers_only(was, now):
+            if was != now and not was.differs_in_numbers_only(now):
                 raise InputError(f"mechanisms: {now}: expected other numbers of {was}")
 
     def _write_materials(self) -> None:

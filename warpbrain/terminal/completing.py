@@ -36,13 +36,7 @@ def complete(parser: argparse.ArgumentParser) -> None:
 
 
 def shell_code(shell: str) -> str:
-    """What a shell must be told once.
-
-    Raises
-    ------
-    InputError
-        If argcomplete is not installed.
-    """
+    """What a shell must be told once; `InputError` if argcomplete is not installed."""
     try:
         import argcomplete
     except ImportError:

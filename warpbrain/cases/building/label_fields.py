@@ -46,26 +46,15 @@ def label_volumes(image: Image) -> dict[int, float]:
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """What every voxel is.
+    """What every voxel is."""
 
-    Attributes
-    ----------
-    codes : (i, j, k) uint8 array
-        `OUTSIDE`, a tissue from 1 on, or `CAVITY`; the voxels at the edge of the grid are outside.
-    grid : Grid
-    tissues : int
-        How many there are.
-    labelled : dict of int to float
-        Volume [mm3] that the user's labels give to each tissue and to `CAVITY`, before anything was mended.
-    notes : tuple of str
-        What was mended.
-    """
-
+    #: (i, j, k): `OUTSIDE`, a tissue from 1 on, or `CAVITY`; the voxels at the edge of the grid are outside.
     codes: Codes
     grid: Grid
-    tissues: int
+    tissues: int  # how many there are
+    #: Volume [mm3] that the user's labels give to each tissue and to `CAVITY`, before anything was mended.
     labelled: dict[int, float]
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was mended
 
 
 def make_regions(image: Image, assignment: Assignment) -> Regions:
@@ -73,10 +62,7 @@ def make_regions(image: Image, assignment: Assignment) -> Regions:
 
     Pieces apart from the largest are left out, and unlabelled voids inside get the nearest label: both are noted.
 
-    Raises
-    ------
-    InputError
-        If the volume is none that a brain can have.
+    `InputError` if the volume is none that a brain can have.
     """
     codes, grid = _cropped(image, assignment)
     unit = image.grid.voxel_volume
@@ -142,24 +128,14 @@ BALANCING = 12
 
 @dataclass(frozen=True, eq=False)
 class LabelFields:
-    """Fields on a grid in the world; see the module.
+    """Fields on a grid in the world; see the module."""
 
-    Attributes
-    ----------
-    body, cavity : (i, j, k) float32 arrays
-        Positive inside the body with its cavities, and inside the cavities.
-    tissues : list of (i, j, k) float32 arrays
-        Presence of each tissue, favours included: the largest one rules.
-    grid : Grid
-    in_place : dict of int to float
-        Share of the voxels of each tissue, and of `CAVITY`, that the fields give to it.
-    """
-
+    #: (i, j, k), positive inside the body with its cavities, and inside the cavities.
     body: Singles
     cavity: Singles
-    tissues: list[Singles]
+    tissues: list[Singles]  # (i, j, k), presence of each tissue, favours included: the largest one rules
     grid: Grid
-    in_place: dict[int, float]
+    in_place: dict[int, float]  # share of the voxels of each tissue, and of `CAVITY`, that the fields give to it
 
 
 def make_fields(regions: Regions, size: float) -> LabelFields:

@@ -47,32 +47,19 @@ EASIER = 7.0
 
 @dataclass(frozen=True, eq=False)
 class LabelMesh:
-    """A mesh made from labels.
+    """A mesh made from labels."""
 
-    Attributes
-    ----------
-    points, tetrahedra, tissue : (n, 3), (m, 4) and (m,) arrays
-        [mm, RAS]; tissues have the numbers of the assignment.
-    size : float
-        Wanted mean edge [mm].
-    labelled, labelled_cavity
-        Volume [mm3] of the labels of each tissue, by number, and of the cavities.
-    in_place : dict of int to float
-        Share of the voxels of each tissue that lie in that tissue of the mesh, before the cutting.
-    fields : LabelFields
-    notes : tuple of str
-        What was mended, left out or not reached.
-    """
-
-    points: Floats
-    tetrahedra: Ints
-    tissue: Ints
-    size: float
+    points: Floats  # (n, 3) [mm, RAS]
+    tetrahedra: Ints  # (m, 4)
+    tissue: Ints  # (m,), numbers of the assignment
+    size: float  # wanted mean edge [mm]
+    #: Volume [mm3] of the labels of each tissue, by number, and of the cavities.
     labelled: dict[int, float]
     labelled_cavity: float
+    #: Share of the voxels of each tissue that lie in that tissue of the mesh, before the cutting.
     in_place: dict[int, float]
     fields: LabelFields
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what was mended, left out or not reached
 
     def opens(self, centres: Floats, normals: Floats) -> Bools:
         """Whether outer faces, of centres (b, 3) [mm] and outward normals (b, 3), are walls of a cavity that opens."""

@@ -45,22 +45,13 @@ def cut(
 ) -> tuple[Floats, Ints, Ints, Bools]:
     """Split every edge that crosses the zero level, there.
 
-    Parameters
-    ----------
-    points, tetrahedra : (n, 3) and (m, 4) arrays
-    labels : (m,) array
-        Handed down to the pieces.
-    field : callable
-        From positions (k, 3) to values (k,).
+    `points` (n, 3), `tetrahedra` (m, 4).
+    `labels` (m,): handed down to the pieces.
+    `field`: from positions (k, 3) to values (k,).
 
-    Returns
-    -------
-    points, tetrahedra, labels, positive
-        The cut mesh, conforming and positively oriented if the given one is, and for each tetrahedron whether the field
-        is positive there.
+    Returns points, tetrahedra and labels of the cut mesh, conforming and positively oriented if the given one is, and
+    for each tetrahedron whether the field is positive there.
 
-    Notes
-    -----
     Bisecting an edge splits every tetrahedron around it in two, which keeps the mesh conforming whatever the order.
     Here the crossed edges are bisected in order of their number. One tetrahedron has at most four of them and each
     piece inherits those that are left, so four rounds over all tetrahedra at once do all of it.

@@ -113,16 +113,10 @@ def remesh(cells: Cells, edge: float) -> Cells | None:
 def fit_size(cells: Cells, size: Size, edge: float, good: Callable[[Cells], Cells | None]) -> Cells:
     """Find the edge length that gives the wanted count, and a mesh there that is good.
 
-    Parameters
-    ----------
-    cells : Cells
-        Fine mesh to start every trial from.
-    size : Size
-    edge : float
-        First guess of the largest edge [mm].
-    good : callable
-        Finishes a mesh of the right size; None if it is not good enough. The first good one met is returned; the search
-        is deterministic.
+    `cells`: fine mesh to start every trial from.
+    `edge`: first guess of the largest edge [mm].
+    `good`: finishes a mesh of the right size; None if it is not good enough. The first good one met is returned; the
+    search is deterministic.
     """
     goal = 0.5 * (size.at_least + size.at_most)
     seen: list[tuple[float, int]] = []

@@ -65,13 +65,8 @@ def first_sets(
     """Sets (n,) of a user's mesh: ``surface``, ``base``, a first guess of where it is held, and ``ventricle`` if there
     are cavities.
 
-    Parameters
-    ----------
-    points, tetrahedra : (n, 3) and (m, 4) arrays
-        RAS, any unit, positively oriented.
-    is_cavity : callable, optional
-        From centres (b, 3) and outward unit normals (b, 3) of outer faces to whether they are the wall of a cavity that
-        opens to the outside (b,).
+    `points` (n, 3), `tetrahedra` (m, 4): RAS, any unit, positively oriented. `is_cavity`: from centres (b, 3) and
+    outward unit normals (b, 3) of outer faces to whether they are the wall of a cavity that opens to the outside (b,).
     """
     xyz = np.asarray(points, dtype=np.float64)
     outer, cavities = split_boundary(xyz, tetrahedra)

@@ -36,19 +36,11 @@ LATTICE = 6.0
 def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], None] = lambda line: None) -> Path:
     """Build every mesh of a case.
 
-    Parameters
-    ----------
-    name : str
-        ``"phantom"`` or one of the clinical cases, ``"0529"``; `NAMES` has them all.
-    out_dir : path
-        The folder ``out_dir/name`` receives the meshes (VTU, millimetres) and ``meshes.json``, their record.
-    progress : callable
-        Called with one line of text whenever something is done.
+    `name`: ``"phantom"`` or one of the clinical cases, ``"0529"``; `NAMES` has them all.
+    `out_dir`: the folder ``out_dir/name`` receives the meshes (VTU, millimetres) and ``meshes.json``, their record.
+    `progress`: called with one line of text whenever something is done.
 
-    Returns
-    -------
-    Path
-        The folder written.
+    Returns the folder written.
     """
     if name not in RECIPES:
         raise BuildError(f"no case '{name}' can be built; choose from {', '.join(NAMES)}")

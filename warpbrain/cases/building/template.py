@@ -239,12 +239,7 @@ class IndividualWarp:
 
     It is the flow for unit time of a velocity field that is a sum of long sine waves.
 
-    Parameters
-    ----------
-    seed : int
-        Same seed, same deformation.
-    amplitude : float
-        Root mean square displacement in space [mm].
+    `seed`: same seed, same deformation. `amplitude`: root mean square displacement in space [mm].
     """
 
     def __init__(self, seed: int, amplitude: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import tomllib
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ from typing import Any
 from warpbrain.frame import Frame
 from warpbrain.keys import Table, short
 from warpbrain.mesh import TetMesh
-from warpbrain.problems import Problems
+from warpbrain.problems import Problems, nearest
 
 #: No case.toml is as large as this [bytes]; a file that is must be something else.
 LARGEST_TOML = 4 << 20
@@ -45,28 +44,17 @@ def parse_toml(file: Path, problems: Problems) -> dict[str, Any] | None:
 class Reading:
     """A table of a file: the values that are right, with every fault noted as a problem.
 
-    Parameters
-    ----------
-    table : Table
-        What it may say.
-    values : Any
-        What the file has there.
-    context : Context
-    where : str
-        How a message calls it: ``"tissue.1"``, ``"boundary 2"``.
-    problems : Problems
-        Where faults go.
-
-    Attributes
-    ----------
-    variant : str or None
-        Which of the table's variants it is; None if that cannot be told.
+    `table`: what it may say.
+    `values`: what the file has there.
+    `where`: how a message calls it: ``"tissue.1"``, ``"boundary 2"``.
+    `problems`: where faults go.
     """
 
     def __init__(self, table: Table, values: Any, context: Context, where: str, problems: Problems) -> None:
         self.context, self.where, self.problems = context, where, problems
         self._good: dict[str, Any] = {}
         self._named: set[str] = set(values) if isinstance(values, dict) else set()
+        #: Which of the table's variants it is; None if that cannot be told.
         self.variant: str | None = None
         self.keys = table.keys_of("")
         if not isinstance(values, dict):
@@ -85,8 +73,8 @@ class Reading:
             elif fault := self.keys[name].fault(value):
                 # a unit or axes that look alike are others all the same
                 guess = isinstance(value, str) and name not in ("units", "axes")
-                near = difflib.get_close_matches(value, self.keys[name].choices, 1) if guess else []
-                self.problem(name, fault, f"did you mean '{near[0]}'?" if near else self.keys[name].hint)
+                choices = self.keys[name].choices if guess else ()
+                self.problem(name, fault, nearest(value, choices, self.keys[name].hint))
             else:
                 self._good[name] = value
         for name, key in self.keys.items():
@@ -101,9 +89,7 @@ class Reading:
             takes = ", ".join(key.name for key in table.variants[self.variant]) or "no key of its own"
             self.problem(name, f"means nothing with {table.by.name} '{self.variant}'", f"it takes {takes}")
             return
-        near = difflib.get_close_matches(name, list(self.keys), 1)
-        cure = f"did you mean '{near[0]}'?" if near else f"expected one of {', '.join(self.keys)}"
-        self.problem(name, "unknown key", cure)
+        self.problem(name, "unknown key", nearest(name, self.keys))
 
     def problem(self, key: str, message: str, cure: str = "") -> None:
         """Note what is wrong with a key."""
@@ -168,26 +154,13 @@ def _file_of(folder: Path, name: str) -> tuple[Path | None, str]:
 
 @dataclass
 class Context:
-    """Where a case is being read from, and what was found wrong so far.
+    """Where a case is being read from, and what was found wrong so far."""
 
-    Attributes
-    ----------
-    file : Path
-        The `case.toml`.
-    tables : dict
-        Its top level.
-    problems : Problems
-    frame : Frame
-        Of every file in the folder.
-    mesh : TetMesh or None
-        The whole anatomy; None if it could not be read.
-    """
-
-    file: Path
-    tables: dict[str, Any]
+    file: Path  # the `case.toml`
+    tables: dict[str, Any]  # its top level
     problems: Problems
-    frame: Frame = field(default_factory=Frame)
-    mesh: TetMesh | None = None
+    frame: Frame = field(default_factory=Frame)  # of every file in the folder
+    mesh: TetMesh | None = None  # the whole anatomy; None if it could not be read
 
     def table(self, table: Table, needed: bool = True) -> Reading:
         """Read ``[name]``; one that may be left out is read as an empty table."""

@@ -22,15 +22,9 @@ def read_mechanisms(
 ) -> tuple[Mechanism, ...]:
     """Mechanisms in the order of the file, as far as they are right.
 
-    Parameters
-    ----------
-    context : Context
-    named : Named or None
-        The mesh and what can be named; gains what the mechanisms name. None if there is no mesh.
-    axis : (float, float, float) or None
-        Where 'down' is.
-    density : float
-        [kg/m3]
+    `named`: the mesh and what can be named; gains what the mechanisms name. None if there is no mesh.
+    `axis`: where 'down' is.
+    `density` [kg/m3].
     """
     acting: dict[int, Mechanism] = {}
     kinds: set[str] = set()

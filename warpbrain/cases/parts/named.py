@@ -34,32 +34,19 @@ _DIRECTIONS = (".csv", ".npy", ".vtu", ".vtk", ".xdmf", ".msh")
 
 @dataclass
 class Named:
-    """Looks up what a key names, and adds to the mesh what comes from elsewhere.
+    """Looks up what a key names, and adds to the mesh what comes from elsewhere."""
 
-    Attributes
-    ----------
-    mesh : TetMesh
-        The whole anatomy; it gains an element set for each tissue that is named as one, the nodes of the wall of each
-        element set that is named as a node set, sets of nodes and vectors of elements from files.
-    tissues : mapping of int to Tissue
-    frame : Frame
-        Of the files.
-    problems : Problems
-    """
-
+    #: The whole anatomy; it gains an element set for each tissue that is named as one, the nodes of the wall of each
+    #: element set that is named as a node set, sets of nodes and vectors of elements from files.
     mesh: TetMesh
     tissues: Mapping[int, Tissue]
-    frame: Frame
+    frame: Frame  # of the files
     problems: Problems
 
     def nodes(self, table: Reading, in_file: MeshInFile) -> str | None:
         """Name of the node set that the key `nodes` of a table names; None, and a problem noted, if there is none.
 
-        Parameters
-        ----------
-        table : Reading
-        in_file : MeshInFile
-            How the file of the mesh numbers its nodes.
+        `in_file`: how the file of the mesh numbers its nodes.
         """
         if not table.has("nodes"):
             return None
@@ -89,17 +76,9 @@ class Named:
     def look_up(self, kind: str, name: str, path_of: Callable[[], Path | None]) -> str | ClosedSurface | None:
         """What a mechanism takes for a name of a kind of `warpbrain.physics.mechanism.KINDS`.
 
-        Parameters
-        ----------
-        kind, name : str
-        path_of : callable
-            The file of that name; None, and the problem noted, if there is none.
-
-        Returns
-        -------
-        str, ClosedSurface or None
-            None, and a problem noted, if a file is missing or wrong. A name of nothing is returned as it is: the
-            mechanism says what the mesh has.
+        `path_of`: the file of that name; None, and the problem noted, if there is none. Returns None, and a problem
+        noted, if a file is missing or wrong. A name of nothing is returned as it is: the mechanism says what the mesh
+        has.
         """
         if kind == "element set" or (kind == "node set" and name not in self.mesh.node_sets):
             self._take_tissue(name)

@@ -29,8 +29,8 @@ def read_tissues(context: Context) -> dict[int, Tissue]:
     labels: set[int] = set()
     for key, value in values.items():
         if not re.fullmatch("0|[1-9][0-9]{0,9}", key):
-            found = f"tissue labels are whole numbers, found '{key}'"
-            context.problems.add(context.file, f"[tissue.{key}]", " ".join(found.split()), "[tissue.1]")
+            message = " ".join(f"tissue labels are whole numbers, found '{key}'".split())
+            context.problems.add(context.file, f"[tissue.{key}]", message, "[tissue.1]")
             continue
         labels.add(int(key))
         tissue = _read_tissue(Reading(TISSUE, value, context, f"tissue.{key}", context.problems), key)

@@ -25,7 +25,6 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterable
-from difflib import get_close_matches
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -37,7 +36,7 @@ from warpbrain.errors import InputError
 from warpbrain.gp.literature.forms import FORMS, Convention, Parameter, Parameters
 from warpbrain.gp.literature.study import GROUPS, STRETCHES, Study
 from warpbrain.keys import finite, short
-from warpbrain.problems import Problems, Unreadable
+from warpbrain.problems import Problems, Unreadable, nearest
 from warpbrain.recordings.text import read_text
 
 Variant = Literal["as_published", "corrected"]
@@ -313,15 +312,6 @@ class _Entry:
                 fault = f"the shear modulus at rest is {modulus:.3g} Pa, expected {MODULI[0]:g} to {MODULI[1]:g} Pa"
                 cure = 'write units = "kPa" at the top of the file if that is meant' if modulus < MODULI[0] else ""
                 self.problem("", fault, cure)
-
-
-def nearest(name: Any, names: Iterable[str]) -> str:
-    """The cure for a name that is not known: the one that is probably meant, or all of them."""
-    known = list(names)
-    plain = {candidate.lower(): candidate for candidate in known}
-    word = str(name).lower().replace("_", "-")
-    near = get_close_matches(word, list(plain), n=1) or get_close_matches(word.replace("-", " "), list(plain), n=1)
-    return f"did you mean '{plain[near[0]]}'?" if near else f"expected one of {', '.join(known)}"
 
 
 def _fault(key: Parameter, value: Any) -> str:

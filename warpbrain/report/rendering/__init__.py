@@ -92,10 +92,7 @@ class Scene:
 def render(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -> dict[str, Any]:
     """The pictures of a scene that have cameras by name, each (height, width, 3) uint8.
 
-    Raises
-    ------
-    RenderingError
-        If there is no graphics library, or it fails.
+    `RenderingError` if there is no graphics library, or it fails.
     """
     with tempfile.TemporaryDirectory(prefix="warpbrain-") as name:
         folder = Path(name)

@@ -112,10 +112,7 @@ class BaseFinder:
         return self._prior()
 
     def find(self) -> Base:
-        """The base state.
-
-        `SolveError` if the case as declared has no equilibrium.
-        """
+        """The base state; `SolveError` if the case as declared has no equilibrium."""
         self._listener.stage("the case as declared")
         declared = self.states.solve(self._declared())
         self._listener.stage("tissue beside any smooth force")
@@ -265,7 +262,9 @@ def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats
     It depends on the mesh, the load and the sensors; if it is overestimated it hides what is missing. Its evidence is
     that of models with and without a smooth force, so that a missing cause is not taken for an error of the mesh.
 
-    `factor` (n, n): of the noise. `residual` (n,). `smooth` (n, k): columns of a smooth force as large as the noise.
+    `factor` (n, n): of the noise.
+    `residual` (n,).
+    `smooth` (n, k): columns of a smooth force as large as the noise.
     """
     from scipy.special import logsumexp, softmax
 

@@ -123,8 +123,9 @@ def column_slices(effects: Sequence[Effect], first: int) -> tuple[slice, ...]:
 class Effects:
     """Makes the columns of proposals at one state.
 
-    `switches`: needed for proposals that are switches. `mesh_errors`: of the state: less compressible tissue locks
-    more, which is part of the effect of a law. `instant`: number of the time of the state.
+    `switches`: needed for proposals that are switches.
+    `mesh_errors`: of the state: less compressible tissue locks more, which is part of the effect of a law.
+    `instant`: number of the time of the state.
     """
 
     def __init__(

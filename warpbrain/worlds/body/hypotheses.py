@@ -54,10 +54,7 @@ _BETTER = 1.0
 
 
 class HypothesisSearch:
-    """Weighs sets of causes.
-
-    `spacing`: between the places of a scan [m].
-    """
+    """Weighs sets of causes. `spacing`: between the places of a scan [m]."""
 
     def __init__(self, base: Base, candidates: Candidates, spacing: float, listener: Listener) -> None:
         self.base, self.candidates, self.spacing, self._listener = base, candidates, spacing, listener
@@ -404,29 +401,13 @@ def screened(
 ) -> HypothesisSearch:
     """Sets of causes of a case.
 
-    Parameters
-    ----------
-    case : Case
-    device : str, optional
-        Warp device.
-    listener : Listener, optional
-    prior : Gaussian, optional
-        Of the tissues' parameters; that of a diagnosis unless given.
-    mesh_error : bool
-        False: the mesh is taken for exact.
-    without_nuisances : bool
-        Whether mechanisms are credited with what is no physics, too.
-    mechanisms : sequence of str, optional
-        Kinds that are looked for; all by default.
-    timed : callable, optional
-        A context in which each stage is done, by its name.
+    `prior`: of the tissues' parameters; that of a diagnosis unless given.
+    `mesh_error`: False takes the mesh for exact.
+    `without_nuisances`: whether mechanisms are credited with what is no physics, too.
+    `mechanisms`: kinds that are looked for; all by default.
+    `timed`: a context in which each stage is done, by its name.
 
-    Raises
-    ------
-    InputError
-        If there are too few recordings.
-    SolveError
-        If the case as declared has no equilibrium.
+    `InputError` if there are too few recordings. `SolveError` if the case as declared has no equilibrium.
     """
     require_observable(case)
     listener = listener or Listener()

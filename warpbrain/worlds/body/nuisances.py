@@ -103,22 +103,12 @@ def nuisances_at(
 ) -> Nuisances:
     """The nuisances of a state.
 
-    Parameters
-    ----------
-    at : Linearisation
-    states : States
-    theta : (p,) array
-        Of the tissues there.
-    prior : Gaussian
-        Of `theta`.
-    effects : Effects
-        At that state.
-    mesh_errors : MeshErrors or None
-        The state on a finer mesh less the state; None: the mesh is taken for exact.
-    anchors : (a, 3) array, optional
-        Those of other sensors, so that columns mean the same.
-    fraction : float, optional
-        Unknown part of the mesh's error, relative to the displacement; the largest that is believed by default.
+    `theta` (p,): of the tissues there.
+    `prior`: of `theta`.
+    `effects`: at that state.
+    `mesh_errors`: the state on a finer mesh less the state; None: the mesh is taken for exact.
+    `anchors` (a, 3): those of other sensors, so that columns mean the same.
+    `fraction`: unknown part of the mesh's error, relative to the displacement; the largest that is believed by default.
     """
     if fraction is None:
         fraction = float(beliefs("mesh.unknown").max())

@@ -50,9 +50,12 @@ def best_in_cell(
 
     Each place has gross errors of its own: points that a local effect moves far are sound in the right place alone.
 
-    `effects`: which makes columns at the state that the linear model is about. `effect`: of a proposal that can be
-    elsewhere. `size`: of its coefficients, relative to what is usual. `spacing`: between the places of the scan [m].
-    `without`: of rows with all else that acts and all points sound. `residual` (n,): less what is expected of all else.
+    `effects`: which makes columns at the state that the linear model is about.
+    `effect`: of a proposal that can be elsewhere.
+    `size`: of its coefficients, relative to what is usual.
+    `spacing`: between the places of the scan [m].
+    `without`: of rows with all else that acts and all points sound.
+    `residual` (n,): less what is expected of all else.
     """
 
     everywhere = PointRows(without, residual, base.points)
@@ -179,8 +182,10 @@ def weigh(
     log evidence: the mean over its likeliest places, since points that a local cause moves far are gross errors where
     it is thought to be elsewhere.
 
-    `causes`: those that were screened. `screened`: of the rows without them. `sizes`: see `evidence_of`. `about`: a
-    fitted set, whose causes act beside those of the hypothesis; the base, where no cause acts, unless given.
+    `causes`: those that were screened.
+    `screened`: of the rows without them.
+    `sizes`: see `evidence_of`.
+    `about`: a fitted set, whose causes act beside those of the hypothesis; the base, where no cause acts, unless given.
     """
     configurations = (hypothesis.best, *hypothesis.elsewhere)
     weighed = [
@@ -239,8 +244,9 @@ def with_refined_places(
 ) -> WeightedSet:
     """A set with its mechanisms at the best places within their cells of a scan.
 
-    `spacing`: between the places of the scan [m]. `source`: which makes columns at the state that the set is linear
-    about. `placed`: effects, the first ones, whose places stay: those of the fit that the set is linear about.
+    `spacing`: between the places of the scan [m].
+    `source`: which makes columns at the state that the set is linear about.
+    `placed`: effects, the first ones, whose places stay: those of the fit that the set is linear about.
     """
     effects = list(candidate.effects)
     placed = len(effects) if candidate.refined else placed

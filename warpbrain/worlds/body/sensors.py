@@ -81,7 +81,9 @@ def _spread(points_as_bytes: bytes, spacing: float, most: int) -> Ints:
 def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Floats) -> Floats:
     """Standard deviation (n,) of each row: where none is declared, as by an estimate, given nuisances and a field.
 
-    `residual` (n,). `nuisances` (n, k): columns of one standard deviation. `field` (n, k): of a smooth force of 1 m.
+    `residual` (n,).
+    `nuisances` (n, k): columns of one standard deviation.
+    `field` (n, k): of a smooth force of 1 m.
     """
     undeclared = np.isnan(sensors.sigma)
     if not undeclared.any():

@@ -31,8 +31,10 @@ def next_to_fit(
 ) -> WeightedSet | None:
     """The set that is fitted next, or whose supersets are weighed next if it is fitted; None to stop.
 
-    `sets`: the most probable first. `probabilities` (s,). `expanded`: fitted sets whose supersets were weighed about
-    their fit. `rivals`: whether sets that the verdict does not rest on may be chosen, too.
+    `sets`: the most probable first.
+    `probabilities` (s,).
+    `expanded`: fitted sets whose supersets were weighed about their fit.
+    `rivals`: whether sets that the verdict does not rest on may be chosen, too.
     """
     decision, _ = _decide(sets)
     named = [candidate for candidate in sets if frozenset(candidate.mechanisms) == frozenset(decision.causes)]

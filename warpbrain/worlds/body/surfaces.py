@@ -10,9 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools
+from warpbrain.arrays import Bools, Int32s
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh, nodes_of, split_boundary
@@ -79,7 +78,7 @@ def free_surfaces(case: Case) -> tuple[FreeSurface, ...]:
     return tuple(surfaces)
 
 
-def named_triangles(case: Case, surfaces: Sequence[FreeSurface]) -> tuple[tuple[str, NDArray[np.int32]], ...]:
+def named_triangles(case: Case, surfaces: Sequence[FreeSurface]) -> tuple[tuple[str, Int32s], ...]:
     """Triangles (k, 3) that can move with what people call them: connected parts, and free surfaces, each of them."""
     parts = [(words, part.faces) for words, part in _named_parts(case, connected_parts(case))]
     return (*parts, *((surface.words, surface.faces) for surface in surfaces))
@@ -115,7 +114,7 @@ def with_sets_that_act(case: Case, declared: TetMesh) -> Case:
     return replace(case, mesh=case.mesh.with_node_sets(kept))
 
 
-def _triangles_key(faces: NDArray[np.int32], corners: NDArray[np.int32]) -> bytes:
+def _triangles_key(faces: Int32s, corners: Int32s) -> bytes:
     """A key that is equal for equal triangles, those with corners of a cut left out."""
     inner = faces[~in_rows(faces, corners)]
     rows = np.sort(inner if len(inner) else faces, axis=1)

@@ -189,10 +189,7 @@ def _unit_stresses(corners: Floats) -> Floats:
 
 
 def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]) -> dict[str, Floats]:
-    """Columns of every field by its name.
-
-    `lengths` [m]. `forces` (n, k): `body_forces` of these lengths.
-    """
+    """Columns of every field by its name. `lengths` [m]. `forces` (n, k): `body_forces` of these lengths."""
     columns_by_name = {}
     for length, columns in zip(lengths, forces, strict=True):
         # in bodies of any size

@@ -81,8 +81,10 @@ def mesh_share_of(
 
     A switch has no size: alone it has a constant share, beside others none.
 
-    `coefficients` (k,): of each effect, in standard deviations about its mean. `state`: with these mechanisms. `known`:
-    of tissue alone. `prior`: of the tissues' parameters.
+    `coefficients` (k,): of each effect, in standard deviations about its mean.
+    `state`: with these mechanisms.
+    `known`: of tissue alone.
+    `prior`: of the tissues' parameters.
     """
     sized = [not effect.proposed.is_there_or_not for effect in effects]
     parts = list(zip(sized, effects, coefficients, strict=True))

@@ -73,10 +73,7 @@ class DiagnosingSpecimen:
         self.protocol = protocol_of(specimen_of(case), recordings)
 
     def run(self) -> SpecimenDiagnosis:
-        """Every stage.
-
-        `InputError` if the declared law finds no state in the tests.
-        """
+        """Every stage; `InputError` if the declared law finds no state in the tests."""
         with one_thread_of_blas():
             return self._run()
 

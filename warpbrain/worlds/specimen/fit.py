@@ -7,7 +7,7 @@ to have (`priors.toml`), a coefficient that is normal with mean 0 and standard d
 of one tissue, what glued ends do, a law that stiffens a little (a factor on all of the stress, what it remembers among
 it) or depends on the second invariant, the zero of a gauge and its drift.
 
-Damped least squares (`scipy.optimize.least_squares`) of rows and coefficients lead to the most probable coefficients.
+The least-squares loop of the house (`warpbrain.inference.least_squares`) leads to the most probable coefficients.
 About them the rows are a `GaussianModel`, whose log density is the evidence (Laplace's approximation); the scale of the
 noise is the most probable one.
 """
@@ -27,6 +27,7 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.least_squares import minimise
 from warpbrain.inference.noise import scales
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.worlds.specimen.effects import Action, Effect, Variant, excess_rows, invariant_rows, specimen_rows
@@ -36,9 +37,9 @@ from warpbrain.worlds.specimen.protocol import Protocol, noise_factor
 
 #: Step of differences, in standard deviations; responses that are kept.
 _STEP, _REMEMBERED = 1e-3, 500
-#: Steps at most, and the relative gain that ends them; how often a fit is repeated with the scale of the noise, and
-#: with the glued ends of the law, that it arrived at.
-_STEPS, _DONE, _SETTLING = 30, 1e-4, 3
+#: Steps at most, and length of the one [standard deviations] that is not worth it; how often a fit is repeated with the
+#: scale of the noise, and with the glued ends of the law, that it arrived at.
+_STEPS, _AT_BEST, _SETTLING = 30, 1e-3, 3
 #: What causes raise whose coefficients cannot be.
 CANNOT_BE = (InputError, NoStateError, OverflowError, np.linalg.LinAlgError, ValueError)
 #: Relative change of the factor of glued ends that is none.
@@ -300,8 +301,6 @@ def fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: floa
 
 def _fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: float, rows: Bools) -> Fit:
     """A fit with one scale of the noise and the glued ends of one law; raises one of `CANNOT_BE` if none stands."""
-    from scipy.optimize import least_squares
-
     observed = forward.protocol.observed
     # what only adds stress is linear: it is integrated out while all else is searched for
     adds, added = forward.adding(assumed)
@@ -312,21 +311,15 @@ def _fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: flo
         z[~adds] = at
         return z
 
-    def residuals(at: Floats) -> Floats:
-        try:
-            with np.errstate(all="ignore"):
-                left = observed - forward.stress(assumed, whole(at))
-                return np.concatenate([noise.standardised(left[rows]), at])
-        except CANNOT_BE:
-            # the step is shortened
-            return np.full(np.count_nonzero(rows) + len(at), np.nan)
+    def standardised(at: Floats) -> Floats:
+        return np.concatenate([noise.standardised((observed - forward.stress(assumed, whole(at)))[rows]), at])
 
     def slopes(at: Floats) -> Floats:
-        with np.errstate(all="ignore"):
-            tangent = forward.tangent(assumed, whole(at), forward.stress(assumed, whole(at)))
+        tangent = forward.tangent(assumed, whole(at), forward.stress(assumed, whole(at)))
         return np.concatenate([-noise.standardised(tangent[rows][:, ~adds]), np.eye(len(at))])
 
-    at = least_squares(residuals, z[~adds], slopes, ftol=_DONE, xtol=_DONE, gtol=None, max_nfev=_STEPS).x
+    with np.errstate(all="ignore"):
+        at, _ = minimise(standardised, slopes, z[~adds], _AT_BEST, cannot_be=CANNOT_BE, evaluations=_STEPS)
     z = whole(at)
     z[adds] = noise.coefficients((observed - forward.stress(assumed, z))[rows])[0]
     stress = forward.stress(assumed, z)

@@ -34,30 +34,16 @@ _ROWS, _REACH, _DURATION, _SPREAD = 40, 0.5, 100.0, 0.1
 
 @dataclass(frozen=True)
 class Ranked:
-    """One cause.
-
-    Attributes
-    ----------
-    name, sentence : str
-    kind : Kind
-    log_evidence : float
-        Of the cause alone against nothing.
-    probability : float
-        That it acts, whatever else does.
-    detectability : float or None
-        `d` of the effect, fitted alone: its length in standard deviations of noise and nuisances.
-    change : float or None
-        Of the held-out error of all rows [Pa] with it alone; negative is better. None where it was not fitted.
-    values : tuple of Value
-    region : str
-    """
+    """One cause."""
 
     name: str
     sentence: str
     kind: Kind
-    log_evidence: float
-    probability: float
+    log_evidence: float  # of the cause alone against nothing
+    probability: float  # that it acts, whatever else does
+    #: `d` of the effect, fitted alone: its length in standard deviations of noise and nuisances.
     detectability: float | None
+    #: Of the held-out error of all rows [Pa] with it alone; negative is better. None where it was not fitted.
     change: float | None
     values: tuple[Value, ...]
     region: str

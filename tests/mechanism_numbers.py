@@ -17,10 +17,8 @@ from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
-from warpbrain.physics.mechanism import Mechanism, Says
+from warpbrain.physics.mechanism import NUMBERS, Mechanism, Says
 
-#: Kinds of parameters that are numbers, and those of which the components are.
-_ONE, _SEVERAL = ("number",), ("position", "vector", "numbers")
 #: Over what length [m] something changes that depends on where it is, at most.
 _LENGTH = 0.01
 #: Over what angle [rad] something changes that depends on a direction, at most.
@@ -79,20 +77,14 @@ class Continuous:
         return size
 
 
-def smooth_parameters(mechanism: type[Mechanism]) -> dict[str, Says]:
-    """What is known of the parameters of a kind of mechanism that are numbers, by name, in the order of its fields."""
-    parameters = mechanism.parameters().items()
-    return {key: says for key, says in parameters if says.kind in (*_ONE, *_SEVERAL) and not says.method}
-
-
 def continuous(mechanism: Mechanism) -> tuple[Continuous, ...]:
     """Every number that a mechanism can be differentiated by, in the order of its fields."""
     places: list[Continuous] = []
-    for key, says in smooth_parameters(type(mechanism)).items():
+    for key, says in mechanism.parameters().items():
         value: Any = getattr(mechanism, key)
-        if value is None:
+        if value is None or says.method or says.kind not in NUMBERS:
             continue
-        if says.kind in _ONE:
+        if says.kind == "number":
             places.append(Continuous(mechanism.kind, key, None, says))
         else:
             places += [Continuous(mechanism.kind, key, component, says) for component in range(len(value))]
@@ -130,14 +122,3 @@ def with_numbers(mechanisms: Sequence[Mechanism], numbers: ArrayLike) -> tuple[M
         at += len(its_places)
         made.append(replace(mechanism, **values) if its_places else mechanism)
     return tuple(made)
-
-
-def differ_in_numbers_only(first: Mechanism, second: Mechanism) -> bool:
-    """Whether two mechanisms are the same but for numbers, settings of the method and the ramp."""
-    if type(first) is not type(second):
-        return False
-    settings = {key: getattr(first, key) for key, says in first.parameters().items() if says.method}
-    if continuous(first) != continuous(second):
-        return False
-    [alike, other] = (with_numbers([mechanism], numbers_of([first]))[0] for mechanism in (first, second))
-    return replace(other, ramp=first.ramp, **settings) == alike

@@ -1,16 +1,10 @@
-"""Numbers of mechanisms: which there are, other ones in the same mechanism, and what is there or not."""
+"""Numbers of mechanisms: which there are, other ones in the same mechanism, and what else two may differ in."""
 
 import numpy as np
 import pytest
+from mechanism_numbers import continuous, numbers_of, scales_of, with_numbers
 
 from warpbrain.errors import InputError
-from warpbrain.physics.continuous import (
-    continuous,
-    differ_in_numbers_only,
-    numbers_of,
-    scales_of,
-    with_numbers,
-)
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.cavity import Cavity
 from warpbrain.physics.mechanisms.compressibility import Compressibility
@@ -83,9 +77,9 @@ def test_a_number_at_the_end_of_its_range_has_a_scale() -> None:
 
 def test_what_another_mechanism_is() -> None:
     other = Swelling(amount=0.3, centre=(0.0, 0.0, 0.0), radius=0.1, ramp=[(0.0, 0.0), (1.0, 1.0)])
-    assert differ_in_numbers_only(BALL, other)
-    assert not differ_in_numbers_only(BALL, Swelling(amount=0.1))
-    assert not differ_in_numbers_only(BALL, Inclusion(ratio=2.0, centre=(0.0, 0.0, 0.0), radius=0.1))
-    assert not differ_in_numbers_only(Contact(nodes="a"), Contact(nodes="a", state="lifting"))
-    assert differ_in_numbers_only(Contact(nodes="a"), Contact(nodes="a", penalty=10.0, friction=0.1))
-    assert not differ_in_numbers_only(BRANCHES, Viscoelasticity(moduli=(1.0,), times=(3.0,)))
+    assert BALL.differs_in_numbers_only(other)
+    assert not BALL.differs_in_numbers_only(Swelling(amount=0.1))
+    assert not BALL.differs_in_numbers_only(Inclusion(ratio=2.0, centre=(0.0, 0.0, 0.0), radius=0.1))
+    assert not Contact(nodes="a").differs_in_numbers_only(Contact(nodes="a", state="lifting"))
+    assert Contact(nodes="a").differs_in_numbers_only(Contact(nodes="a", penalty=10.0, friction=0.1))
+    assert not BRANCHES.differs_in_numbers_only(Viscoelasticity(moduli=(1.0,), times=(3.0,)))

@@ -1,0 +1,100 @@
+"""Commands and their arguments as a TOML table describes them: parsers of them, ranges of numbers, calls.
+
+A command has its `help`, its `description` and the function that is its `call`, in a module that is imported only then;
+`arguments`, with the keywords of `add_argument`; and `actions`, which are commands of it. What the arguments have
+beside these keywords is said in `warpbrain/cli/commands.toml`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from warpbrain.errors import InputError
+
+_TYPES = {"path": Path, "int": int, "float": float}
+
+
+@dataclass(frozen=True)
+class _Range:
+    """What the number of an argument can be, which is refused before anything is imported for it."""
+
+    argument: argparse.Action
+    least: float | None = None
+    above: float | None = None
+    below: float | None = None
+    expected: str = ""
+
+    def require(self, options: argparse.Namespace) -> None:
+        """`InputError` if a number is given that is outside."""
+        value = getattr(options, self.argument.dest)
+        inside = value is None or (
+            (self.least is None or value >= self.least)
+            and (self.above is None or value > self.above)
+            and (self.below is None or value < self.below)
+        )
+        if not inside:
+            shown = f"{value:g}" if isinstance(value, float) else value
+            expected = self.expected or f"a whole number of at least {self.least}"
+            raise InputError(f"{self.argument.option_strings[0]} {shown}: expected {expected}")
+
+
+def described_in(package: str) -> dict[str, Any]:
+    """The table `commands.toml` of a package."""
+    return tomllib.loads((files(package) / "commands.toml").read_text(encoding="utf-8"))
+
+
+def call(options: argparse.Namespace, package: str) -> None:
+    """Run what was asked for, by a module of a package; `InputError` if a number is out of its range."""
+    for number in options.ranges:
+        number.require(options)
+    module, _, function = options.call.partition(":")
+    getattr(import_module(f"{package}.{module}"), function)(options)
+
+
+def add_commands(
+    commands: argparse._SubParsersAction[Any], described: Mapping[str, Any], shared: Mapping[str, Any]
+) -> None:
+    """Add commands, or actions of one, as a table describes them; `shared` are arguments of several."""
+    for name, command in described.items():
+        fill(commands.add_parser(name, help=command["help"], description=command.get("description")), command, shared)
+
+
+def fill(parser: argparse.ArgumentParser, command: Mapping[str, Any], shared: Mapping[str, Any]) -> None:
+    """Give a parser the arguments and actions of a command."""
+    ranges: list[_Range] = []
+    parser.set_defaults(call=command.get("call"), ranges=ranges, program=parser.prog)
+    # sections of the help and exclusive groups, by their name
+    places: dict[str, argparse._ActionsContainer] = {"": parser}
+    for flags, changed in command.get("arguments", {}).items():
+        settings = dict(changed) if changed.get("apart") else {**shared.get(flags, {}), **changed}
+        settings.pop("apart", None)
+        section, group = settings.pop("under", ""), settings.pop("one_of", "")
+        required = settings.pop("required", False) if group else False
+        if section not in places:
+            places[section] = parser.add_argument_group(section)
+        if group not in places:
+            places[group] = parser.add_mutually_exclusive_group(required=required)
+        limits = {key: settings.pop(key) for key in ("least", "above", "below", "expected") if key in settings}
+        argument = _add_argument(places[group or section], flags.split(), settings)
+        ranges += [_Range(argument, **limits)] if limits else []
+    if "actions" in command:
+        # without an action a command that can be called is
+        actions = parser.add_subparsers(dest="action", required="call" not in command, metavar="ACTION")
+        add_commands(actions, command["actions"], shared)
+
+
+def _add_argument(place: argparse._ActionsContainer, flags: Sequence[str], settings: dict[str, Any]) -> argparse.Action:
+    if "type" in settings:
+        settings["type"] = _TYPES[settings["type"]]
+    if settings.get("action") == "boolean":
+        settings["action"] = argparse.BooleanOptionalAction
+    if isinstance(settings.get("metavar"), list):
+        settings["metavar"] = tuple(settings["metavar"])
+    return place.add_argument(*flags, **settings)
