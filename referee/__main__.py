@@ -19,13 +19,14 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m referee", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="make a set of cases and seal what is true of them")
-    sets = ("development", "calibration", "scored", "traps", "pairs", "unknown")
+    sets = ("development", "calibration", "scored", "traps", "pairs", "unknown", "challenge")
     make.add_argument("--set", required=True, choices=sets, dest="which")
-    make.add_argument("--count", type=int, help="how many; 24, 80, 160, 60, 100 or 100 if absent")
+    make.add_argument("--count", type=int, help="how many; 24, 80, 160, 60, 100, 100 or 500 if absent")
     make.add_argument("--out", type=Path, required=True)
     make.add_argument(
         "--geometry", nargs="+", help="bodies, in turn; phantom 0603 or, for what is not scored, phantom 0529"
     )
+    make.add_argument("--bodies", type=int, help="declared bodies that the cases share; each has its own if absent")
     make.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
     make.add_argument("--seed", default="1", help="any text, such as the hash of the commit that froze the tool")
     run = commands.add_parser("run", help="let the tool diagnose every case, as a user would")
@@ -103,9 +104,10 @@ def _make(given: argparse.Namespace) -> int:
         if name not in NAMES:
             raise InputError(f"--geometry {name}: expected one of {', '.join(NAMES)}")
     count = SETS[given.which] if given.count is None else given.count
-    if count < 1 or given.workers < 1:
-        raise InputError("--count and --workers: expected 1 or more")
-    return int(bool(make_set(given.which, count, given.out, geometries, given.workers, given.seed)))
+    if min(count, given.workers, 1 if given.bodies is None else given.bodies) < 1:
+        raise InputError("--count, --workers and --bodies: expected 1 or more")
+    not_made = make_set(given.which, count, given.out, geometries, given.workers, given.seed, given.bodies)
+    return int(bool(not_made))
 
 
 def _run(given: argparse.Namespace) -> int:

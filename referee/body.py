@@ -12,6 +12,7 @@ from scipy.sparse import bsr_matrix, csr_matrix
 
 from referee.faces import Faces
 from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.recordings.location import locate
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -114,6 +115,14 @@ class Body:
         """Shape functions (10, q) at the quadrature points."""
         h: Floats = self._felupe.h
         return h[..., 0] if h.ndim == 3 else h
+
+    def at(self, places: Floats) -> tuple[Ints, Floats]:
+        """Nodes (k, 10) and shape functions (k, 10) at places (k, 3) [m], or at what is nearest in the body."""
+        found = locate(self.mesh.points, self.mesh.tetrahedra, places)
+        cells = self.cells[found.element]
+        # outside the body the nodes of a face come first
+        w = ((found.nodes[:, None, :] == cells[:, :4, None]) * found.weights[:, None, :]).sum(axis=2)
+        return cells, np.concatenate([w * (2.0 * w - 1.0), 4.0 * w[:, SIDES[:, 0]] * w[:, SIDES[:, 1]]], axis=1)
 
     @cached_property
     def pattern(self) -> Pattern:

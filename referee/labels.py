@@ -32,7 +32,7 @@ def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dic
         Why earlier draws of this case were given up.
     """
     fitted, checked = truth.sensors.fitted, truth.sensors.checked
-    points = truth.setting.body.points
+    places, moved = truth.tracked(checked)
     clean = truth.effect(fitted)
     noise = seen(truth, checked, 2) - _registered(truth, checked)
     acting = []
@@ -50,12 +50,12 @@ def label_of(name: str, plan: Planned, truth: Truth, attempts: list[str]) -> dic
         "rms_effect_m": _number(np.sqrt((clean**2).sum(axis=2).mean())),
         "rms_declared_m": _number(np.sqrt((truth.declared[fitted] ** 2).sum(axis=1).mean())),
         "setting": truth.setting.described(),
-        "points_m": _array(points[fitted]),
+        "points_m": _array(truth.tracked(fitted)[0]),
         "clean_effect_m": _array(clean),
         "clean_effect_on_wall_m": _array(truth.effect_on_wall),
         "clean_effect_n": _array(truth.force - truth.held),
-        "check_points_m": _array(points[checked]),
-        "check_displacement_m": _array(truth.u[:, checked]),
+        "check_points_m": _array(places),
+        "check_displacement_m": _array(moved),
         "check_noise_m": _number(np.sqrt((noise**2).sum(axis=2).mean())),
         "forces_left": _number(truth.left),
         "attempts": attempts,
@@ -78,7 +78,8 @@ def _alone(truth: Truth, one: Sized) -> dict[str, Any]:
 def _registered(truth: Truth, nodes: NDArray[np.int64]) -> NDArray[np.float64]:
     points = truth.setting.body.points
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    return np.stack([truth.setting.blur.misaligned(points[nodes], u[nodes], middle) for u in truth.u])
+    places, moved = truth.tracked(nodes)
+    return np.stack([truth.setting.blur.misaligned(places, u, middle) for u in moved])
 
 
 def _number(value: Any) -> float:

@@ -13,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
+from referee.bodies import assigned, draw_bodies, on_body
 from referee.draw import WANTED, draw_effect, trapped, wanted
 from referee.equilibrium import NoTruth
 from referee.folder import write_folder
 from referee.labels import label_of, seal
 from referee.plan import BOTH, Planned, planned
 from referee.sealed import write_commitments
-from referee.setting import draw_setting
+from referee.setting import Setting, draw_setting
 from referee.sizing import Wish
 from referee.threads import single
 from referee.truth import LEAST, Truth, solve_truth
@@ -40,7 +41,9 @@ def seed_of(text: str) -> int:
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:6], "big")
 
 
-def make_set(which: str, count: int, out: Path, geometries: Sequence[str], workers: int, seed: str) -> list[str]:
+def make_set(
+    which: str, count: int, out: Path, geometries: Sequence[str], workers: int, seed: str, bodies: int | None = None
+) -> list[str]:
     """Make a set; cases that are there already are kept, so that an interrupted set is finished by the same command.
 
     Parameters
@@ -53,6 +56,8 @@ def make_set(which: str, count: int, out: Path, geometries: Sequence[str], worke
     workers : int
         Processes.
     seed : str
+    bodies : int, optional
+        How many declared bodies the cases share, beside one for meshes that are too coarse; each has its own if None.
 
     Returns
     -------
@@ -61,13 +66,18 @@ def make_set(which: str, count: int, out: Path, geometries: Sequence[str], worke
     """
     number = seed_of(f"{which} {seed}")
     plans = planned(which, count, geometries, number)
+    shared: list[Setting | None] = [None] * count
+    if bodies is not None:
+        coarse = any(plan.names == ("coarse",) for plan in plans)
+        drawn = draw_bodies(bodies, geometries, number, coarse)
+        shared = [drawn[k] for k in assigned(plans, drawn, number)]
     names = [f"{which[:3]}-{k + 1:03d}" for k in range(count)]
     missing = [k for k, name in enumerate(names) if not (out / LABELS / f"{name}.json.gz").exists()]
     missing.sort(key=lambda k: -_work(plans[k]))
     not_made = []
     # a fresh process knows nothing of the threads of this one
     with ProcessPoolExecutor(max_workers=workers, mp_context=get_context("spawn"), initializer=single) as pool:
-        jobs = [pool.submit(make_case, out, names[k], plans[k], [number, k]) for k in missing]
+        jobs = [pool.submit(make_case, out, names[k], plans[k], [number, k], shared[k]) for k in missing]
         for ended, job in enumerate(as_completed(jobs), 1):
             try:
                 outcome = job.result()
@@ -89,8 +99,8 @@ def _work(plan: Planned) -> float:
     return 1.0 + sum(each.get(name, 2.0) for name in plan.names)
 
 
-def make_case(out: Path, name: str, plan: Planned, seed: Sequence[int]) -> str:
-    """Make one case; a draw without a truth that converges is counted, and drawn again.
+def make_case(out: Path, name: str, plan: Planned, seed: Sequence[int], body: Setting | None = None) -> str:
+    """Make one case, of what a body declares if there is one; a draw without a truth is counted, and drawn again.
 
     Returns
     -------
@@ -102,7 +112,7 @@ def make_case(out: Path, name: str, plan: Planned, seed: Sequence[int]) -> str:
     given_up: list[str] = []
     for attempt in range(ATTEMPTS):
         try:
-            truth = _draw(plan, [*seed, attempt])
+            truth = _draw(plan, [*seed, attempt], body)
             break
         except NoTruth as reason:
             given_up.append(str(reason))
@@ -117,9 +127,11 @@ def make_case(out: Path, name: str, plan: Planned, seed: Sequence[int]) -> str:
     return f"{name} in {time.perf_counter() - started:.0f} s, {len(given_up)} draws given up"
 
 
-def _draw(plan: Planned, seed: Sequence[int]) -> Truth:
+def _draw(plan: Planned, seed: Sequence[int], body: Setting | None = None) -> Truth:
     random = np.random.default_rng(list(seed))
     setting = draw_setting(random, plan.geometry, timed="viscoelasticity" in plan.names)
+    if body is not None:
+        setting = on_body(setting, body)
     if plan.kind == "trap":
         setting = trapped(random, plan.names[0], setting)
     until = time.process_time() + LIMIT

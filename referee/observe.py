@@ -15,6 +15,8 @@ from warpbrain.recordings.recording import ForceRecording, PointsRecording, Reco
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+#: Decimals of a recorded metre: to a tenth of a micrometre.
+DECIMALS = 7
 #: Name of the declared load.
 CAP = "superior cap"
 
@@ -44,18 +46,18 @@ def _middle(truth: Truth) -> Floats:
 def seen(truth: Truth, nodes: Ints, salt: int) -> Floats:
     """Displacement (times, k, 3) [m] of nodes as it is recorded, before mistakes; `salt` tells noises apart."""
     setting = truth.setting
-    points = setting.body.points[nodes]
+    points, moved = truth.tracked(nodes)
     out = []
-    for k, u in enumerate(truth.u):
+    for k, u in enumerate(moved):
         blur = replace(setting.blur, seed=(setting.seed + 1000 * salt + k) % 2**31)
-        out.append(blur.misaligned(points, u[nodes], _middle(truth)) + blur.noise(points))
+        out.append(blur.misaligned(points, u, _middle(truth)) + blur.noise(points))
     return np.stack(out)
 
 
 def _points(truth: Truth, name: str, role: str, nodes: Ints, mistakes: bool) -> PointsRecording:
     setting = truth.setting
     random = np.random.default_rng([setting.seed, 2])
-    points = setting.body.points[nodes]
+    points, _ = truth.tracked(nodes)
     moved = seen(truth, nodes, 1 if mistakes else 2)
     if mistakes:
         wrong = random.random(moved.shape[:2]) < setting.gross
@@ -73,7 +75,7 @@ def _points(truth: Truth, name: str, role: str, nodes: Ints, mistakes: bool) -> 
         role=role,
         sigma=_sigma(truth),
         points=np.tile(points, (len(moved), 1)),
-        displacement=moved.reshape(-1, 3),
+        displacement=np.round(moved.reshape(-1, 3), DECIMALS),
         time=times,
         ids=ids * len(moved),
         outside="nearest",
@@ -84,7 +86,7 @@ def _surface(truth: Truth) -> SurfaceRecording:
     setting = truth.setting
     points, u = truth.sensors.on_wall(setting.body.points), truth.sensors.on_wall(truth.u[-1])
     blur = replace(setting.blur, seed=(setting.seed + 5000) % 2**31)
-    moved = points + blur.misaligned(points, u, _middle(truth)) + blur.noise(points)
+    moved = np.round(points + blur.misaligned(points, u, _middle(truth)) + blur.noise(points), DECIMALS)
     return SurfaceRecording(
         name="ventricle wall", file="", role="fit", sigma=_sigma(truth), points=moved, nodes="ventricle"
     )

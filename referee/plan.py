@@ -11,7 +11,15 @@ import numpy as np
 from referee.draw import MECHANISMS, OUTSIDE, TRAPS
 
 #: Sets, and how many cases each has if nobody says.
-SETS = {"development": 24, "calibration": 80, "scored": 160, "traps": 60, "pairs": 100, "unknown": 100}
+SETS = {
+    "development": 24,
+    "calibration": 80,
+    "scored": 160,
+    "traps": 60,
+    "pairs": 100,
+    "unknown": 100,
+    "challenge": 500,
+}
 #: Shares of cases; all others have one mechanism each, in turn.
 SHARES = {
     "scored": {"none": 0.2, "two": 0.1, "outside": 0.05, "trap": 0.05},
@@ -19,6 +27,7 @@ SHARES = {
     "traps": {"trap": 1.0},
     "pairs": {"two": 1.0},
     "unknown": {"outside": 1.0},
+    "challenge": {"none": 0.12, "two": 0.2, "outside": 0.2, "trap": 0.16},
 }
 #: Least detectability of each of two effects at once.
 BOTH = 5.0
@@ -52,7 +61,7 @@ def planned(which: str, count: int, geometries: Sequence[str], seed: int) -> lis
         The scored set of 160 has 32 cases in which nothing is missing, 12 of each mechanism, 16 of two at once, 8
         outside the dictionary and 8 traps; calibration of 80 has 30, 4 of each, 6, 6 and 6; any other number has the
         same shares. Traps, pairs (two at once) and unknown (outside the dictionary) have nothing else, of each as
-        many. Development takes one of everything in turn.
+        many. The challenge of 500 has 60, 20 of each, 100, 100 and 80. Development takes one of everything in turn.
     geometries : sequence of str
         In turn.
     seed : int

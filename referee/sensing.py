@@ -44,8 +44,8 @@ class Sensors:
 
 def place_sensors(setting: Setting) -> Sensors:
     """Draw where is seen: within the tissue and on its walls, not where nothing moves freely."""
-    body = setting.body
-    random = np.random.default_rng([setting.seed, 1])
+    body = setting.outlined
+    random = np.random.default_rng([setting.seed if setting.sites is None else setting.sites, 1])
     known = body.nodes("fixed") | body.nodes("superior") | body.nodes("side")
     wall = np.zeros(len(known), dtype=bool)
     wall[body.outer.nodes] = True

@@ -105,6 +105,8 @@ class Setting:
         The mesh that the case declares.
     seed : int
         Of noise and of where is recorded.
+    sites : int, optional
+        Seed of where points are recorded, if other cases have the same places.
     """
 
     geometry: str
@@ -131,11 +133,17 @@ class Setting:
     bent: float = 0.0
     mispaired: float = 0.0
     mesh: str = ""
+    sites: int | None = None
+
+    @property
+    def outlined(self) -> Body:
+        """The true body, were its surface the declared one."""
+        return true_body(self.geometry)
 
     @cached_property
     def body(self) -> Body:
         """The true body."""
-        body = true_body(self.geometry)
+        body = self.outlined
         if self.bent == 0.0:
             return body
         # in each direction a part of the whole

@@ -67,6 +67,17 @@ class Truth:
         """Effects at the size that they have."""
         return tuple(one.effect for one in self.found)
 
+    def tracked(self, nodes: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """Places (k, 3) at rest [m] of nodes, and displacement (times, k, 3) [m] of the tissue that is there.
+
+        A body that is bent has other tissue at the places that its case declares.
+        """
+        if self.setting.bent == 0.0:
+            return self.setting.body.points[nodes], self.u[:, nodes]
+        places = self.setting.outlined.points[nodes]
+        members, shapes = self.setting.body.at(places)
+        return places, np.einsum("ka,tkai->tki", shapes, self.u[:, members])
+
     def effect(self, nodes: NDArray[np.int64]) -> Floats:
         """Displacement (times, k, 3) [m] of nodes that is due to the effects."""
         return self.u[:, nodes] - self.declared[nodes]

@@ -4,8 +4,8 @@
     python -m bench.real.beam_cases FOLDER --weight FILE.c3d GRAMS --out DIR    # a case of any other weight
 
 FOLDER holds `beam.stl` and the `.c3d` files; needs ezc3d. Every number of a case is from these files, from the authors'
-description of the rig, or from the releases under its own weight (`bench.real.beam_motion`): nothing is from how a beam
-with a weight came to rest.
+description of the rig, or from the releases under its own weight (`bench.real.beam_motion`), but for how even the
+silicone is: nothing is from how a beam with a weight came to rest.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ HELD, HELD_WITH_WEIGHT = 0.35, 0.6
 GRAVITY_FILES = ("beam_gravity_V2_a.c3d", "beam_gravity_V2_b.c3d")
 #: Its standard deviation there, relative: of a beam with a weight it is known. The weight of the beam is what tells it.
 MU_ACCURACY = 0.043
+#: Standard deviation of ln mu from place to place: a guess for silicone of one pour. Diagnoses are alike with 0.02.
+UNEVEN = 0.05
 WEIGHT_FILE, WEIGHT_GRAMS = "beam_load52_V2_a.c3d", 52.0
 
 _CASE = """\
@@ -60,6 +62,7 @@ mu = {mu:.0f}.0                   # fitted to its weight alone: warpbrain estima
 [body]
 density = 1070.0
 poisson = 0.499
+heterogeneity = {uneven}           # cast in one piece: nobody measured it; 0.25, brain's, is no silicone's
 
 [[boundary]]
 name = "clamp"
@@ -151,7 +154,7 @@ def write_beam(folder: Path, name: str, title: str, grams: float, recordings: di
     """`name.toml` and its tables: of each file the role and the table's text, by file."""
     weight = _WEIGHT.format(force=-1e-3 * grams * GRAVITY, grams=grams) if grams else ""
     source, accuracy = ", ".join(recordings), f"accuracy = {MU_ACCURACY}\n" if grams else ""
-    text = _CASE.format(name=name, title=title, source=source, mu=MU, accuracy=accuracy, weight=weight)
+    text = _CASE.format(name=name, title=title, source=source, mu=MU, accuracy=accuracy, uneven=UNEVEN, weight=weight)
     for number, (file, (role, content)) in enumerate(recordings.items()):
         csv = f"{Path(file).stem}.csv"
         (folder / csv).write_text(content, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""``python -m referee challenge export|baselines|tool|commit|score|leaderboard``."""
+"""``python -m referee challenge export|pack|unpack|baselines|tool|commit|score|leaderboard``."""
 
 from __future__ import annotations
 
@@ -24,6 +24,15 @@ def add_challenge(commands: Any) -> None:
     export.add_argument("--cases", type=Path, required=True, help="folder of case folders")
     export.add_argument("--only", default="", help="names of cases, separated by commas; all if absent")
     export.add_argument("--workers", type=int, default=1, help="processes")
+    pack = parts.add_parser("pack", help="write cases that share declared bodies small, a file for each body")
+    pack.add_argument("folder", type=Path, help="gets a file of each body and mesh")
+    pack.add_argument("--cases", type=Path, required=True, help="folder of case folders")
+    pack.add_argument("--workers", type=int, default=1, help="processes")
+    unpack = parts.add_parser("unpack", help="write packed cases as export writes them")
+    unpack.add_argument("folder", type=Path, help="gets CASE.npz, the folder CASE and cases.txt")
+    unpack.add_argument("--packed", type=Path, default=Path("bench/challenge"), help="where pack wrote")
+    unpack.add_argument("--only", default="", help="names of cases, separated by commas; all if absent")
+    unpack.add_argument("--workers", type=int, default=1, help="processes")
     baselines = parts.add_parser("baselines", help="answer by forward selection, LASSO, relevance vectors, discrepancy")
     baselines.add_argument("folder", type=Path, help="where export wrote")
     baselines.add_argument("--out", type=Path, required=True, help="folder that gets METHOD.csv")
@@ -57,6 +66,21 @@ def _export(given: argparse.Namespace) -> int:
     from referee.challenge.export import export
 
     count = export(given.cases, given.folder, [name for name in given.only.split(",") if name], given.workers)
+    print(f"{count} cases in {given.folder}")
+    return 0
+
+
+def _pack(given: argparse.Namespace) -> int:
+    from referee.challenge.pack import pack
+
+    print(f"{pack(given.cases, given.folder, given.workers)} bodies in {given.folder}")
+    return 0
+
+
+def _unpack(given: argparse.Namespace) -> int:
+    from referee.challenge.unpack import unpack
+
+    count = unpack(given.packed, given.folder, [name for name in given.only.split(",") if name], given.workers)
     print(f"{count} cases in {given.folder}")
     return 0
 
@@ -146,6 +170,8 @@ def _names(folder: Path) -> list[str]:
 
 _PARTS = {
     "export": _export,
+    "pack": _pack,
+    "unpack": _unpack,
     "baselines": _baselines,
     "tool": _tool,
     "commit": _commit,

@@ -72,7 +72,11 @@ def _export(out: Path, folder: Path) -> str:
 
 def neutral_case(case: Case) -> NeutralCase:
     """A case in the neutral format."""
-    response = DeclaredResponse(NeoHookeanBody(case))
+    return neutral_of(DeclaredResponse(NeoHookeanBody(case)))
+
+
+def neutral_of(response: DeclaredResponse) -> NeutralCase:
+    """A case whose declared state was found in the neutral format."""
     rows = response.rows_of
     nuisance_name, nuisance_response = nuisances(response)
     names, numbers, places, lengths, amounts, units, columns = [], [], [], [], [], [], []
@@ -88,7 +92,7 @@ def neutral_case(case: Case) -> NeutralCase:
         units += [candidate.unit] * k
     site_place, site_response = sites(response)
     return NeutralCase(
-        name=case.name,
+        name=response.body.case.name,
         sensor_place=rows.place,
         sensor_direction=rows.direction,
         sensor_kind=rows.kind,

@@ -6,8 +6,8 @@ Spreads are those of `referee.setting`, which docs/referee.md publishes; the tru
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import block_diag
 
+from referee.challenge.noise import Noise, covariance_of
 from referee.compliance.observed import Observed
 from referee.compliance.response import DeclaredResponse
 from referee.faces import Floats
@@ -18,24 +18,13 @@ from referee.unknowns import stiffness_modes
 #: Modes of the stiffness field, and standard deviation of how much of the recovered error of the mesh there is: linear
 #: tetrahedra leave more than recovery shows (once to twice as much in three opened cases of run 15).
 MODES, UNRESOLVED = 24, 2.0
+#: Noise as it is drawn.
+NOISES = Noise(mean_square(NOISE), SHARED, SHARED_LENGTH)
 
 
 def noise_covariance(rows: Observed) -> Floats:
     """Covariance (rows, rows) of noise: each point's own, and what neighbours share at the same time."""
-    square = mean_square(NOISE)
-    blocks = []
-    for kind in ("displacement", "wall"):
-        own = rows.kind == kind
-        apart = np.linalg.norm(rows.place[own][:, None] - rows.place[own][None], axis=2)
-        time = np.nan_to_num(rows.time[own], nan=-1.0)
-        shared = SHARED**2 * np.exp(-apart / SHARED_LENGTH) * (time[:, None] == time[None])
-        shared *= rows.direction[own] @ rows.direction[own].T
-        sigma = rows.sigma[own]
-        blocks.append(square * sigma[:, None] * sigma[None] * (shared + np.eye(len(sigma))))
-    own = rows.kind == "force"
-    blocks.append(square * np.diag(rows.sigma[own] ** 2))
-    # rows come in this order
-    return np.asarray(block_diag(*(block for block in blocks if len(block))))
+    return covariance_of(NOISES, rows.place, rows.direction, rows.kind, rows.time, rows.sigma)
 
 
 def nuisances(response: DeclaredResponse) -> tuple[list[str], Floats]:

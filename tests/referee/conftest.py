@@ -13,7 +13,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from referee import draw, folder, geometry, setting, truth
 from referee.body import Body
 from referee.sensing import place_sensors
+from warpbrain.cases.boundary import Displaced, Fixed
 from warpbrain.mesh import TetMesh, boundary_faces
+from warpbrain.recordings.recording import ForceRecording, PointsRecording, SurfaceRecording
 
 
 def small_mesh() -> TetMesh:
@@ -56,3 +58,35 @@ def small(monkeypatch, small_body):
     monkeypatch.setattr(draw, "_AWAY", 0.015)
     monkeypatch.setattr(truth, "place_sensors", lambda s: place_sensors(replace(s, points=40, checks=10)))
     return small_body
+
+
+@pytest.fixture(scope="session")
+def small_case(small_body):
+    """The small body, its cap moved; points within, the moved wall and the force of the cap are recorded."""
+    random = np.random.default_rng(4)
+    mesh = small_body.mesh
+    free = np.flatnonzero(~(mesh.node_sets["fixed"] | mesh.node_sets["side"] | mesh.node_sets["superior"]))
+    points = mesh.points[random.permutation(free)[:30]]
+    known = {"file": "", "role": "fit"}
+    moved = mesh.points[mesh.node_sets["ventricle"]] + 1e-3 * random.normal(size=3)
+    force = np.array([[0.1, 0.2, -2.0]])
+    return replace(
+        geometry.declared_case("phantom"),
+        name="small",
+        mesh=mesh,
+        gravity_axis=setting.DOWN,
+        boundaries=(
+            Fixed(name="skull base", nodes="fixed"),
+            Fixed(name="side", nodes="side"),
+            Displaced(name="cap", nodes="superior", times=(0.0,), values=((0.001, 0.002, -0.006),)),
+        ),
+        mechanisms=(),
+        recordings=(
+            PointsRecording(
+                name="points", points=points, displacement=1e-3 * random.normal(size=points.shape), **known
+            ),
+            SurfaceRecording(name="wall", sigma=3e-4, points=moved, nodes="ventricle", **known),
+            ForceRecording(name="force", sigma=0.05, boundary="cap", time=np.array([1.0]), force=force, **known),
+        ),
+        remarks=(),
+    )
