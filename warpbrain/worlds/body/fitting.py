@@ -544,8 +544,9 @@ class Fitter:
         for number in range(_ROUNDS):
             search.minimise(_ENOUGH if number == _ROUNDS - 1 else enough)
             fit = self._update(search)
+            expected = search.expected_gain()
             # of all that is left of a renewal that is taken in part
-            gain = search.expected_gain() / search.taken**2
+            gain = expected / search.taken**2
             if enough == _ENOUGH and gain < _ENOUGH:
                 best = fit
                 break
@@ -555,7 +556,7 @@ class Fitter:
             best, least = fit if better else best, min(gain, least)
             if worse == _WORSE:
                 break
-            enough = min(max(_ENOUGH, _PART * gain), _ROUGHLY)
+            enough = min(max(_ENOUGH, _PART * expected), _ROUGHLY)
         assert best is not None
         if not np.isfinite(best.log_evidence):
             raise FloatingPointError("its evidence is not a number")
