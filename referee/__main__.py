@@ -58,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     calibrate = commands.add_parser("calibrate", help="fit the numbers of the tool's calibration.json")
     calibrate.add_argument("--write", type=Path, help="that of the package if absent")
+    calibrate.add_argument("--price-alone", action="store_true", help="the temperature stays, of more cases than these")
     published = "the published hashes; commitments.txt beside the labels if absent"
     for parser_of in (see, analyse):
         parser_of.add_argument("--labels", type=Path, required=True)
@@ -172,7 +173,7 @@ def _score(given: argparse.Namespace) -> int:
 def _calibrate(given: argparse.Namespace) -> int:
     from referee.calibrate import FILE, calibrate
 
-    print(calibrate(_sets(given), given.write or FILE))
+    print(calibrate(_sets(given), given.write or FILE, given.price_alone))
     return 0
 
 

@@ -26,11 +26,12 @@ from referee.temperature import TRAITS, Ballot, Floats, Scale, fit, held_out, in
 FILE = Path(warpbrain.__file__).parent / "inference" / "calibration.json"
 #: Fewest cases that a scale is fitted to.
 FEWEST = 10
-#: What a false name may cost, and the share of spoken names that may be wrong.
-PRICES, WRONG = (5.0, 7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 80.0), 0.03
+#: What a false name may cost, and the share of spoken names that may be wrong. At the least price a name that is left
+#: out at 0.4 is added to others from a probability of 5/6.
+PRICES, WRONG = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0, 64.0), 0.03
 
 
-def calibrate(sets: Sequence[ScoredSet], write: Path = FILE) -> str:
+def calibrate(sets: Sequence[ScoredSet], write: Path = FILE, price_alone: bool = False) -> str:
     """Fit the temperature and the price of a false name, count right names, and write all of it; weights of sets stay.
 
     Parameters
@@ -39,6 +40,8 @@ def calibrate(sets: Sequence[ScoredSet], write: Path = FILE) -> str:
         Cases without a case folder are left out.
     write : Path
         File that is written.
+    price_alone : bool
+        Whether the temperature, and how much is said at most, stay what they were of more cases than these.
 
     Returns
     -------
@@ -72,28 +75,34 @@ def calibrate(sets: Sequence[ScoredSet], write: Path = FILE) -> str:
     # names of cases whose truth was not tried are spoken and false, too
     others = [(o, b) for o, b in zip(outcomes, ballots, strict=True) if not b.right.any()]
     everyone = [*useful, *others]
+    if price_alone:
+        scale, ends = Scale(known["temperature"], tuple(weights)), known["interval"]["temperature"]
+        apart = [scale.probabilities(b.hypotheses) for b in chosen]
     probabilities = [*apart, *(scale.probabilities(b.hypotheses) for _, b in others)]
     losses, spoken = priced([o for o, _ in everyone], [b for _, b in everyone], probabilities, known["losses"])
     names = " and ".join(each.cases.resolve().parent.name for each in sets)
     content = {
-        "source": f"`python -m referee calibrate`, {len(useful)} cases of {names}",
+        "source": f"`python -m referee calibrate`, {len(useful)} cases of {names}"
+        if not price_alone
+        else f"{known['source']}; the price of a false name: {len(useful)} cases of {names}",
         "date": f"{datetime.now(UTC):%Y-%m-%d}",
         "temperature": round(scale.temperature, 3),
         # by the rule of succession: that all were right does not make the next one certain; in whole percent
-        "most_said": math.floor(100 * (spoken.hits + 1) / (spoken.of + 2)) / 100,
+        "most_said": known["most_said"] if price_alone else math.floor(100 * (spoken.hits + 1) / (spoken.of + 2)) / 100,
         "log_weights": known["log_weights"],
         "losses": losses,
         "interval": {"temperature": np.round(ends, 3).tolist()},
     }
     write.write_text(json.dumps(content, indent=1) + "\n", encoding="ascii")
     kinds = ", ".join(f"{sum(o.kind == kind for o, _ in useful)} {kind}" for kind in _KINDS)
+    apart_from = "" if price_alone else " by what the other four fifths give"
     lines = [
         f"{len(outcomes)} cases, {len(missing)} without a diagnosis; fitted to {len(useful)}: {kinds}.",
         f"Left out: {len(outcomes) - len(useful)} whose truth was not among the hypotheses.",
         "",
         f"temperature {scale.temperature:.2f}, {ends[0]:.2f} to {ends[1]:.2f}",
         "",
-        f"A false name costs {losses['false name']:g}: names right by what the other four fifths give: {spoken}.",
+        f"A false name costs {losses['false name']:g}: names right{apart_from}: {spoken}.",
         *_before_and_after(chosen, apart, weights),
         f"Written: {write.name}",
     ]
@@ -132,29 +141,27 @@ def priced(
 ) -> tuple[dict[str, float], Share]:
     """The least price of a false name at which spoken names are right as often as is asked; the highest if none is.
 
-    All that is false costs in proportion; silence, what is left out and groups cost what they did. Of fewer names than
-    one wrong one among them would show, the price stays what it was.
+    As often by what is stated of them, and not seldomer, by more than chance, by how often they were: one wrong name of
+    fifty that no price takes away must not silence the other ones. What else is false costs what it did. Of fewer names
+    than one wrong one among them would show, the price stays what it was.
     """
     for price in PRICES:
-        factor = price / losses["false name"]
-        now = {name: round(value * factor, 3) if name in _FALSE else value for name, value in losses.items()}
-        spoken = share(_spoken(outcomes, ballots, probabilities, now))
+        now = {**losses, "false name": price}
+        spoken = _spoken(outcomes, ballots, probabilities, now)
+        right, stated = share(hit for hit, _ in spoken), [p for _, p in spoken]
         # the least price has the most names
-        if price == PRICES[0] and spoken.of < 1.0 / WRONG:
-            return dict(losses), share(_spoken(outcomes, ballots, probabilities, losses))
-        if spoken.hits >= (1.0 - WRONG) * spoken.of:
+        if price == PRICES[0] and right.of < 1.0 / WRONG:
+            return dict(losses), share(hit for hit, _ in _spoken(outcomes, ballots, probabilities, losses))
+        if right.of == 0 or (np.mean(stated) >= 1.0 - WRONG and right.interval[1] >= 1.0 - WRONG):
             break
-    return now, spoken
-
-
-#: What costs in proportion to a false name.
-_FALSE = ("false name", "name where nothing is", "false group")
+    return now, right
 
 
 def _spoken(
     outcomes: Sequence[Outcome], ballots: Sequence[Ballot], probabilities: Sequence[Floats], losses: Mapping[str, float]
-) -> list[bool]:
-    right = []
+) -> list[tuple[bool, float]]:
+    """Of each verdict with names whether all of these are right, and the probability that they are."""
+    spoken = []
     for outcome, ballot, p in zip(outcomes, ballots, probabilities, strict=True):
         if outcome.said.p_value > ALPHA:
             continue
@@ -165,8 +172,8 @@ def _spoken(
             posterior[causes] = posterior.get(causes, 0.0) + value
         said = decide(posterior, losses)
         if said.verdict in ("named", "named + rest"):
-            right.append(all(map(outcome.right, said.causes)))
-    return right
+            spoken.append((all(map(outcome.right, said.causes)), said.probability))
+    return spoken
 
 
 def _before_and_after(ballots: Sequence[Ballot], apart: Sequence[Floats], weights: Sequence[float]) -> list[str]:
