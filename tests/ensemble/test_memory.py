@@ -41,7 +41,7 @@ def test_what_a_sample_takes_is_what_is_allocated(device: str, precision) -> Non
     samples = samples_of(model)
     system = System(model, device, precision.name)
     few, many = (held(Batch(system, samples, slots, tolerance=1e-6)) for slots in (8, 40))
-    # a solve on the chip needs no vectors of its own elsewhere
+    # how much several patches of the mesh have in common is not known before there are any
     least = 0.8 if forms_clusters(system.device) else 0.997
     assert least < (many - few) / 32 / bytes_per_slot(system) < 1.003
 

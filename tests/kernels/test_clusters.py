@@ -9,11 +9,9 @@ from bodies import model_of
 from shapes import box, distorted
 
 from warpbrain.ensemble.batch import pattern_of
-from warpbrain.kernels.batched import cluster, linear
-from warpbrain.kernels.batched.assembly import batched_assembly_kernels, batched_system_gather, tiles_of
-from warpbrain.kernels.batched.layout import TANGENT
+from warpbrain.kernels.batched import cluster
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
-from warpbrain.kernels.persistent import shared_memory
+from warpbrain.kernels.batched.parts import Parts
 from warpbrain.kernels.precision import DOUBLE, Precision
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
@@ -44,7 +42,13 @@ def system_of(cells: tuple[int, int, int], device: str, precision: Precision) ->
     return system
 
 
-def solved(system: System, slots: list[int], most: int = 500) -> tuple[np.ndarray, np.ndarray, bool]:
+def fitting(system: System) -> Parts | None:
+    return cluster.fitting_parts(pattern_of(system), system.precision.numpy.itemsize, system.device)
+
+
+def solved(
+    system: System, slots: list[int], most: int = 500, clusters: bool = True
+) -> tuple[np.ndarray, np.ndarray, bool]:
     """Solutions (n, 3, slots) and iterations of systems of numbers of their own, and whether clusters had them."""
     device, precision = system.device, system.precision
     random = np.random.default_rng(1)
@@ -53,8 +57,9 @@ def solved(system: System, slots: list[int], most: int = 500) -> tuple[np.ndarra
     free = system.free.numpy()[:, :, None]
     x.assign(0.1 * free * x.numpy())
     cg = BatchedConjugateGradient(
-        pattern_of(system), system.free, v, x, precision, tolerance=TOLERANCE[precision.name], max_iterations=most
-    )
+        pattern_of(system), system.free, v, x, precision, tolerance=TOLERANCE[precision.name], max_iterations=most,
+        parts=fitting(system) if clusters else None,
+    )  # fmt: skip
     cg.right_hand_side.assign(free * b.numpy())
     stored = system.matrix.values.numpy()[system.pair_positions.numpy()[:, 0]].reshape(-1, 9, 1)
     diagonal = np.zeros((len(stored), 9, 1), dtype=stored.dtype)
@@ -66,6 +71,7 @@ def solved(system: System, slots: list[int], most: int = 500) -> tuple[np.ndarra
         cg.start(*listed)
         cg.iterate(*listed, wp.zeros(1, dtype=int, device=device))
     wp.capture_launch(capture.graph)
+    wp.synchronize_device(device)
     iterations, residual, goal = (values[slots] for values in cg.results())
     assert np.all((residual <= goal) | (iterations == most))
     return x.numpy().astype(float), iterations, cg._cluster is not None
@@ -80,8 +86,7 @@ def test_the_same_solutions_as_of_many_launches(
     monkeypatch.setattr(cluster, "SIZES", (size,))
     x, iterations, on_chip = solved(system, list(range(SLOTS)))
     assert on_chip
-    monkeypatch.setattr(linear, "forms_clusters", lambda _device: False)
-    expected, many, on_chip = solved(system, list(range(SLOTS)))
+    expected, many, on_chip = solved(system, list(range(SLOTS)), clusters=False)
     assert not on_chip
     np.testing.assert_allclose(x, expected, rtol=0, atol=NEAR[precision.name] * np.abs(expected).max())
     # of which each has numbers of its own
@@ -104,30 +109,6 @@ def test_a_limit_and_no_room(clustered: str, precision: Precision) -> None:
     pattern = pattern_of(system_of((6, 6, 10), clustered, precision))
     # a hundred times the blocks, and nodes of which hardly one is active
     larger = replace(pattern, columns=np.tile(pattern.columns, 100))
-    assert cluster.fitting_parts(larger, 8, shared_memory(wp.get_device(clustered))) is None
+    assert cluster.fitting_parts(larger, 8, wp.get_device(clustered)) is None
     held = replace(pattern, active=np.zeros_like(pattern.active))
-    assert cluster.fitting_parts(held, 8, shared_memory(wp.get_device(clustered))) is None
-
-
-@pytest.mark.parametrize("count", [0, 1, 45, 70])
-def test_the_same_matrices_with_the_numbers_of_a_system_side_by_side(
-    count: int, clustered: str, precision: Precision
-) -> None:
-    system, slots = system_of((3, 3, 4), clustered, precision), 70
-    random = np.random.default_rng(3)
-    tangents, k, m = (
-        wp.array(random.normal(size=shape), dtype=precision.scalar, device=clustered)
-        for shape in ((system.elements, TANGENT, slots), slots, slots)
-    )
-    order, listed = (wp.array(values, dtype=int, device=clustered) for values in (random.permutation(slots), [count]))
-    inputs = [order, listed, system.pairs, system.pair_first, system.contributions]
-    inputs += [tangents, system.mass, system.free, k, m]
-    pairs = len(system.pairs)
-    apart = wp.zeros((pairs, 9, slots), dtype=precision.scalar, device=clustered)
-    beside = wp.zeros((slots, pairs, 9), dtype=precision.scalar, device=clustered).transpose((1, 2, 0))
-    for kernel, dim, values in (
-        (batched_assembly_kernels(precision).gather_matrix, (pairs, slots), apart),
-        (batched_system_gather(precision), tiles_of(pairs, slots), beside),
-    ):
-        wp.launch(kernel, dim, inputs=[*inputs, values], device=clustered, block_dim=128)
-    assert apart.numpy().tobytes() == np.ascontiguousarray(beside.numpy()).tobytes()
+    assert cluster.fitting_parts(held, 8, wp.get_device(clustered)) is None

@@ -15,11 +15,11 @@ import warp as wp
 
 from warpbrain.bench import command
 from warpbrain.cases.shipped import find_case
+from warpbrain.ensemble.batch import parts_of_clusters
 from warpbrain.ensemble.course import step_batch
 from warpbrain.ensemble.run import chosen_samples
 from warpbrain.ensemble.workers import Here, Job, Processes, bytes_per_slot
 from warpbrain.errors import InputError
-from warpbrain.kernels.batched.cluster import forms_clusters
 from warpbrain.kernels.batched.layout import TANGENT
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.of_case import model_of
@@ -179,16 +179,18 @@ def count_bytes(system: System, cg_iterations: float) -> int:
     n, m, pairs = system.size, system.elements, len(system.pairs)
     vector, inverse = 3 * n, 6 * n
     blocks, forces, matrix = TANGENT * m, 12 * m, 9 * pairs
-    elements = vector + blocks + forces + m
-    evaluation = elements + forces + vector + m
-    real = system.precision.numpy.itemsize
-    # right-hand side
-    beginning = blocks + matrix + 7 * vector
-    if forms_clusters(system.device):
-        # a solve reads the matrix once, and its iterations stay on the chip
-        return int(real * (evaluation + beginning + (matrix + 4 * vector) + 6 * vector))
+    # of elements and of the balance, u apart: it goes by here, and twice each with the right-hand side and the update
+    evaluation = forces + m + forces + vector + m
+    real, displacements = system.precision.numpy.itemsize, 8 * 5 * vector
+    if parts_of_clusters(system) is not None:
+        # tangents stay on the chip, a solve reads the matrix once, and its iterations stay there, too; right-hand side
+        moved = evaluation + matrix + 5 * vector + (matrix + 4 * vector) + 4 * vector
+        # u once more, for the tangents
+        return int(displacements + 8 * vector + real * moved)
+    evaluation += blocks
+    beginning = blocks + matrix + 5 * vector
     # preconditioner, start
     beginning += (3 * vector + inverse) + (2 * matrix + 6 * vector + inverse)
     product = matrix + 2 * vector
     iteration = product + (7 * vector + inverse) + 3 * vector
-    return int(real * (evaluation + beginning + cg_iterations * iteration + 6 * vector))
+    return int(displacements + real * (evaluation + beginning + cg_iterations * iteration + 4 * vector))

@@ -20,16 +20,21 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats
+from warpbrain.ensemble.room import ResultRoom
 from warpbrain.ensemble.sample import Sample
 from warpbrain.errors import InputError
-from warpbrain.kernels.batched.assembly import batched_assembly_kernels, batched_system_gather, tiles_of
+from warpbrain.kernels.batched.assembly import batched_assembly_kernels
+from warpbrain.kernels.batched.cluster import fitting_parts
 from warpbrain.kernels.batched.elements import batched_element_kernels
 from warpbrain.kernels.batched.layout import TANGENT, stages
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
 from warpbrain.kernels.batched.motion import batched_motion_kernels
-from warpbrain.kernels.batched.parts import Pattern
+from warpbrain.kernels.batched.parts import Parts, Pattern
+from warpbrain.kernels.batched.patch_assembly import PatchAssembly
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
 from warpbrain.kernels.module import KernelSet
+from warpbrain.kernels.persistent import shared_memory
+from warpbrain.kernels.tetrahedron import DeviceLaw
 from warpbrain.physics.laws import Law
 from warpbrain.simulation.dynamics import finest_tolerance
 from warpbrain.simulation.model import Material
@@ -45,10 +50,14 @@ def code_of(material: Material) -> tuple[type[Law], str]:
 class BatchGroup:
     """Elements that share a law and formulation."""
 
+    law: DeviceLaw
     kernels: KernelSet
-    elements: wp.array  # elements, and which tissue of the group each is of
+    members: NDArray[np.intp]  # elements, and which tissue of the group each is of
+    tissues: NDArray[np.intp]
+    elements: wp.array  # the same on the device
     tissue: wp.array
-    parameters: wp.array  # one row for a tissue and a slot, slots fastest
+    parameters: wp.array  # one row for a tissue and a slot, slots fastest; and in double precision
+    exact: wp.array
     rows: Floats  # the same on the host, shape (tissues, slots, parameters)
     known: Mapping[int, Floats]  # rows of each sample by its number, shape (tissues, parameters)
 
@@ -88,13 +97,19 @@ class BatchMaterials:
         rows = np.repeat(table[0][:, None], self._slots, axis=1)
         tissue = system.model.mesh.tissue
         members = np.flatnonzero(np.isin(tissue, labels))
+        tissues = np.searchsorted(labels, tissue[members])
+        law = law_type.device_law(formulation)
 
         array = partial(wp.array, device=system.device)
         return BatchGroup(
-            batched_element_kernels(law_type.device_law(formulation), p),
+            law,
+            batched_element_kernels(law, p),
+            members,
+            tissues,
             array(members, dtype=int),
-            array(np.searchsorted(labels, tissue[members]), dtype=int),
+            array(tissues, dtype=int),
             array(rows.reshape(-1, rows.shape[2]), dtype=p.scalar),
+            array(rows.reshape(-1, rows.shape[2]), dtype=wp.float64),
             rows,
             dict(zip(samples, table, strict=True)),
         )
@@ -104,7 +119,8 @@ class BatchMaterials:
         for group in self.groups:
             for slot, number in numbers.items():
                 group.rows[:, slot] = group.known[number]
-            group.parameters.assign(group.rows.reshape(-1, group.rows.shape[2]))
+            for parameters in (group.parameters, group.exact):
+                parameters.assign(group.rows.reshape(-1, group.rows.shape[2]))
 
 
 def pattern_of(system: System) -> Pattern:
@@ -114,6 +130,12 @@ def pattern_of(system: System) -> Pattern:
     pairs[positions[:, 0]] = pairs[positions[:, 1]] = np.arange(len(positions))
     columns, active = matrix.columns.numpy()[: matrix.nnz], np.any(system.free.numpy() != 0.0, axis=1)
     return Pattern(matrix.offsets.numpy(), columns, pairs, system.model.mesh.points, active)
+
+
+def parts_of_clusters(system: System) -> Parts | None:
+    """Who has which part of a matrix of a system where clusters of its device solve; None if they do not."""
+    real = system.precision.numpy.itemsize
+    return system.once("clusters", [system.constrained], lambda: fitting_parts(pattern_of(system), real, system.device))
 
 
 Ints = NDArray[np.int32]
@@ -141,9 +163,9 @@ class States:
 class Batch:
     """Slots on a device for samples, which share the mesh, pattern and masses of a system, and not its fields.
 
-    Linear solves have a relative tolerance, never finer than 20 rounding errors of the precision. A pass ends when the
+    Linear solves have a relative tolerance, never finer than what the precision allows. A pass ends when the
     part `linger` of those that it began with, or less, has not ended. Prescribed displacements are sums of `shapes`
-    (shapes, n, 3) [m].
+    (shapes, n, 3) [m]. Steps may all be `even`, of one length.
     """
 
     def __init__(
@@ -155,6 +177,7 @@ class Batch:
         tolerance: float,
         shapes: Floats | None = None,
         linger: float = 0.0,
+        even: bool = False,
     ) -> None:
         self.system, self.slots = system, slots
         self._linger = linger
@@ -165,11 +188,10 @@ class Batch:
         self._sums_kernels = batched_solve_kernels(system.precision)
         self.shapes = np.zeros((0, system.size, 3)) if shapes is None else shapes
         model, p, n, m, b = system.model, system.precision, system.size, system.elements, slots
-        self._u, self._v, self._dv = (self._zeros(n, 3, b) for _ in range(3))
-        self._u_start, self._v_start = self._zeros(n, 3, b), self._zeros(n, 3, b)
+        self._u, self._u_start = (self._zeros(n, 3, b, dtype=wp.float64) for _ in range(2))
+        self._v, self._v_start, self._dv = (self._zeros(n, 3, b) for _ in range(3))
         self._prescribed, self._internal = self._zeros(n, 3, b), self._zeros(n, 3, b)
         self._element_forces, self._element_J = self._zeros(4 * m, 3, b), self._zeros(m, b)
-        self._tangents = self._zeros(m, TANGENT, b)
         # slots, and how many of them are in the list
         self._all = self._array(np.arange(b), int), self._array([b], int)
         self._fresh = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
@@ -202,21 +224,40 @@ class Batch:
         self._told = [self._on_host(values) for values in (self._lists, self._numbers, self._found)]
         self._J_share = int(np.ceil(np.sqrt(m)))
         self._least_J = self._zeros(-(-m // self._J_share), b)
+        parts = parts_of_clusters(system)
+        # on the chip sums are in double precision, and tangents are before they are added up
+        roundings = 20.0 if parts is None else 8.0
         self._cg = BatchedConjugateGradient(
             pattern_of(system),
             system.free,
             self._v,
             self._dv,
             system.precision,
-            tolerance=finest_tolerance(tolerance, system.precision),
+            tolerance=finest_tolerance(tolerance, system.precision, roundings),
             max_iterations=_MAX_CG,
+            parts=parts,
         )
+        # matrices are made of elements where they are solved for, or of tangents in memory
+        self._patches = self._patch_assembly() if self._cg.side_by_side else None
+        self._tangents = self._zeros(0 if self._patches else m, TANGENT, b)
         self._every = self._array(np.arange(n), int)
         self.held = np.flatnonzero(np.any(model.constrained, axis=1))
         self._held = self._array(self.held, int)
-        self._collected = self._zeros(n * min(b, max(1, _STAGED // (n * 3 * p.numpy.itemsize))), dtype=p.vec3)
+        self._collected = self._zeros(n * min(b, max(1, _STAGED // (n * 3 * 8))), dtype=wp.vec3d)
         self._staging = self._on_host(self._collected)
+        self._room = ResultRoom(n, b)
+        self._ahead = even and self._patches is not None
         self._graph: Any = None
+        self._graph_ahead: Any = None
+        self._told_all = wp.Event(self._device) if self._device.is_cuda else None
+
+    def _patch_assembly(self) -> PatchAssembly:
+        s, mesh = self.system, self.system.model.mesh
+        return PatchAssembly(
+            [(group.law, group.members, group.tissues, group.exact) for group in self._materials.groups],
+            mesh.points, s.tetrahedra, s.shape_gradients, mesh.volumes, s.pairs.numpy(), s.free.numpy() != 0.0, s.mass,
+            self._u, self._cg.values, self._precision, shared_memory(self._device),
+        )  # fmt: skip
 
     def _array(self, values: Any, dtype: Any) -> wp.array:
         return wp.array(values, dtype=dtype, device=self._device)
@@ -249,15 +290,14 @@ class Batch:
 
     def displacements(self, slots: Sequence[int]) -> Floats:
         """`u` of some slots [m], shape (slots, n, 3)."""
-        return self._collect(self._u, slots, self._every)
+        return self._collect(self._u, slots, self._every, self._room.take(len(slots)))
 
     def held_forces(self, slots: Sequence[int]) -> Floats:
         """Internal forces of some slots [N] on the nodes `held`, shape (slots, held, 3)."""
-        return self._collect(self._internal, slots, self._held)
+        return self._collect(self._internal, slots, self._held, np.empty((len(slots), len(self.held), 3)))
 
-    def _collect(self, values: wp.array, slots: Sequence[int], nodes: wp.array) -> Floats:
-        """Vectors of some slots at some nodes."""
-        collected = np.empty((len(slots), len(nodes), 3))
+    def _collect(self, values: wp.array, slots: Sequence[int], nodes: wp.array, collected: Floats) -> Floats:
+        """Vectors of some slots at some nodes, in an array for them."""
         some = self._staging.size // max(1, len(nodes))
         for first in range(0, len(slots) if len(nodes) else 0, some):
             listed = self._array(slots[first : first + some], int)
@@ -274,8 +314,9 @@ class Batch:
 
     # -- a pass ---------------------------------------------------------------------------------------------------
 
-    def advance(self, start: NDArray[np.intp], marked: NDArray[np.intp]) -> States:
-        """One pass: slots `start` begin a step from an evaluated state, the states of `marked` are to be evaluated."""
+    def advance(self, start: NDArray[np.intp], marked: NDArray[np.intp], *, on: bool = True) -> States:
+        """One pass: slots `start` begin a step from an evaluated state, the states of `marked` are to be evaluated, and
+        it may go `on` from there."""
         if self._graph is None:
             self._capture()
         self._unsolved[start] = True
@@ -291,8 +332,14 @@ class Batch:
         numbers[3 : 3 + len(self.load_factors)] = self.load_factors
         numbers[3 + self._factors.shape[0] :][: len(self.amounts)] = self.amounts
         wp.capture_launch(self._graph)
+        if self._told_all is not None:
+            wp.record_event(self._told_all)
+            if self._ahead and on:
+                # while what has been told decides which of them are solved
+                wp.capture_launch(self._graph_ahead)
+            self._room.prepare()
+            wp.synchronize_event(self._told_all)
         iterations, residual, goal = self._cg.results()
-        wp.synchronize_device(self._device)
         ready = found[3] != 0.0
         self._unsolved[ready] = False
         unbalanced, internal = np.sqrt(found[:2].astype(np.float64))
@@ -309,6 +356,11 @@ class Batch:
         with wp.ScopedCapture(device=self._device) as capture:
             self._record()
         self._graph = capture.graph
+        if self._ahead:
+            self._assemble(self._fresh)
+            with wp.ScopedCapture(device=self._device) as capture:
+                self._assemble(self._fresh)
+            self._graph_ahead = capture.graph
 
     def _record(self) -> None:
         lists, numbers, found = self._told
@@ -335,33 +387,48 @@ class Batch:
                 self._motion.prescribe, (s.size, lanes), *begun, self._shapes, self._amounts, s.free, self._h, self._u,
                 self._prescribed,
             )  # fmt: skip
-        gather: tuple[Any, tuple[int, ...]] = self._kernels.gather_matrix, (len(s.pairs), lanes)
-        if self._cg.side_by_side:
-            gather = batched_system_gather(self._precision), tiles_of(len(s.pairs), lanes)
-        self._launch(
-            *gather, *begun, s.pairs, s.pair_first, s.contributions, self._tangents, s.mass, s.free, self._k, self._m,
-            self._cg.values,
-        )  # fmt: skip
+        if not self._ahead:
+            self._assemble(begun)
         self._launch(
             self._motion.begin, (s.size, lanes), *begun, self._loads, self._factors, self._internal, s.mass, s.free,
             self._h, self._u, self._v, self._u_start, self._v_start, self._cg.right_hand_side,
         )  # fmt: skip
         if self._shapes is not None:
+            for group in self._materials.groups:
+                self._launch(
+                    group.kernels.tangents_times, (len(group.elements), lanes), *begun, *self._elements_of(group),
+                    self._u, self._prescribed, self._element_forces,
+                )  # fmt: skip
             self._launch(
-                self._kernels.constrained_load, (s.size, lanes), *begun, s.corner_first, s.corners, s.nodes,
-                self._tangents, self._prescribed, s.free, self._k, self._cg.right_hand_side,
+                self._kernels.constrained_load, (s.size, lanes), *begun, s.corner_first, s.corners,
+                self._element_forces, s.free, self._k, self._cg.right_hand_side,
             )  # fmt: skip
         self._cg.start(*begun)
 
+    def _assemble(self, listed: tuple[wp.array, wp.array]) -> None:
+        """Matrices of a list of slots, whose states have been evaluated."""
+        s = self.system
+        if self._patches is not None:
+            self._patches.assemble(*listed, self._k, self._m)
+            return
+        self._launch(
+            self._kernels.gather_matrix, (len(s.pairs), self.slots), *listed, s.pairs, s.pair_first, s.contributions,
+            self._tangents, s.mass, s.free, self._k, self._m, self._cg.values,
+        )  # fmt: skip
+
+    def _elements_of(self, group: BatchGroup) -> tuple[wp.array, ...]:
+        s = self.system
+        return group.elements, group.tissue, s.nodes, s.inverse_edges, s.volume, group.parameters
+
     def _evaluate(self) -> None:
-        """Forces, tangents, `J` and balance at the states of the fresh list."""
+        """Forces, tangents where they are kept, `J` and balance at the states of the fresh list."""
         s, lanes, fresh = self.system, self.slots, self._fresh
         for group in self._materials.groups:
-            self._launch(
-                group.kernels.forces_and_tangents, (len(group.elements), lanes), *fresh, group.elements, group.tissue,
-                s.nodes, s.inverse_edges, s.volume, group.parameters, self._u, self._element_forces,
-                self._tangents, self._element_J,
-            )  # fmt: skip
+            of_elements = (len(group.elements), lanes), *fresh, *self._elements_of(group), self._u, self._element_forces
+            if self._patches is not None:
+                self._launch(group.kernels.forces, *of_elements, self._element_J)
+            else:
+                self._launch(group.kernels.forces_and_tangents, *of_elements, self._tangents, self._element_J)
         self._launch(
             self._kernels.gather_forces, (self._chunks, lanes), *fresh, s.corner_first, s.corners,
             self._element_forces, self._final, s.free, self._internal, self._shares,

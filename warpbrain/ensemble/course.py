@@ -45,6 +45,8 @@ class Course(abc.ABC):
     #: best where all take steps of one length, and a quarter in a run to rest, where some need a hundred times the
     #: iterations of others.
     linger: float = 0.0
+    #: Whether all steps have one length: then the matrix of the next one is made while the host decides.
+    even: bool = False
 
     def __init__(self, model: Model) -> None:
         self.model = model
@@ -57,7 +59,9 @@ class Course(abc.ABC):
     def batch_of(self, system: System, samples: Sequence[Sample], slots: int) -> Batch:
         """A batch for this course."""
         shapes = self.shapes()
-        return Batch(system, samples, slots, tolerance=self.tolerance, shapes=shapes, linger=self.linger)
+        return Batch(
+            system, samples, slots, tolerance=self.tolerance, shapes=shapes, linger=self.linger, even=self.even
+        )
 
     def attach(self, batch: Batch) -> None:
         """Follow the slots of a batch."""
@@ -67,6 +71,10 @@ class Course(abc.ABC):
         self.steps, self.cg_iterations = np.zeros(batch.slots, dtype=int), np.zeros(batch.slots, dtype=int)
         # the state is one to start from, not one that a step has led to
         self._entering = np.zeros(batch.slots, dtype=bool)
+
+    def goes_on(self, slots: Slots) -> bool:
+        """Whether a step may follow on those that slots begin."""
+        return True
 
     def begin(self, slots: Slots) -> None:
         """New samples have been placed."""
@@ -98,19 +106,19 @@ class Course(abc.ABC):
 
     def _prepare(self, slots: Slots) -> None:
         """Set step lengths, load factors and prescribed displacements of the steps that begin."""
-        due = self.time + self.batch.time_step
+        times, which = np.unique((self.time + self.batch.time_step)[slots], return_inverse=True)
         for row, load in enumerate(self.model.loads):
-            factors = {time: load.factor(time) for time in set(due[slots].tolist())}
-            self.batch.load_factors[row, slots] = [factors[time] for time in due[slots].tolist()]
+            self.batch.load_factors[row, slots] = np.array([load.factor(time) for time in times.tolist()])[which]
 
-    def reactions(self, slots: Sequence[int]) -> Floats:
-        """What holds the constrained components of some slots [N], shape (slots, n, 3)."""
-        held, times = self.batch.held, [float(self.time[slot]) for slot in slots]
-        at = {time: self.model.external_forces(time)[held] for time in set(times)}
-        external = np.reshape([at[time] for time in times], (len(slots), len(held), 3))
-        reactions = np.zeros((len(slots), *self.model.constrained.shape))
-        reactions[:, held] = self.model.reactions(self.batch.held_forces(slots), external, held)
-        return reactions
+    def support(self, slots: Sequence[int]) -> Floats:
+        """What holds the constrained components of some slots [N], shape (slots, held, 3)."""
+        held = self.batch.held
+        times, which = np.unique(self.time[list(slots)], return_inverse=True)
+        at = [self.model.external_forces(time)[held] for time in times.tolist()]
+        external = np.reshape(at, (len(times), len(held), 3))
+        # of all that have ended at the same time it is one
+        external = external if len(external) == 1 else external[which]
+        return self.model.reactions(self.batch.held_forces(slots), external, held)
 
     def why(self, slot: int, states: States) -> str:
         """What is wrong with the state of a slot."""
@@ -122,6 +130,8 @@ class Course(abc.ABC):
 
 class Moving(Course):
     """So many equal steps [s] of backward Euler; the tolerance of linear solves is relative."""
+
+    even = True
 
     def __init__(self, model: Model, steps: int, time_step: float = 0.001, tolerance: float = 1e-6) -> None:
         super().__init__(model)
@@ -143,6 +153,9 @@ class Moving(Course):
     def attach(self, batch: Batch) -> None:
         super().attach(batch)
         batch.time_step[:] = self._h
+
+    def goes_on(self, slots: Slots) -> bool:
+        return bool(np.any(self._entering) or np.any(self.steps[slots] + 1 < self._count))
 
     def _decide(self, good: Slots, bad: Slots, states: States) -> Verdict:
         failed = {int(slot): self.why(int(slot), states) for slot in bad}
@@ -251,14 +264,17 @@ def step_batch(batch: Batch, course: Course, numbers: Sequence[int]) -> Iterator
         del waiting[: len(free)]
         batch.place(dict(zip(free.tolist(), number_in[free].tolist(), strict=True)))
         course.begin(free)
-        states = batch.advance(go, np.concatenate([back, free]))
+        states = batch.advance(go, np.concatenate([back, free]), on=course.goes_on(go))
         verdict = course.judge(states)
         batch.restore(verdict.back.tolist())
         ended, done = [], verdict.done.tolist()
-        for slot, u, reactions in zip(done, batch.displacements(done), course.reactions(done), strict=True):
-            number, steps, iterations = (int(of[slot]) for of in (number_in, course.steps, course.cg_iterations))
-            time, residual, least = (float(of[slot]) for of in (course.time, course.residual, states.min_J))
-            ended.append(Outcome(number, "", steps, iterations, time, residual, least, u, reactions))
+        if done:
+            known = (number_in, course.steps, course.cg_iterations, course.time, course.residual, states.min_J)
+            fields = batch.displacements(done), course.support(done)
+            for number, steps, iterations, time, residual, least, u, support in zip(
+                *(of[done].tolist() for of in known), *fields, strict=True
+            ):
+                ended.append(Outcome(number, "", steps, iterations, time, residual, least, u, batch.held, support))
         for slot, reason in verdict.failed.items():
             taken = int(course.steps[slot]), int(course.cg_iterations[slot]), float(course.time[slot])
             ended.append(failure(int(number_in[slot]), reason, *taken))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from warpbrain.simulation.result import NodalState, Statistics, displacement_sta
 
 #: Percentiles of the fields.
 PERCENTILES = (5, 50, 95)
-_NOTHING = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
@@ -118,8 +117,7 @@ def results_of(
             observed = observe(case, NodalState(mesh, outcome.u, outcome.reactions), None if to_rest else outcome.time)
             comparisons = observed.comparisons
             not_compared.update(dict.fromkeys(observed.skipped))
-        ended = replace(outcome, u=_NOTHING, reactions=_NOTHING)
-        rows[outcome.number] = Row(by_number[outcome.number], ended, displacement, comparisons)
+        rows[outcome.number] = Row(by_number[outcome.number], outcome.without_fields(), displacement, comparisons)
         if on_sample is not None:
             on_sample(len(rows))
     # by number: sums over samples then have one order, whoever computed which of them when

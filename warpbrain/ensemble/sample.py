@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
 from warpbrain.simulation.model import Material
@@ -41,15 +42,30 @@ class Outcome:
     residual: float  # out-of-balance force of that state relative to all nodal forces, with every load at its end
     min_J: float  # smallest volume ratio of an element in that state
     u: Floats  # (n, 3), displacement [m]; of no nodes if the sample failed
-    reactions: Floats  # (n, 3), what holds the constrained components [N]
+    held: NDArray[np.intp]  # nodes with constrained components, and what holds these [N], (held, 3)
+    support: Floats
 
     @property
     def failed(self) -> bool:
         """There is no answer."""
         return bool(self.reason)
 
+    @property
+    def reactions(self) -> Floats:
+        """What holds the constrained components of all nodes [N], shape (n, 3)."""
+        reactions = np.zeros_like(self.u)
+        reactions[self.held] = self.support
+        return reactions
+
+    def without_fields(self) -> Outcome:
+        """The same without what is of nodes."""
+        return replace(self, u=_NOTHING, held=_NOWHERE, support=_NOTHING)
+
+
+_NOTHING, _NOWHERE = np.zeros((0, 3)), np.zeros(0, dtype=np.intp)
+
 
 def failure(number: int, reason: str, steps: int = 0, cg_iterations: int = 0, time: float = 0.0) -> Outcome:
     """The outcome of a sample that has none."""
-    nothing = np.zeros((0, 3))
-    return Outcome(number, reason, steps, cg_iterations, time, float("nan"), float("nan"), nothing, nothing)
+    nan = float("nan")
+    return Outcome(number, reason, steps, cg_iterations, time, nan, nan, _NOTHING, _NOWHERE, _NOTHING)

@@ -44,7 +44,7 @@ class Store:
     def __init__(self, folder: Path, job: Job, kind: str, about: Mapping[str, Any]) -> None:
         self.folder = folder
         # reactions are kept at nodes with constrained components only
-        self._held = np.any(job.model.constrained, axis=1)
+        self._held, self._nodes = np.flatnonzero(np.any(job.model.constrained, axis=1)), len(job.model.constrained)
         self._fingerprint = job.fingerprint(kind)
         manifest = output_folder(folder) / MANIFEST
         self._parts = folder / PARTS
@@ -106,13 +106,12 @@ class Store:
     def write(self, outcomes: Sequence[Outcome]) -> None:
         """Write outcomes, all or none of them."""
         good = [outcome for outcome in outcomes if not outcome.failed]
-        n, held = len(self._held), np.count_nonzero(self._held)
         arrays: dict[str, Any] = {
             "fingerprint": np.array(self._fingerprint),
             **{name: np.array([getattr(o, name) for o in outcomes]) for name in _NUMBERS},
             "reason": np.array([outcome.reason for outcome in outcomes], dtype=np.str_),
-            "u": np.array([outcome.u for outcome in good]).reshape(-1, n, 3),
-            "reactions": np.array([outcome.reactions[self._held] for outcome in good]).reshape(-1, held, 3),
+            "u": np.array([outcome.u for outcome in good]).reshape(-1, self._nodes, 3),
+            "reactions": np.array([outcome.support for outcome in good]).reshape(-1, len(self._held), 3),
         }
         with whole_file(self._parts / f"part-{self._next:06d}.npz") as scratch:
             write_arrays(scratch, arrays)
@@ -129,15 +128,11 @@ class Store:
                 raise InputError(f"{file}: {error}; the same command computes its samples again") from None
             good = iter(range(len(arrays["u"])))
             for row, reason in enumerate(arrays["reason"].tolist()):
-                u = reactions = np.zeros((0, 3))
-                if not reason:
-                    place = next(good)
-                    u = arrays["u"][place]
-                    reactions = np.zeros_like(u)
-                    reactions[self._held] = arrays["reactions"][place]
-                yield Outcome(
-                    **{name: arrays[name][row].item() for name in _NUMBERS}, reason=reason, u=u, reactions=reactions
-                )
+                numbers = {name: arrays[name][row].item() for name in _NUMBERS}
+                place = None if reason else next(good)
+                u, support = (np.zeros((0, 3)) if place is None else arrays[name][place] for name in ("u", "reactions"))
+                held = self._held[: len(support)]
+                yield Outcome(**numbers, reason=reason, u=u, held=held, support=support)
 
 
 _NUMBERS = ("number", "steps", "cg_iterations", "time", "residual", "min_J")

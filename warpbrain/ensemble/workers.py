@@ -24,6 +24,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from warpbrain import __version__
+from warpbrain.ensemble.batch import parts_of_clusters
 from warpbrain.ensemble.course import Course, Moving, Resting, step_samples
 from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.errors import InputError, SolveError
@@ -119,14 +120,21 @@ SHARE = 0.8
 def bytes_per_slot(system: System) -> int:
     """Memory that a sample takes in a batch: element results, matrix, vectors and sums."""
     n, m = system.size, system.elements
-    elements = m * (TANGENT + 4 * 3 + 1)
+    elements = m * (4 * 3 + 1)
     matrix = len(system.pairs) * 9
-    # u, v, dv, both at the start of the step, prescribed velocity, internal forces, b, what leaves the device
-    vectors = 9 * 3 * n
-    # z, p, q and the preconditioner, where they are not on the chip
-    vectors += 3 * 3 * n + 6 * n
+    # u, u at the start of the step and what leaves the device are in double precision
+    displacements = 3 * 3 * n
+    # v, dv, v at the start of the step, prescribed velocity, internal forces, b
+    vectors = 6 * 3 * n
+    if parts_of_clusters(system) is not None:
+        # what several patches have of a pair: half as much, at most
+        matrix += matrix // 2
+    else:
+        # tangents; z, p, q and the preconditioner
+        elements += m * TANGENT
+        vectors += 3 * 3 * n + 6 * n
     sums = 2 * n
-    return system.precision.numpy.itemsize * (elements + matrix + vectors + sums)
+    return 8 * displacements + system.precision.numpy.itemsize * (elements + matrix + vectors + sums)
 
 
 def free_bytes(system: System) -> int:

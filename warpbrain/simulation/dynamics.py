@@ -32,9 +32,9 @@ from warpbrain.simulation.system import System
 PHASES = ("internal forces", "assemble system", "solve system", "time integration")
 
 
-def finest_tolerance(tolerance: float, precision: Precision) -> float:
-    """A relative tolerance of CG, or the finest that the precision allows: 20 rounding errors."""
-    return max(tolerance, 20.0 * precision.epsilon)
+def finest_tolerance(tolerance: float, precision: Precision, roundings: float = 20.0) -> float:
+    """A relative tolerance of CG, or the finest that the precision allows: so many rounding errors."""
+    return max(tolerance, roundings * precision.epsilon)
 
 
 def fault_of_step(time: float, min_J: float, linear: LinearResult, most_compressed: Callable[[], str]) -> str:

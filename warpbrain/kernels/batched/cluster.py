@@ -10,6 +10,7 @@ There are as many clusters as systems, and the GPU begins one where another has 
 depends on the pattern alone: so a system has the same bits alone and among others.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -20,7 +21,7 @@ import warp as wp
 
 from warpbrain.kernels.batched.parts import ENDS, Parts, Pattern, parts_of
 from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.persistent import blocks_stay
+from warpbrain.kernels.persistent import blocks_stay, shared_memory
 from warpbrain.kernels.precision import Precision
 
 #: Blocks of a cluster, of which the fewest that have room are taken; and threads of a block.
@@ -31,6 +32,29 @@ _REGISTERS = 108
 _BANKS = 128
 #: Sizes of a kernel are whole multiples of this: meshes of about the same size share it.
 _ROUNDED = 32
+
+
+@wp.struct
+class Tables:
+    """Of `warpbrain.kernels.batched.parts.Parts`."""
+
+    starts: wp.array[int]
+    nodes: wp.array[int]
+    outer_starts: wp.array[int]
+    outer_nodes: wp.array[int]
+    outer_places: wp.array[int]
+    pairs: wp.array3d[int]
+    columns: wp.array3d[int]
+    segment_starts: wp.array2d[int]
+    row_segments: wp.array[int]
+
+
+def on_device(struct: Any, tables: Mapping[str, Any], device: wp.Device) -> Any:
+    """A struct of arrays of whole numbers, of tables of these names."""
+    made = struct()
+    for name in struct.vars:
+        setattr(made, name, wp.array(tables[name], dtype=int, device=device))
+    return made
 
 
 def forms_clusters(device: wp.Device) -> bool:
@@ -71,9 +95,10 @@ def sizes_of(parts: Parts, real: int) -> Sizes:
     return Sizes(parts.blocks, parts.places, in_registers, rows, outers, segments)
 
 
-def fitting_parts(pattern: Pattern, real: int, shared_bytes: int) -> Parts | None:
-    """Parts for the smallest cluster that keeps a matrix of numbers of `real` bytes, or None."""
-    for blocks in SIZES:
+def fitting_parts(pattern: Pattern, real: int, device: wp.Device) -> Parts | None:
+    """Parts for the smallest cluster of a device that keeps a matrix of numbers of `real` bytes, or None."""
+    shared_bytes = shared_memory(device)
+    for blocks in SIZES if forms_clusters(device) else ():
         # without more ado where not even the matrix has room
         if 9 * real * len(pattern.columns) > blocks * (shared_bytes + 4 * _REGISTERS * THREADS):
             continue
@@ -112,15 +137,7 @@ def cluster_kernel(precision: Precision, sizes: Sizes) -> Any:
         slots: wp.array[int],
         count: wp.array[int],
         ahead: int,
-        starts: wp.array[int],
-        nodes: wp.array[int],
-        outer_starts: wp.array[int],
-        outer_nodes: wp.array[int],
-        outer_places: wp.array[int],
-        place_pairs: wp.array3d[int],
-        place_columns: wp.array3d[int],
-        segment_starts: wp.array2d[int],
-        row_segments: wp.array[int],
+        parts: Tables,
         diagonal: wp.array[int],
         pair_count: int,
         values: wp.array3d[scalar],
@@ -138,15 +155,7 @@ def cluster_kernel(precision: Precision, sizes: Sizes) -> Any:
         slots: wp.array[int],
         count: wp.array[int],
         ahead: int,
-        starts: wp.array[int],
-        nodes: wp.array[int],
-        outer_starts: wp.array[int],
-        outer_nodes: wp.array[int],
-        outer_places: wp.array[int],
-        place_pairs: wp.array3d[int],
-        place_columns: wp.array3d[int],
-        segment_starts: wp.array2d[int],
-        row_segments: wp.array[int],
+        parts: Tables,
         diagonal: wp.array[int],
         pair_count: int,
         values: wp.array3d[scalar],
@@ -161,9 +170,7 @@ def cluster_kernel(precision: Precision, sizes: Sizes) -> Any:
         # all of the shared memory: the native code knows where it begins
         wp.tile_empty(shape=numbers, dtype=wp.float64, storage="shared")
         solve(
-            slots, count, ahead, starts, nodes, outer_starts, outer_nodes, outer_places, place_pairs, place_columns,
-            segment_starts, row_segments, diagonal, pair_count, values, b, v, free, x, tolerance, max_iterations,
-            outcome,
+            slots, count, ahead, parts, diagonal, pair_count, values, b, v, free, x, tolerance, max_iterations, outcome,
         )  # fmt: skip
 
     return conjugate_gradients
@@ -205,14 +212,11 @@ class ClusterSolve:
         self._kernel = cluster_kernel(precision, sizes_of(parts, precision.numpy.itemsize))
         self._block_count = self._clusters * parts.blocks
         self._outcome = wp.zeros((self._clusters, 3), dtype=wp.float64, device=device)
-        tables = (
-            parts.starts, parts.nodes, parts.outer_starts, parts.outer_nodes, parts.outer_places, parts.pairs,
-            parts.columns, parts.segment_starts, parts.row_segments,
-        )  # fmt: skip
+        self._told = wp.zeros((self._clusters, 3), dtype=wp.float64, device="cpu", pinned=True)
         self._inputs = [
             # about as many are under way at a time
-            device.sm_count // parts.blocks, *(wp.array(table, dtype=int, device=device) for table in tables), diagonal,
-            values.shape[0], values, b, v, free, x, wp.float64(tolerance), max_iterations, self._outcome,
+            device.sm_count // parts.blocks, on_device(Tables, vars(parts), device), diagonal, values.shape[0], values,
+            b, v, free, x, wp.float64(tolerance), max_iterations, self._outcome,
         ]  # fmt: skip
 
     def solve(self, slots: wp.array, count: wp.array) -> None:
@@ -224,8 +228,9 @@ class ClusterSolve:
             device=self._device,
             block_dim=THREADS,
         )
+        wp.copy(self._told, self._outcome)
 
     def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Iterations, residual norms and goals of all slots, of the last system of each (waits for the device)."""
-        iterations, residual, goal = self._outcome.numpy().T
+        """Iterations, residual norms and goals of the last system of each slot, once the device has ended."""
+        iterations, residual, goal = self._told.numpy().T
         return iterations.astype(np.int32), residual.copy(), goal.copy()

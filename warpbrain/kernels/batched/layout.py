@@ -25,6 +25,18 @@ def vector_of(x: wp.array3d[Any], i: int, slot: int):
 
 
 @wp.func
+def narrowed(x: wp.vec3d, like: wp.array3d[Any]):
+    """A vector in the precision of others."""
+    return wp.vector(like.dtype(x[0]), like.dtype(x[1]), like.dtype(x[2]))
+
+
+@wp.func
+def widened(x: Any):
+    """A vector in double precision."""
+    return wp.vec3d(wp.float64(x[0]), wp.float64(x[1]), wp.float64(x[2]))
+
+
+@wp.func
 def store_vector(x: wp.array3d[Any], i: int, slot: int, value: Any):
     """Set vector `i` of a sample."""
     x[i, 0, slot] = value[0]

@@ -10,7 +10,7 @@ A system need not end in the loop that it began in. The loop is left when few go
 and go on in the next one beside whatever has been started until then. So a system that takes a thousand iterations
 holds up nobody.
 
-Where a GPU has clusters that keep a system on the chip, all of this is one launch, of which none is left over
+Where clusters of a GPU have room for a system, all of this is one launch, of which none is left over
 (`warpbrain.kernels.batched.cluster`).
 """
 
@@ -21,11 +21,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpbrain.kernels.batched.cluster import ClusterSolve, fitting_parts, forms_clusters
+from warpbrain.kernels.batched.cluster import ClusterSolve
 from warpbrain.kernels.batched.layout import stages
-from warpbrain.kernels.batched.parts import Pattern
+from warpbrain.kernels.batched.parts import Parts, Pattern
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
-from warpbrain.kernels.persistent import shared_memory
 from warpbrain.kernels.precision import Precision
 
 
@@ -34,7 +33,7 @@ class BatchedConjugateGradient:
 
     Solves `A (v + x) = b` for the change `x` of a given `v` (n, 3, slots) on the `free` components (n,): others have a
     row and a column of the identity in `A`, and no `b`. `x` (n, 3, slots) is first guess and result. A system ends when
-    ``|b - A v - A x| <= tolerance |b - A v|``.
+    ``|b - A v - A x| <= tolerance |b - A v|``. With `parts` of the pattern clusters solve.
 
     Attributes
     ----------
@@ -58,6 +57,7 @@ class BatchedConjugateGradient:
         *,
         tolerance: float,
         max_iterations: int,
+        parts: Parts | None = None,
     ) -> None:
         n, _, slots = x.shape
         self._kernels = batched_solve_kernels(precision)
@@ -75,9 +75,6 @@ class BatchedConjugateGradient:
         self.right_hand_side = zeros(n, 3, slots)
         self.solving = zeros(slots, dtype=int)
         self._cluster: ClusterSolve | None = None
-        parts = None
-        if forms_clusters(device):
-            parts = fitting_parts(pattern, precision.numpy.itemsize, shared_memory(device))
         self.side_by_side = parts is not None
         if parts is not None:
             self.values = zeros(slots, pattern.stored, 9).transpose((1, 2, 0))
@@ -160,7 +157,7 @@ class BatchedConjugateGradient:
         self._launch(k.turn, chunks, *active, self._beta, self._z, self._p)
 
     def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Iterations, residual norms and goals of all slots (waits for the device)."""
+        """Iterations, residual norms and goals of all slots, once the device has ended."""
         if self._cluster is not None:
             return self._cluster.results()
         with np.errstate(invalid="ignore"):

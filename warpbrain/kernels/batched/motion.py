@@ -1,13 +1,15 @@
 """Kernels of a time step of many samples, each with a step length, a time and loads of its own.
 
-See `warpbrain.simulation.dynamics` for the equations.
+See `warpbrain.simulation.dynamics` for the equations. Displacements are in double precision whatever the others are:
+that of a body that moves far has no digits to lose to the strain of its elements.
 """
 
 from functools import cache
+from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.batched.layout import store_vector, vector_of
+from warpbrain.kernels.batched.layout import narrowed, store_vector, vector_of, widened
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
@@ -21,9 +23,9 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
     @kernels.add
     def restore(
         slots: wp.array[int],
-        u_start: wp.array3d[scalar],
+        u_start: wp.array3d[wp.float64],
         v_start: wp.array3d[scalar],
-        u: wp.array3d[scalar],
+        u: wp.array3d[wp.float64],
         v: wp.array3d[scalar],
         dv: wp.array3d[scalar],
     ):
@@ -35,11 +37,11 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         store_vector(dv, i, slot, vec3())
 
     @kernels.add
-    def reset(slots: wp.array[int], u: wp.array3d[scalar], v: wp.array3d[scalar], dv: wp.array3d[scalar]):
+    def reset(slots: wp.array[int], u: wp.array3d[wp.float64], v: wp.array3d[scalar], dv: wp.array3d[scalar]):
         """At rest in the reference shape."""
         i, lane = wp.tid()
         slot = slots[lane]
-        store_vector(u, i, slot, vec3())
+        store_vector(u, i, slot, wp.vec3d())
         store_vector(v, i, slot, vec3())
         store_vector(dv, i, slot, vec3())
 
@@ -51,7 +53,7 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         amounts: wp.array2d[scalar],
         free: wp.array[vec3],
         h: wp.array[scalar],
-        u: wp.array3d[scalar],
+        u: wp.array3d[wp.float64],
         velocity: wp.array3d[scalar],
     ):
         """Velocity of the constrained components that takes them to where they must be at the end of the step."""
@@ -63,7 +65,9 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         for shape in range(shapes.shape[0]):
             goal += amounts[shape, slot] * shapes[shape, i]
         held = vec3(scalar(1.0), scalar(1.0), scalar(1.0)) - free[i]
-        store_vector(velocity, i, slot, wp.cw_mul(held, (goal - vector_of(u, i, slot)) / h[slot]))
+        store_vector(
+            velocity, i, slot, wp.cw_mul(held, narrowed(widened(goal) - vector_of(u, i, slot), velocity) / h[slot])
+        )
 
     @kernels.add
     def begin(
@@ -75,9 +79,9 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         mass: wp.array[scalar],
         free: wp.array[vec3],
         h: wp.array[scalar],
-        u: wp.array3d[scalar],
+        u: wp.array3d[wp.float64],
         v: wp.array3d[scalar],
-        u_start: wp.array3d[scalar],
+        u_start: wp.array3d[wp.float64],
         v_start: wp.array3d[scalar],
         b: wp.array3d[scalar],
     ):
@@ -100,14 +104,14 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         slots: wp.array[int],
         count: wp.array[int],
         solving: wp.array[int],
-        u_start: wp.array3d[scalar],
+        u_start: wp.array3d[wp.float64],
         v_start: wp.array3d[scalar],
         dv: wp.array3d[scalar],
         velocity: wp.array3d[scalar],
         free: wp.array[vec3],
         h: wp.array[scalar],
         v: wp.array3d[scalar],
-        u: wp.array3d[scalar],
+        u: wp.array3d[wp.float64],
     ):
         """Velocity and displacement at the end of the step, of the samples whose linear solve has ended."""
         i, lane = wp.tid()
@@ -120,7 +124,7 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         change = vector_of(v_start, i, slot) + vector_of(dv, i, slot) - prescribed
         w = wp.cw_mul(free[i], change) + prescribed
         store_vector(v, i, slot, w)
-        store_vector(u, i, slot, vector_of(u_start, i, slot) + h[slot] * w)
+        store_vector(u, i, slot, vector_of(u_start, i, slot) + widened(h[slot] * w))
 
     @kernels.add
     def find_ready(
@@ -139,10 +143,10 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         found[slot] = scalar(ready[slot])
 
     @kernels.add
-    def collect(slots: wp.array[int], nodes: wp.array[int], x: wp.array3d[scalar], collected: wp.array[vec3]):
+    def collect(slots: wp.array[int], nodes: wp.array[int], x: wp.array3d[Any], collected: wp.array[wp.vec3d]):
         """One thread for a slot of a list and a node of a list: vectors of a sample side by side, as they leave the
         device."""
         place, k = wp.tid()
-        collected[place * nodes.shape[0] + k] = vector_of(x, nodes[k], slots[place])
+        collected[place * nodes.shape[0] + k] = widened(vector_of(x, nodes[k], slots[place]))
 
     return kernels

@@ -1,0 +1,237 @@
+"""Which elements a block of threads assembles, and in what order: tables for `batched.patch_assembly`.
+
+A patch is a region of the mesh, found by recursive bisection of the elements' centres, so small that the matrix of its
+elements fits into the shared memory of a block of threads: the blocks between its nodes, all but those on the diagonal,
+which are minus the sum of the others in their row. Its elements are dealt out to rounds. No two elements of a round
+share an edge, so that threads add what they have of a round to the matrix at the same time, and in an order that
+depends on the mesh alone.
+
+A pair of nodes that elements of several patches share has a row of the matrix for the first of them, and one among
+others behind it for each further one, which are added up afterwards.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpbrain.arrays import Bools, Floats
+from warpbrain.kernels.batched.parts import Ints, bisected
+
+#: Local nodes of the six edges of an element.
+EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+#: Of a node, that are read at a time.
+SPOKES = 4
+#: In `Patches.kept`, behind nine bits: the row of a pair on the diagonal that has what each node has once.
+FIRST = 1 << 9
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Tables of the patches of some elements.
+
+    Rows of a patch are those of its edges and behind them those of its nodes.
+
+    Attributes
+    ----------
+    elements : array of int, shape (patches, rounds, width)
+        -1 where there is none.
+    corners : array of int, shape (patches, rounds, width, 4)
+        Places of their nodes in the patch.
+    edges : array of int, shape (patches, rounds, width, 6)
+        Places of their edges; where there is no element, one behind those of the patch.
+    round_counts, edge_counts : array of int, shape (patches,)
+        Rounds are a multiple of those together.
+    node_starts, nodes : array of int
+        Nodes of each patch.
+    spoke_starts, spokes : array of int
+        Edges of each node of a patch, ``-1 - edge`` where the node is the second of the two. They are a multiple of
+        `SPOKES`: there are some at the end that are one behind those of the patch.
+    row_starts, rows, kept : array of int
+        Row of the matrix of each row of a patch, and bits ``3 r + c`` of what is free in it; and `FIRST`.
+    """
+
+    elements: Ints
+    corners: Ints
+    edges: Ints
+    round_counts: Ints
+    edge_counts: Ints
+    node_starts: Ints
+    nodes: Ints
+    spoke_starts: Ints
+    spokes: Ints
+    row_starts: Ints
+    rows: Ints
+    kept: Ints
+
+
+@dataclass(frozen=True)
+class Sums:
+    """What is to be added up: to the row `pairs[i]` the rows `extra_starts[i]` to `extra_starts[i + 1]` of others."""
+
+    pairs: Ints
+    extra_starts: Ints
+
+    @property
+    def extras(self) -> int:
+        """How many others there are."""
+        return int(self.extra_starts[-1])
+
+
+def rounds_of(edges: Ints, width: int) -> list[list[int]]:
+    """Elements (k, 6) of edges in rounds of at most `width`, of which no two share an edge."""
+    shared = np.bincount(edges.ravel())[edges]
+    # what is hardest to place first
+    order = np.lexsort((-shared.sum(axis=1), -shared.max(axis=1)))
+    least = max(int(shared.max()), -(-len(edges) // width))
+    taken = np.zeros((len(edges), edges.max() + 1), dtype=bool)
+    filled = np.zeros(len(edges), dtype=int)
+    rounds: list[list[int]] = [[] for _ in edges]
+    for element in order.tolist():
+        possible = np.flatnonzero((filled[:least] < width) & ~np.any(taken[:least, edges[element]], axis=1))
+        if not len(possible):
+            possible = np.array([least])
+            least += 1
+        place = possible[np.argmin(filled[possible])]
+        taken[place, edges[element]] = True
+        filled[place] += 1
+        rounds[place].append(element)
+    return rounds[:least]
+
+
+def patches_of(
+    points: Floats,
+    tetrahedra: Ints,
+    pairs: Ints,
+    free: Bools,
+    groups: Sequence[NDArray[np.intp]],
+    width: int,
+    together: int,
+    fits: Callable[[int, int], bool],
+) -> tuple[list[Patches], Sums]:
+    """Share out elements (m, 4) of nodes that ascend, whose matrix has blocks of `pairs` (p, 2) that ascend.
+
+    Each of `groups` of elements has patches of its own, of as many edges and nodes as there is room for (`fits`), in
+    rounds of `width` elements, of which so many are `together`. `free` (n, 3) are the components that are.
+    """
+    keys = pairs[:, 0].astype(np.int64) * len(points) + pairs[:, 1]
+
+    def pairs_of(i: NDArray[np.int64], j: NDArray[np.int64]) -> Ints:
+        return _ints(np.searchsorted(keys, i * len(points) + j))
+
+    ends = np.array(EDGES)
+    of_edges = pairs_of(tetrahedra[:, ends[:, 0]].astype(np.int64), tetrahedra[:, ends[:, 1]].astype(np.int64))
+    every = np.arange(len(points), dtype=np.int64)
+    of_nodes = pairs_of(every, every)
+    parted = [
+        _parted(points[tetrahedra[group]].mean(axis=1), tetrahedra[group], of_edges[group], fits) for group in groups
+    ]
+    # of each patch, one group after the other: its edges and nodes, as pairs
+    listed = [
+        np.concatenate([np.unique(of_edges[group[piece]]), of_nodes[np.unique(tetrahedra[group[piece]])]])
+        for group, pieces in zip(groups, parted, strict=True)
+        for piece in pieces
+    ]
+    rows, firsts, sums = _rows_of(np.concatenate(listed), len(pairs))
+    bits = free[pairs[:, 0]][:, :, None] & free[pairs[:, 1]][:, None, :]
+    kept = bits.reshape(-1, 9) @ (1 << np.arange(9))
+    starts = np.cumsum([0, *map(len, listed)])
+    made, number = [], 0
+    for group, pieces in zip(groups, parted, strict=True):
+        mine = slice(number, number + len(pieces))
+        number += len(pieces)
+        span = slice(starts[mine.start], starts[mine.stop])
+        both = pairs[np.concatenate(listed[mine])]
+        own = kept[np.concatenate(listed[mine])] + FIRST * (firsts[span] & (both[:, 0] == both[:, 1]))
+        pieces = [group[piece] for piece in pieces]
+        made.append(
+            _tables(
+                pieces,
+                tetrahedra,
+                of_edges,
+                pairs,
+                width,
+                together,
+                starts[mine.start : mine.stop + 1],
+                rows[span],
+                own,
+            )
+        )
+    return made, sums
+
+
+def _parted(centres: Floats, tetrahedra: Ints, edges: Ints, fits: Callable[[int, int], bool]) -> list[NDArray[np.intp]]:
+    """The elements of each patch: the fewest, of a power of two, that all have room."""
+    parts = 1
+    while True:
+        part = bisected(centres, np.ones(len(centres), dtype=np.int32), parts)
+        pieces = [np.flatnonzero(part == number) for number in range(parts)]
+        pieces = [piece for piece in pieces if len(piece)]
+        if all(fits(len(np.unique(edges[piece])), len(np.unique(tetrahedra[piece]))) for piece in pieces):
+            return pieces
+        parts *= 2
+
+
+def _rows_of(listed: Ints, pairs: int) -> tuple[Ints, Bools, Sums]:
+    """Row of each of the pairs that patches have, whether it is the pair's own, and what is to be added up."""
+    order = np.argsort(listed, kind="stable")
+    copies = np.bincount(listed, minlength=pairs)
+    rank = np.empty(len(listed), dtype=np.int64)
+    rank[order] = np.arange(len(listed)) - np.repeat(np.cumsum(copies) - copies, copies)
+    shared = np.flatnonzero(copies > 1)
+    starts = np.r_[0, np.cumsum(copies[shared] - 1)]
+    extra_of = np.zeros(pairs, dtype=np.int64)
+    extra_of[shared] = starts[:-1]
+    rows = np.where(rank == 0, listed, pairs + extra_of[listed] + rank - 1)
+    return _ints(rows), np.asarray(rank == 0), Sums(_ints(shared), _ints(starts))
+
+
+def _tables(
+    pieces: list[NDArray[np.intp]],
+    tetrahedra: Ints,
+    of_edges: Ints,
+    pairs: Ints,
+    width: int,
+    together: int,
+    starts: NDArray[np.intp],
+    rows: Ints,
+    kept: Ints,
+) -> Patches:
+    edges = [np.unique(of_edges[piece], return_inverse=True) for piece in pieces]
+    nodes = [np.unique(tetrahedra[piece], return_inverse=True) for piece in pieces]
+    rounds = [rounds_of(_ints(inverse.reshape(-1, 6)), width) for _, inverse in edges]
+    turns = [-(-len(of) // together) * together for of in rounds]
+    elements = np.full((len(pieces), max(turns), width), -1)
+    corners = np.zeros((*elements.shape, 4), dtype=np.int32)
+    at = np.empty((*elements.shape, 6), dtype=np.int32)
+    counts, spokes = [], []
+    for patch, piece in enumerate(pieces):
+        (found, edge), (own, corner) = edges[patch], nodes[patch]
+        at[patch] = len(found)
+        for turn, chosen in enumerate(rounds[patch]):
+            elements[patch, turn, : len(chosen)] = piece[chosen]
+            corners[patch, turn, : len(chosen)] = corner.reshape(-1, 4)[chosen]
+            at[patch, turn, : len(chosen)] = edge.reshape(-1, 6)[chosen]
+        at_ends = np.searchsorted(own, pairs[found])
+        all_ends = np.r_[at_ends[:, 0], at_ends[:, 1]]
+        count = np.bincount(all_ends, minlength=len(own))
+        counts.append(-(-count // SPOKES) * SPOKES)
+        order = np.argsort(all_ends, kind="stable")
+        # where those of each node begin with and without what is added at the end
+        shift = np.cumsum(counts[-1]) - counts[-1] - np.cumsum(count) + count
+        spokes.append(np.full(counts[-1].sum(), len(found)))
+        spokes[-1][np.arange(len(order)) + np.repeat(shift, count)] = np.r_[
+            np.arange(len(found)), -1 - np.arange(len(found))
+        ][order]
+    return Patches(
+        _ints(elements), corners, at, _ints(turns),
+        _ints([len(found) for found, _ in edges]),
+        _ints(np.cumsum([0, *(len(own) for own, _ in nodes)])), _ints(np.concatenate([own for own, _ in nodes])),
+        _ints(np.r_[0, np.cumsum(np.concatenate(counts))]), _ints(np.concatenate(spokes)),
+        _ints(starts - starts[0]), rows, _ints(kept),
+    )  # fmt: skip
+
+
+def _ints(values: object) -> Ints:
+    return np.asarray(values, dtype=np.int32)
