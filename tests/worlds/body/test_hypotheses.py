@@ -53,6 +53,15 @@ def test_nothing_is_far_less_probable(search):
     assert gain > 50.0
 
 
+def test_places_are_one_in_all_and_everywhere_is_as_probable_as_somewhere(search):
+    for cause in search.causes.causes:
+        np.testing.assert_allclose(np.exp(cause.log_weights).sum(), 1.0)
+    swelling = search.causes.effects["swelling"]
+    everywhere = [effect.proposed.centre is None for effect in swelling]
+    shares = search.causes.named("swelling").shares
+    np.testing.assert_allclose(shares[everywhere].sum(), 1.0 - belief("causes.in_one_place"))
+
+
 def test_sets_say_what_they_are(search):
     for one in search.weighted_sets:
         assert len(one.mechanisms) == len(one.effects) == len(one.coefficients)

@@ -108,7 +108,8 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
             continue
         # a mechanism with an expected size, such as a weight, has that one
         has_mean = any(place.mean is not None for place in places)
-        causes.append(Cause(kind, places, math.log(belief("causes.mechanism")), unit_sizes if has_mean else sizes))
+        sized, log_prior = unit_sizes if has_mean else sizes, math.log(belief("causes.mechanism"))
+        causes.append(Cause(kind, places, log_prior, sized, shares=_shares(of_kind)))
     # setting in at any recorded time, or changing from one to the next as mechanisms may
     times, sensors = base.states.times, base.at.sensors
     factors = [factor_of_rows(course, sensors)[:, None] for course in main_courses(times)]
@@ -116,6 +117,18 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
         factors.append(modes_of_rows(times, sensors))
     causes.append(unknown_cause(base, [factor for factor in factors if factor.any()]))
     return BodyCauses(tuple(causes), candidates.effects)
+
+
+def _shares(effects: Sequence[Effect]) -> Floats | None:
+    """Probability (p,) of each place of a mechanism; None if all are equally probable.
+
+    A scan has hundreds of places, and that all tissue swells is not as improbable as any one of these.
+    """
+    local = np.array([effect.proposed.centre is not None for effect in effects])
+    if local.all() or not local.any():
+        return None
+    in_one = belief("causes.in_one_place")
+    return np.where(local, in_one / local.sum(), (1.0 - in_one) / (~local).sum())
 
 
 def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:
