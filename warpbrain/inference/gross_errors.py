@@ -42,6 +42,7 @@ class GrossErrors:
 
     #: Log density of the rows, summed over the inflation of each point with all others at their most probable ones.
     log_density: float
+    log_odds: Floats  # (g,), of each point to be a gross error, given the others
     inflation: Floats  # (g,), the most probable one of each point, 1 of a sound one
     weighted: Floats  # (n,), the inverse of the covariance with these, times the rows
 
@@ -117,7 +118,8 @@ class PointRows:
             search.change(worst, int(best[worst]))
         sums = np.logaddexp.reduce(logs, axis=1)
         log_density = search.log_density + float(log_prior[search.kinds].sum() + sums.sum())
-        return GrossErrors(log_density, prior.inflations[search.kinds], search.weighted)
+        odds = np.logaddexp.reduce(logs[:, 1:], axis=1) - logs[:, 0]
+        return GrossErrors(log_density, odds, prior.inflations[search.kinds], search.weighted)
 
 
 class FurtherColumns:
