@@ -396,7 +396,7 @@ def test_a_run_stands_where_the_error_of_its_mesh_is_not_found(folder, tmp_path,
     def fail(*_arguments: object, **_options: object) -> None:
         raise SolveError("on elements tet4-averaged: no equilibrium")
 
-    monkeypatch.setattr("warpbrain.cli.run.mesh_error", fail)
+    monkeypatch.setattr("warpbrain.cli.run_case.mesh_error", fail)
     ran = run(folder, "--mesh-error", "--out", tmp_path)
     assert (ran.status, ran.err) == (0, "")
     assert "error of the mesh: not known: on elements tet4-averaged: no equilibrium" in ran.out

@@ -8,7 +8,8 @@ from bodies import model_of
 from shapes import box, cube, distorted
 
 from warpbrain.errors import InputError
-from warpbrain.kernels.precision import DOUBLE, SINGLE
+from warpbrain.kernels.module import find_device
+from warpbrain.kernels.precision import DOUBLE, SINGLE, find_precision
 from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.load import NodalForce
@@ -17,7 +18,7 @@ from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.model import Damping, Material, Model
-from warpbrain.simulation.system import System, find_device, find_precision
+from warpbrain.simulation.system import System
 
 MESH = cube(1)
 SHAPE = MESH.points.shape

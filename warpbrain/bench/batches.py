@@ -21,9 +21,10 @@ from warpbrain.ensemble.run import chosen_samples
 from warpbrain.ensemble.workers import Here, Job, Processes, bytes_per_slot
 from warpbrain.errors import InputError
 from warpbrain.kernels.batched.layout import TANGENT
+from warpbrain.kernels.module import find_device
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.system import System, find_device
+from warpbrain.simulation.system import System
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.quiet import start_warp_quietly
 

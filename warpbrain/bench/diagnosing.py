@@ -12,7 +12,7 @@ from warpbrain.bench import command
 from warpbrain.cases.shipped import find_case
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.estimation.options import Listener
-from warpbrain.simulation.system import find_device
+from warpbrain.kernels.module import find_device
 from warpbrain.terminal.progress import Progress
 
 

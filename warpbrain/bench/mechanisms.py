@@ -20,11 +20,12 @@ from warpbrain.bench.measure import RESTART
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
+from warpbrain.kernels.module import find_device
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.system import System, find_device
+from warpbrain.simulation.system import System
 from warpbrain.terminal.progress import Progress
 
 Result = TypeVar("Result")

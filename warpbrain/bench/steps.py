@@ -11,8 +11,9 @@ import warp as wp
 from warpbrain.bench import command
 from warpbrain.bench.measure import BODIES, PREPROCESSING, RESTART, STEP, measure_row
 from warpbrain.bench.table3 import MAIN_LOOP, TABLE3
+from warpbrain.kernels.module import find_device
+from warpbrain.kernels.precision import find_precision
 from warpbrain.simulation.dynamics import finest_tolerance
-from warpbrain.simulation.system import find_device, find_precision
 from warpbrain.terminal.progress import Progress
 
 

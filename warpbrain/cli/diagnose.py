@@ -13,6 +13,7 @@ from warpbrain.cli import warp
 from warpbrain.cli.log import note_case
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.estimation.options import Listener
+from warpbrain.kernels.module import find_device
 from warpbrain.report.diagnosis.description import describe
 from warpbrain.report.diagnosis.files import (
     write_covariance,
@@ -26,7 +27,6 @@ from warpbrain.report.diagnosis.page import write_page
 from warpbrain.report.diagnosis.text import diagnosis_lines
 from warpbrain.report.files import write_summary
 from warpbrain.report.state_files import read_state
-from warpbrain.simulation.system import find_device
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import choose_folder, results_in

@@ -27,6 +27,7 @@ from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
 from warpbrain.gp.trained import find_model
+from warpbrain.kernels.module import find_device
 from warpbrain.recordings.registration import Registration
 from warpbrain.report import views
 from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
@@ -44,7 +45,6 @@ from warpbrain.report.sweep import (
     write_sweep_picture,
 )
 from warpbrain.report.warped import WarpRequest
-from warpbrain.simulation.system import find_device
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.terminal.record import Record

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
+import tempfile
+import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import warp as wp
+import warp._src.context as warp_context
+
+from warpbrain.errors import InputError
+from warpbrain.threads import thread_count
 
 #: Our kernels are chains of 3 x 3 products on one thread. LLVM's SLP vectoriser packs them into shuffles that halve the
 #: speed of the matrix-vector product on the CPU; fused multiply-adds help all of them. (The inlining thresholds are
@@ -18,8 +25,11 @@ _CPU_FLAGS = (
     " -fno-slp-vectorize -ffp-contract=fast"
 )
 
+#: Compilers at most: a third gains nothing beside the first module, which the others wait for.
+_MOST = 2
 #: What was begun to be compiled and may not be done.
 _begun: list[Future[None]] = []
+_alone = threading.Lock()
 
 
 def compiled_module(name: str, unroll: int | None = None) -> Any:
@@ -43,6 +53,15 @@ def threads_of_block(device: wp.DeviceLike) -> int | None:
     return 64 if wp.get_device(device).is_cuda else None
 
 
+def find_device(name: str | None) -> wp.Device:
+    """The Warp device of a name (``"cpu"``, ``"cuda:0"``; None for the default one); `InputError` if there is none."""
+    try:
+        return wp.get_device(name)
+    except Exception as error:  # Warp raises RuntimeError or ValueError, by version and cause
+        there = ", ".join(device.alias for device in wp.get_devices())
+        raise InputError(f"device '{name}': not found on this machine (there are: {there})") from error
+
+
 class KernelSet:
     """Kernels of one module, by their names: each is one that `add` decorates; see `compiled_module`."""
 
@@ -63,14 +82,11 @@ class KernelSet:
 def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], None]:
     """Begin to compile the modules of kernels, or to find them in Warp's cache, beside what else is to be done.
 
-    What is returned waits for them, and raises what went wrong. All that is begun in a process is compiled in one
-    thread: Warp precompiles its header once for each thread, and that takes longer than four of our modules.
+    What is returned waits for them, and raises what went wrong. The first of a process is compiled alone: with it Warp
+    precompiles its header, which takes longer than four of our modules and which those after it share.
     """
     modules = {kernel.module.name: kernel.module for kernel in kernels}
-    begun = [
-        _compiler(os.getpid()).submit(wp.force_load, device, [module], threads_of_block(device))
-        for module in modules.values()
-    ]
+    begun = [_compilers(os.getpid()).submit(_load, device, module) for module in modules.values()]
     _begun[:] = [*(loaded for loaded in _begun if not loaded.done()), *begun]
 
     def wait() -> None:
@@ -81,10 +97,35 @@ def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], Non
 
 
 def is_compiling() -> bool:
-    """Whether the thread of `begin_loading` is at work, which nothing stops before it is done."""
+    """Whether the threads of `begin_loading` are at work, which nothing stops before they are done."""
     return any(not loaded.done() for loaded in _begun)
 
 
 @cache
-def _compiler(process: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(1, thread_name_prefix="compiler")
+def _compilers(process: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(min(_MOST, thread_count()), thread_name_prefix="compiler")
+
+
+def _load(device: wp.Device, module: Any) -> None:
+    """Compile a module, or find it; several at once for the CPU, after the first one has precompiled the header."""
+    folder = _share_header(os.getpid())
+    with _alone:
+        if device.is_cuda or not any(folder.iterdir()):
+            wp.force_load(device, [module], threads_of_block(device))
+            return
+    wp.force_load(device, [module], threads_of_block(device))
+
+
+def _share_header(process: int) -> Path:
+    """The folder of precompiled headers, of all compilers of a process.
+
+    Warp makes one for each thread, so that none reads what another has half written: `_load` sees to that.
+    """
+    folders = warp_context.runtime._pch_dirs
+    folder = folders[threading.get_ident()] = _header_folder(process)
+    return Path(folder.name)
+
+
+@cache
+def _header_folder(process: int) -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="wp_pch_")

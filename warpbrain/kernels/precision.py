@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from warpbrain.errors import InputError
+
 
 @dataclass(frozen=True)
 class Precision:
@@ -28,3 +30,10 @@ class Precision:
 DOUBLE = Precision("double", wp.float64, wp.vec3d, wp.mat33d, np.dtype(np.float64))
 SINGLE = Precision("single", wp.float32, wp.vec3f, wp.mat33f, np.dtype(np.float32))
 PRECISIONS = {p.name: p for p in (DOUBLE, SINGLE)}
+
+
+def find_precision(name: str) -> Precision:
+    """The precision of a name, ``"double"`` or ``"single"``; `InputError` otherwise."""
+    if name not in PRECISIONS:
+        raise InputError(f"precision '{name}': expected one of {', '.join(PRECISIONS)}")
+    return PRECISIONS[name]

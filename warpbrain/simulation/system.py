@@ -18,9 +18,9 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.linear import LinearSolver, conjugate_gradient, solver_kernels
-from warpbrain.kernels.module import begin_loading
+from warpbrain.kernels.module import begin_loading, find_device
 from warpbrain.kernels.multicore import launch
-from warpbrain.kernels.precision import PRECISIONS, Precision
+from warpbrain.kernels.precision import find_precision
 from warpbrain.kernels.ten_nodes import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.mesh.surface import EDGES
@@ -34,27 +34,6 @@ from warpbrain.simulation.coupled import CoupledSolver
 from warpbrain.simulation.factored import KeptFactors
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
-
-
-def find_device(name: str | None) -> wp.Device:
-    """The Warp device of a name (``"cpu"``, ``"cuda:0"``; None for the default one); `InputError` if there is none."""
-    try:
-        return wp.get_device(name)
-    except Exception as error:  # Warp raises RuntimeError or ValueError, by version and cause
-        there = ", ".join(device.alias for device in wp.get_devices())
-        raise InputError(f"device '{name}': not found on this machine (there are: {there})") from error
-
-
-def find_precision(name: str) -> Precision:
-    """The precision of a name, ``"double"`` or ``"single"``; `InputError` otherwise."""
-    if name not in PRECISIONS:
-        raise InputError(f"precision '{name}': expected one of {', '.join(PRECISIONS)}")
-    return PRECISIONS[name]
-
-
-def begin_loading_kernels(device: wp.Device, precision: Precision) -> None:
-    """Begin to compile what every model needs, while one is still being read; `System.load_kernels` does the rest."""
-    begin_loading([assembly_kernels(precision).gather_matrix, *solver_kernels(precision, device)], device)
 
 
 def _code(material: Material) -> tuple[type[Law], str, int]:

@@ -1,7 +1,8 @@
 """Bodies as PyVista renders them, in a process of its own: a graphics library that fails takes nothing along.
 
 `render` writes a `Scene`, plain arrays of a deformed body, into a folder, from which `rendering.drawing` makes pictures
-in another process: where there is no graphics library, VTK does not raise but crashes.
+in another process: where there is no graphics library, VTK does not raise but crashes. The process can be begun before
+there is a scene (`ready_to_render`): its libraries take as long to load as a picture to be drawn.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ import pickle
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +29,8 @@ NAMES = (BEFORE, AFTER, MOTION, *CUTS)
 RECORDED, COMPUTED = "#d55e00", "#0072b2"
 #: Longest that rendering may take [s]: a driver that hangs must not hold a result back.
 _LONGEST = 300.0
+#: A process that waits for a scene.
+_ready: list[subprocess.Popen[str]] = []
 
 
 class RenderingError(Exception):
@@ -94,27 +98,51 @@ def render(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -
 
     `RenderingError` if there is no graphics library, or it fails.
     """
-    with tempfile.TemporaryDirectory(prefix="warpbrain-") as name:
+    with tempfile.TemporaryDirectory(prefix="warpbrain-") as name, _ready.pop() if _ready else _begin() as process:
         folder = Path(name)
         write_scene(folder, scene, cameras, size)
-        command = [sys.executable, "-m", "warpbrain.report.rendering.drawing", name]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=_LONGEST)
+            _, said = process.communicate(name, timeout=_LONGEST)
         except subprocess.TimeoutExpired:
+            process.kill()
             raise RenderingError(f"rendering took longer than {_LONGEST:.0f} s") from None
+        except BaseException:
+            process.kill()
+            raise
         written = folder / "pictures.npy"
-        if done.returncode < 0:
+        if process.returncode < 0:
             raise RenderingError(
-                f"VTK crashed (signal {-done.returncode}), as it does where there is no OpenGL library: "
+                f"VTK crashed (signal {-process.returncode}), as it does where there is no OpenGL library: "
                 "on Debian and Ubuntu, apt-get install libegl1"
             )
-        if done.returncode or not written.is_file():
-            lines = done.stderr.strip().splitlines()
-            why = lines[-1][:300] if lines else f"the rendering process ended with status {done.returncode}"
+        if process.returncode or not written.is_file():
+            lines = said.strip().splitlines()
+            why = lines[-1][:300] if lines else f"the rendering process ended with status {process.returncode}"
             raise RenderingError(why)
         image = np.load(written)
     names = [name for name in NAMES if name in cameras]
     return dict(zip(names, np.split(image, len(names), axis=1), strict=True))
+
+
+@contextmanager
+def ready_to_render() -> Iterator[None]:
+    """While it lasts, the process of the next `render` is there, and loads its libraries beside whatever else is done.
+
+    It ends with the block if nothing was rendered, and by itself if this process is gone.
+    """
+    _ready.append(_begin())
+    try:
+        yield
+    finally:
+        while _ready:
+            with _ready.pop() as process:
+                process.kill()
+
+
+def _begin() -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "warpbrain.report.rendering.drawing"]
+    piped = subprocess.PIPE
+    return subprocess.Popen(command, stdin=piped, stdout=piped, stderr=piped, text=True)
 
 
 def write_scene(folder: Path, scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -> None:

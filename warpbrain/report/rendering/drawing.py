@@ -1,6 +1,7 @@
 """A scene in windows of PyVista, on a screen or off it.
 
-`python -m warpbrain.report.rendering.drawing FOLDER` renders the scene that lies in a folder.
+`python -m warpbrain.report.rendering.drawing` renders the scene that lies in the folder whose name comes on standard
+input; without one it ends.
 """
 
 from __future__ import annotations
@@ -231,11 +232,14 @@ def interactive(scene: Scene, exaggeration: float | None, off_screen: bool) -> A
     return plotter
 
 
-def _main(folder: Path) -> None:
+def _main() -> None:
     """Render; what the graphics library says of displays that are not there is nobody's business."""
     with pyvista.vtk_verbosity("off"):
-        np.save(folder / "pictures.npy", screenshot(*read_scene(folder)))
+        # the first one loads what is drawn with, while the scene may still be computed
+        pyvista.Plotter(off_screen=True).close()
+        if name := sys.stdin.read():
+            np.save(Path(name) / "pictures.npy", screenshot(*read_scene(Path(name))))
 
 
 if __name__ == "__main__":
-    _main(Path(sys.argv[1]))
+    _main()
