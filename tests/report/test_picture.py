@@ -123,7 +123,8 @@ def test_pictures_of_any_body_become_a_file(tmp_path, monkeypatch):
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)
             # a dollar sign begins no formula
-            drawn = draw(path, plain, plain, u, {1: "$x", 2: "_y"}, NO_POINTS, "A $title", ["with $ two", "lines"])
+            pictures = pictures_of(plain, plain, u, {1: "$x", 2: "_y"}, NO_POINTS)
+            drawn = draw(path, lambda: pictures, "A $title", ["with $ two", "lines"])  # noqa: B023
         assert not isinstance(drawn, str)
         assert [file.name for file in tmp_path.iterdir()] == ["a.png"]
         assert plt.get_fignums() == []
@@ -131,15 +132,13 @@ def test_pictures_of_any_body_become_a_file(tmp_path, monkeypatch):
         assert image.shape[0] > 700 and image.shape[1] > 1000
 
 
-def test_where_nothing_can_be_rendered_no_old_picture_stays(tmp_path, monkeypatch):
-    def fails(*_arguments):
+def test_where_nothing_can_be_rendered_no_old_picture_stays(tmp_path):
+    def fails():
         raise RenderingError("no graphics")
 
-    monkeypatch.setattr(picture, "render", fails)
     path = tmp_path / "a.png"
     path.write_bytes(b"of another run")
-    mesh = block()
-    said = draw(path, mesh, mesh, np.zeros(mesh.points.shape), {}, NO_POINTS, "A title", [])
+    said = draw(path, fails, "A title", [])
     assert said == "no graphics" and not path.exists()
 
 

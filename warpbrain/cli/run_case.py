@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from warpbrain.cli import run_specimen, warp
 from warpbrain.cli.log import drawn, note_device
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
+from warpbrain.kernels.module import is_compiling
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 from warpbrain.physics.words import tabled
 from warpbrain.report import summary as tables
@@ -76,6 +78,7 @@ def _run_body(
         needed_by,
     )
     model, system = running.model, running.system
+    system.begin_loading_kernels()
     chosen = "--mesh-error elements is about them" if about_elements else running.chosen
     described = tables.describe_case(case, model, chosen)
     say(*lines("run.txt", "case", described, prior, tables.STAND_IN), sep="\n")
@@ -83,6 +86,8 @@ def _run_body(
 
     with Progress("kernels", options.quiet) as loading:
         loading.show(0.0, "the first run on a machine compiles them")
+        if is_compiling():
+            _import_drawing()
         loaded = system.load_kernels()
     with watching(options, say) as watched:
         done = running.run(watched)
@@ -123,6 +128,13 @@ def _run_body(
         write_summary(out / "summary.json", summary)
         if to_warp is not None:
             warp.warp(read_state(out / "result.vtu"), out, to_warp, record, options.quiet)
+
+
+def _import_drawing() -> None:
+    """Import what is drawn with while there is nothing else to do; what is not there is missed when it is used."""
+    with suppress(ImportError):
+        for name in ("meshio", "pyvista", "matplotlib.figure", "matplotlib.backends.backend_agg"):
+            import_module(name)
 
 
 def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:

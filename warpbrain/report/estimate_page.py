@@ -27,7 +27,7 @@ from warpbrain.report.estimate import (
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
 from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import inlined
-from warpbrain.report.picture import Moved, Pictures, draw
+from warpbrain.report.picture import Moved, Pictures, draw, pictures_of
 from warpbrain.report.run_page import BADGES
 from warpbrain.report.state_files import read_state
 from warpbrain.report.summary import left_out
@@ -69,7 +69,12 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     whole, state, moved = posterior.case.mesh, read_state(folder / "state.vtu"), moved_of(posterior)
     titles = {label: tissue.name for label, tissue in posterior.case.tissues.items()}
     subtitles = ["the most probable state of the estimate", *judged.sentences]
-    pictures = draw(folder / "deformation.png", whole, state.mesh, state.u, titles, moved, case["title"], subtitles)
+    pictures = draw(
+        folder / "deformation.png",
+        lambda: pictures_of(whole, state.mesh, state.u, titles, moved),
+        case["title"],
+        subtitles,
+    )
     places = views.places(whole)
     tissue = [parameter_row(parameter) for parameter in summary["parameters"]]
     names = ", ".join(f"{row[0]}, {row[1]}" for row in tissue)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -177,23 +177,14 @@ def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
     return Camera(right, up, centre, 1.14 * float(max(high_, across * _SIZE[1] / _SIZE[0], 1e-3)))
 
 
-def draw(
-    path: Path,
-    whole: TetMesh,
-    mesh: TetMesh,
-    u: Floats,
-    names: dict[int, str],
-    moved: Moved,
-    title: str,
-    subtitles: Sequence[str],
-) -> Pictures | str:
-    """Render a deformed body, see `pictures_of`, and write the picture of it below a title and more lines.
+def draw(path: Path, rendered: Callable[[], Pictures], title: str, subtitles: Sequence[str]) -> Pictures | str:
+    """Write the picture of a deformed body, what is made of it by `pictures_of`, below a title and more lines.
 
     Returns why, if nothing can be rendered here: no picture is then left at `path`, which would be one of something
     else.
     """
     try:
-        pictures = pictures_of(whole, mesh, u, names, moved)
+        pictures = rendered()
     except RenderingError as error:
         path.unlink(missing_ok=True)
         return str(error)
@@ -211,7 +202,7 @@ def draw(
     shades.set_clim(0.0, scene.top)
     label = "displacement [mm]; red: where it was before"
     figure.colorbar(shades, ax=axes, location="bottom", shrink=0.7, aspect=45, pad=0.01, label=label)
-    entries = views.tissue_entries(names, whole, pictures.resected)
+    entries = views.tissue_entries(pictures.names, pictures.whole, pictures.resected)
     entries += [(views.line(color=colour, linewidth=2.5), name) for name, colour in arrow_colours(scene).items()]
     views.legend(figure, entries, loc="outside lower center", fontsize=9, ncols=6)
     views.save(figure, path, "\n".join([title, *subtitles]), y=1.0 - 0.08 / high, va="top")

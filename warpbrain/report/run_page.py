@@ -25,12 +25,13 @@ from warpbrain.report.comparison import (
 from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
-from warpbrain.report.picture import Moved, Pictures, draw
+from warpbrain.report.picture import Moved, Pictures, draw, pictures_of
 from warpbrain.report.specimen import tests_figure
 from warpbrain.report.summary import displacement_rows
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, QUIET, VERMILLION
 from warpbrain.simulation.run import Run
 from warpbrain.simulation.specimen import Tested
+from warpbrain.threads import beside
 
 #: Letters of a line of a picture's title.
 _LINE = 150
@@ -55,7 +56,7 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     names = {label: tissue.name for label, tissue in run.case.tissues.items()}
     left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
     subtitles = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
-    pictures = draw(folder / "deformation.png", whole, result.mesh, result.u, names, moved, run.case.title, subtitles)
+    rendered = beside(lambda: pictures_of(whole, result.mesh, result.u, names, moved))
     fields = [
         Field(
             name.replace("_", " "), f"{name.replace('_', ' ')} [Pa]", values, float(values.min()), float(values.max())
@@ -63,6 +64,8 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
         for name, values in result.nodal_pressures.items()
     ]
     places = views.places(whole)
+    view = body_view(result.mesh, result.u, fields, moved, places)
+    pictures = draw(folder / "deformation.png", rendered, run.case.title, subtitles)
     solved = [f"{solution['kind']}, {len(solution['history'])} recorded steps"]
     if "time_s" in solution:
         solved.append(f"until {solution['time_s']:.4g} s")
@@ -77,7 +80,7 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     _write(
         folder / "report.html", summary, Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts),
         pictures=before_and_after(pictures),
-        view=body_view(result.mesh, result.u, fields, moved, places),
+        view=view,
         displacements=displacement_rows(described),
         mesh_error=lines("run.txt", "mesh_error", summary["mesh_error"]) if "mesh_error" in summary else [],
         solution=solved,

@@ -235,8 +235,10 @@ def frame(axes: Any, mesh: TetMesh, view: View, margin: float | None = None) -> 
 
 def bare(axes: Any) -> None:
     """Equal scales, no ticks, no box."""
-    axes.set(aspect="equal", xticks=[], yticks=[])
-    axes.spines[:].set_visible(False)
+    axes.set_aspect("equal")
+    # constrained layout measures what is not hidden, even if it is empty
+    for part in (axes.xaxis, axes.yaxis, axes.spines[:]):
+        part.set_visible(False)
 
 
 def tissue_entries(names: Mapping[int, str], mesh: TetMesh, resected: Bools) -> list[tuple[Any, str]]:

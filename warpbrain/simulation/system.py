@@ -538,13 +538,16 @@ class System:
             return CoupledSolver(self, self._coupled, plain, factors or KeptFactors(), tolerance)
         return plain
 
+    def begin_loading_kernels(self) -> Callable[[], None]:
+        """Begin to compile what is known to be needed, see `begin_loading`; `load_kernels` does the rest."""
+        of_laws = [kernel for g in self.groups for kernel in (g.kernels.forces_and_tangents, g.kernels.stress)]
+        others = [self._kernels.gather_matrix, *solver_kernels(self.precision, self.device)]
+        return begin_loading([*of_laws, *others], self.device)
+
     def load_kernels(self) -> float:
         """Compile what a run needs, or find it in Warp's cache, at the present state; returns the seconds it took."""
         start = time.perf_counter()
-        of_laws = [kernel for g in self.groups for kernel in (g.kernels.forces_and_tangents, g.kernels.stress)]
-        begin_loading(
-            [*of_laws, self._kernels.gather_matrix, *solver_kernels(self.precision, self.device)], self.device
-        )()
+        self.begin_loading_kernels()()
         # in a step, in which a term may need more than in an equilibrium
         for term in self.terms:
             term.set_time_step(1.0)

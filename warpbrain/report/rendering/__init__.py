@@ -128,15 +128,18 @@ def render(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -
 def ready_to_render() -> Iterator[None]:
     """While it lasts, the process of the next `render` is there, and loads its libraries beside whatever else is done.
 
-    It ends with the block if nothing was rendered, and by itself if this process is gone.
+    It ends with the block, rendering or not, and by itself if this process is gone.
     """
-    _ready.append(_begin())
+    process = _begin()
+    _ready.append(process)
     try:
         yield
     finally:
-        while _ready:
-            with _ready.pop() as process:
-                process.kill()
+        process.kill()
+        if process in _ready:
+            _ready.remove(process)
+            with process:
+                pass
 
 
 def _begin() -> subprocess.Popen[str]:
