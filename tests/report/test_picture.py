@@ -13,7 +13,7 @@ from shapes import box
 
 from warpbrain.mesh import TetMesh
 from warpbrain.report import picture
-from warpbrain.report.picture import Moved, draw, pictures_of, round_factor
+from warpbrain.report.picture import Moved, begin_pictures, draw, round_factor
 from warpbrain.report.rendering import AFTER, AXIAL, BEFORE, CORONAL, MOTION, NAMES, SAGITTAL, RenderingError
 
 NO_POINTS = Moved(*np.zeros((3, 0, 3)))
@@ -32,7 +32,7 @@ def block() -> TetMesh:
 def rendered(whole, left, u, moved=NO_POINTS):
     """Pictures; what cannot be rendered here is skipped, but not where tests must not be."""
     try:
-        return pictures_of(whole, left, u, {1: "grey", 2: "white"}, moved)
+        return begin_pictures(whole, left, u, {1: "grey", 2: "white"}, moved)()
     except RenderingError as error:
         if os.environ.get("CI"):
             raise
@@ -123,8 +123,8 @@ def test_pictures_of_any_body_become_a_file(tmp_path, monkeypatch):
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)
             # a dollar sign begins no formula
-            pictures = pictures_of(plain, plain, u, {1: "$x", 2: "_y"}, NO_POINTS)
-            drawn = draw(path, lambda: pictures, "A $title", ["with $ two", "lines"])  # noqa: B023
+            rendered = begin_pictures(plain, plain, u, {1: "$x", 2: "_y"}, NO_POINTS)
+            drawn = draw(path, rendered, "A $title", ["with $ two", "lines"])
         assert not isinstance(drawn, str)
         assert [file.name for file in tmp_path.iterdir()] == ["a.png"]
         assert plt.get_fignums() == []

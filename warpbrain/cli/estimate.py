@@ -34,6 +34,7 @@ from warpbrain.report.estimate import describe_estimate, estimate_lines, write_e
 from warpbrain.report.estimate_page import write_estimate_page
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure, residuals_figure
 from warpbrain.report.files import fingerprint_of, write_summary
+from warpbrain.report.rendering import ready_to_render
 from warpbrain.report.state_files import read_state
 from warpbrain.report.sweep import (
     TABLE,
@@ -150,7 +151,8 @@ def _posterior(
         write_summary(out / "estimate.json", described)
         record.files += ["estimate.json", "predictions.csv", "state.vtu"]
         record.files += ["posterior.png", "predicted.png", "residuals.png"]
-        record.files += drawn(write_estimate_page(out, described, posterior), say)
+        with ready_to_render():
+            record.files += drawn(write_estimate_page(out, described, posterior), say)
         if images is not None:
             warp.warp(read_state(out / "state.vtu"), out, images, record, options.quiet)
 

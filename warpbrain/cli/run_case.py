@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from warpbrain.cli import run_specimen, warp
 from warpbrain.cli.log import drawn, note_device
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
-from warpbrain.kernels.module import is_compiling
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 from warpbrain.physics.words import tabled
 from warpbrain.report import summary as tables
@@ -86,8 +84,6 @@ def _run_body(
 
     with Progress("kernels", options.quiet) as loading:
         loading.show(0.0, "the first run on a machine compiles them")
-        if is_compiling():
-            _import_drawing()
         loaded = system.load_kernels()
     with watching(options, say) as watched:
         done = running.run(watched)
@@ -128,13 +124,6 @@ def _run_body(
         write_summary(out / "summary.json", summary)
         if to_warp is not None:
             warp.warp(read_state(out / "result.vtu"), out, to_warp, record, options.quiet)
-
-
-def _import_drawing() -> None:
-    """Import what is drawn with while there is nothing else to do; what is not there is missed when it is used."""
-    with suppress(ImportError):
-        for name in ("meshio", "pyvista", "matplotlib.figure", "matplotlib.backends.backend_agg"):
-            import_module(name)
 
 
 def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:

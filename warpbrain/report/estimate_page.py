@@ -27,7 +27,7 @@ from warpbrain.report.estimate import (
 from warpbrain.report.estimate_picture import agreement_figure, densities_figure
 from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import inlined
-from warpbrain.report.picture import Moved, Pictures, draw, pictures_of
+from warpbrain.report.picture import Moved, Pictures, begin_pictures, draw
 from warpbrain.report.run_page import BADGES
 from warpbrain.report.state_files import read_state
 from warpbrain.report.summary import left_out
@@ -69,12 +69,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     whole, state, moved = posterior.case.mesh, read_state(folder / "state.vtu"), moved_of(posterior)
     titles = {label: tissue.name for label, tissue in posterior.case.tissues.items()}
     subtitles = ["the most probable state of the estimate", *judged.sentences]
-    pictures = draw(
-        folder / "deformation.png",
-        lambda: pictures_of(whole, state.mesh, state.u, titles, moved),
-        case["title"],
-        subtitles,
-    )
+    rendered = begin_pictures(whole, state.mesh, state.u, titles, moved)
     places = views.places(whole)
     tissue = [parameter_row(parameter) for parameter in summary["parameters"]]
     names = ", ".join(f"{row[0]}, {row[1]}" for row in tissue)
@@ -85,6 +80,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
             lambda narrow: agreement_figure(posterior, narrow), "Observed beside predicted components.", words
         )
     causes = [] if nothing is None else [cause for cause in nothing["causes"] if cause["probability"] >= _LIKELY]
+    pictures = draw(folder / "deformation.png", rendered, case["title"], subtitles)
     sections = sections_of(
         "estimate.html", summary=summary, agreement=agreement,
         tissue=tissue,

@@ -31,6 +31,7 @@ from warpbrain.report.rendering import (
     Scene,
     render,
 )
+from warpbrain.threads import beside
 
 #: Pixels of one picture.
 _SIZE = (640, 560)
@@ -72,17 +73,20 @@ class Pictures:
     names: dict[int, str]
 
 
-def pictures_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Pictures:
-    """Render a deformed body.
+def begin_pictures(
+    whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved
+) -> Callable[[], Pictures]:
+    """Begin to render a deformed body, beside what else there is to do; what is returned waits for its pictures.
 
     `whole` is the anatomy before anything was resected, `mesh` what is left of it, of whose nodes u (n, 3) [m] is the
     displacement; `names` are those of the tissues by label.
 
-    `RenderingError` if nothing can be rendered here.
+    Then `RenderingError`, if nothing can be rendered here. To be called where `ready_to_render` lasts: it ends with it.
     """
-    scene = scene_of(whole, mesh, u, names, moved)
+    scene, resected = scene_of(whole, mesh, u, names, moved), taken_out(whole, mesh)
     cameras = cameras_of(scene)
-    return Pictures(scene, render(scene, cameras, _SIZE), cameras, whole, taken_out(whole, mesh), names)
+    rendered = beside(lambda: render(scene, cameras, _SIZE))
+    return lambda: Pictures(scene, rendered(), cameras, whole, resected, names)
 
 
 def taken_out(whole: TetMesh, mesh: TetMesh) -> Bools:
@@ -96,7 +100,7 @@ def taken_out(whole: TetMesh, mesh: TetMesh) -> Bools:
 
 
 def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Scene:
-    """What is drawn of a deformed body; see `pictures_of`."""
+    """What is drawn of a deformed body; see `begin_pictures`."""
     from matplotlib import colormaps
     from matplotlib.colors import to_rgb
 
@@ -178,23 +182,24 @@ def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
 
 
 def draw(path: Path, rendered: Callable[[], Pictures], title: str, subtitles: Sequence[str]) -> Pictures | str:
-    """Write the picture of a deformed body, what is made of it by `pictures_of`, below a title and more lines.
+    """Write the picture of a deformed body, what `begin_pictures` returns, below a title and more lines.
 
     Returns why, if nothing can be rendered here: no picture is then left at `path`, which would be one of something
     else.
     """
+    from matplotlib.cm import ScalarMappable
+
+    lines = len(subtitles) + 1
+    high = 9.8 + 0.24 * lines
+    figure, axes = views.panels(2, 3, (13.8, high))
+    # room for the title, which has any number of lines
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.24 * lines / high))
     try:
         pictures = rendered()
     except RenderingError as error:
         path.unlink(missing_ok=True)
         return str(error)
-    from matplotlib.cm import ScalarMappable
-
-    scene, lines = pictures.scene, len(subtitles) + 1
-    high = 9.8 + 0.24 * lines
-    figure, axes = views.panels(2, 3, (13.8, high))
-    # room for the title, which has any number of lines
-    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.24 * lines / high))
+    scene = pictures.scene
     for panel, (name, image) in zip(axes, pictures.images.items(), strict=True):
         show(panel, image, annotations_of(pictures, name))
         panel.set_title(heading(pictures, name), fontsize=10)

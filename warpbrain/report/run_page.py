@@ -25,13 +25,12 @@ from warpbrain.report.comparison import (
 from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
-from warpbrain.report.picture import Moved, Pictures, draw, pictures_of
+from warpbrain.report.picture import Moved, Pictures, begin_pictures, draw
 from warpbrain.report.specimen import tests_figure
 from warpbrain.report.summary import displacement_rows
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, QUIET, VERMILLION
 from warpbrain.simulation.run import Run
 from warpbrain.simulation.specimen import Tested
-from warpbrain.threads import beside
 
 #: Letters of a line of a picture's title.
 _LINE = 150
@@ -56,7 +55,7 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     names = {label: tissue.name for label, tissue in run.case.tissues.items()}
     left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
     subtitles = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
-    rendered = beside(lambda: pictures_of(whole, result.mesh, result.u, names, moved))
+    rendered = begin_pictures(whole, result.mesh, result.u, names, moved)
     fields = [
         Field(
             name.replace("_", " "), f"{name.replace('_', ' ')} [Pa]", values, float(values.min()), float(values.max())
