@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import map_coordinates
 
 from warpbrain.arrays import Bools, Floats, Ints, Singles
 from warpbrain.images.continuation import continued
@@ -52,7 +52,9 @@ class DisplacementField:
             at = np.clip(indices[part], 0.0, last).T
             outside = ((indices[part] < -0.5) | (indices[part] > last + 0.5)).any(axis=1)
             for axis in range(3):
-                vectors[part, axis] = map_coordinates(self.vectors[..., axis], at, order=1, mode="nearest")
+                vectors[part, axis] = scipy.ndimage.map_coordinates(
+                    self.vectors[..., axis], at, order=1, mode="nearest"
+                )
             vectors[part][outside] = 0.0
         return vectors
 
@@ -138,7 +140,7 @@ def _errors(field: DisplacementField, back: DisplacementField, tissue: Bools) ->
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     leads = back.at_indices(places)
     origins = places + grid.steps(leads)
-    inside = map_coordinates(tissue.astype(np.float32), origins.T, order=1) > 0.999
+    inside = scipy.ndimage.map_coordinates(tissue.astype(np.float32), origins.T, order=1) > 0.999
     if not inside.any():
         return np.zeros(1)
     left = leads[inside] + field.at_indices(origins[inside])
@@ -181,9 +183,9 @@ def resampled(
             index = np.floor(at + 0.5).astype(np.int64)
             sampled = source[tuple(np.minimum(index, last).T)]
         else:
-            sampled = map_coordinates(source, at.T, order=1, mode="nearest")
+            sampled = scipy.ndimage.map_coordinates(source, at.T, order=1, mode="nearest")
             if known is not None:
-                share = map_coordinates(known, at.T, order=1, mode="nearest")
+                share = scipy.ndimage.map_coordinates(known, at.T, order=1, mode="nearest")
                 sampled = np.where(share >= 0.5, sampled / np.maximum(share, 0.5), np.nan)
             if np.issubdtype(values.dtype, np.integer):
                 sampled = np.rint(sampled)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import map_coordinates
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.mesh import TetMesh
@@ -94,7 +94,7 @@ class Grid:
         """Values (n,) of a field (i, j, k) on this grid at positions (n, 3) [mm, RAS], linear between voxels."""
         back = np.linalg.inv(self.affine)
         at = back[:3, :3] @ points.T + back[:3, 3:]
-        return np.asarray(map_coordinates(values, at, order=1, mode="nearest", output=np.float64))
+        return np.asarray(scipy.ndimage.map_coordinates(values, at, order=1, mode="nearest", output=np.float64))
 
     def contains(self, points: ArrayLike) -> Bools:
         """Which positions (n, 3) [mm, RAS] are in a voxel: (n,) bool."""

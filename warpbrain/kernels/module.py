@@ -29,7 +29,6 @@ _CPU_FLAGS = (
 _MOST = 2
 #: What was begun to be compiled and may not be done.
 _begun: list[Future[None]] = []
-_alone = threading.Lock()
 
 
 def compiled_module(name: str, unroll: int | None = None) -> Any:
@@ -86,7 +85,8 @@ def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], Non
     precompiles its header, which takes longer than four of our modules and which those after it share.
     """
     modules = {kernel.module.name: kernel.module for kernel in kernels}
-    begun = [_compilers(os.getpid()).submit(_load, device, module) for module in modules.values()]
+    compilers = _compilers(os.getpid())
+    begun = [compilers.threads.submit(compilers.load, device, module) for module in modules.values()]
     _begun[:] = [*(loaded for loaded in _begun if not loaded.done()), *begun]
 
     def wait() -> None:
@@ -101,31 +101,25 @@ def is_compiling() -> bool:
     return any(not loaded.done() for loaded in _begun)
 
 
-@cache
-def _compilers(process: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(min(_MOST, thread_count()), thread_name_prefix="compiler")
+class _Compilers:
+    """Threads that compile modules, several at once for the CPU after the first one has precompiled the header."""
 
+    def __init__(self) -> None:
+        self.threads = ThreadPoolExecutor(min(_MOST, thread_count()), thread_name_prefix="compiler")
+        self._headers = tempfile.TemporaryDirectory(prefix="wp_pch_")
+        self._alone = threading.Lock()
 
-def _load(device: wp.Device, module: Any) -> None:
-    """Compile a module, or find it; several at once for the CPU, after the first one has precompiled the header."""
-    folder = _share_header(os.getpid())
-    with _alone:
-        if device.is_cuda or not any(folder.iterdir()):
-            wp.force_load(device, [module], threads_of_block(device))
-            return
-    wp.force_load(device, [module], threads_of_block(device))
-
-
-def _share_header(process: int) -> Path:
-    """The folder of precompiled headers, of all compilers of a process.
-
-    Warp makes one for each thread, so that none reads what another has half written: `_load` sees to that.
-    """
-    folders = warp_context.runtime._pch_dirs
-    folder = folders[threading.get_ident()] = _header_folder(process)
-    return Path(folder.name)
+    def load(self, device: wp.Device, module: Any) -> None:
+        """Compile a module, or find it."""
+        # Warp has a folder of headers for each thread, so that none reads what another has half written
+        warp_context.runtime._pch_dirs[threading.get_ident()] = self._headers
+        with self._alone:
+            if device.is_cuda or not any(Path(self._headers.name).iterdir()):
+                wp.force_load(device, [module], threads_of_block(device))
+                return
+        wp.force_load(device, [module], threads_of_block(device))
 
 
 @cache
-def _header_folder(process: int) -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="wp_pch_")
+def _compilers(process: int) -> _Compilers:
+    return _Compilers()

@@ -65,9 +65,14 @@ def save(figure: Any, path: Path, title: str = "", fontsize: float = 12.0, dpi: 
 
 def write_png(figure: Any, stream: BinaryIO, dpi: float) -> None:
     """Write a figure; a name in a script that the font lacks is no reason to print anything."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.set_dpi(dpi)
+    canvas: Any = FigureCanvasAgg(figure)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")
-        figure.savefig(stream, format="png", dpi=dpi)
+        # what `savefig` comes to after it has drawn all of it once to measure it, which the layout does by itself
+        canvas.print_png(stream)
 
 
 @dataclass(frozen=True)
