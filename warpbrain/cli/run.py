@@ -24,11 +24,14 @@ def _begin_loading_kernels(options: argparse.Namespace) -> None:
     """Begin to compile what every model needs; `System.load_kernels` does the rest."""
     from warpbrain.kernels.assembly import assembly_kernels
     from warpbrain.kernels.module import begin_loading, find_device
+    from warpbrain.kernels.multicore import team_kernels
     from warpbrain.kernels.precision import find_precision
 
     device, precision = find_device(options.device), find_precision(options.precision)
-    begin_loading([assembly_kernels(precision).gather_matrix], device)
-    # its imports are long, and the first module is
+    # the least one first: until it is compiled others wait
+    first = team_kernels()[:1] if device.is_cpu else ()
+    begin_loading([*first, assembly_kernels(precision).gather_matrix], device)
+    # what this imports takes long, too
     from warpbrain.kernels.linear import solver_kernels
 
     begin_loading(solver_kernels(precision, device), device)
