@@ -17,7 +17,7 @@ from referee.setting import Setting, draw_setting
 
 #: What cases that share a body have of it.
 _DECLARED = ("total", "moved", "sigma", "declares_sigma", "points", "checks", "surface", "times", "sites")
-#: Every so manieth body of a geometry is recorded at several times, as about as many of other cases are.
+#: One body of so many of a geometry is recorded at several times: about the share of other cases that are.
 _TIMED = 4
 
 

@@ -249,7 +249,7 @@ class Batch:
         self._ahead = even and self._patches is not None
         self._graph: Any = None
         self._graph_ahead: Any = None
-        self._told_all = wp.Event(self._device) if self._device.is_cuda else None
+        self._states_copied = wp.Event(self._device) if self._device.is_cuda else None
 
     def _patch_assembly(self) -> PatchAssembly:
         s, mesh = self.system, self.system.model.mesh
@@ -332,13 +332,13 @@ class Batch:
         numbers[3 : 3 + len(self.load_factors)] = self.load_factors
         numbers[3 + self._factors.shape[0] :][: len(self.amounts)] = self.amounts
         wp.capture_launch(self._graph)
-        if self._told_all is not None:
-            wp.record_event(self._told_all)
+        if self._states_copied is not None:
+            wp.record_event(self._states_copied)
             if self._ahead and on:
                 # while what has been told decides which of them are solved
                 wp.capture_launch(self._graph_ahead)
             self._room.prepare()
-            wp.synchronize_event(self._told_all)
+            wp.synchronize_event(self._states_copied)
         iterations, residual, goal = self._cg.results()
         ready = found[3] != 0.0
         self._unsolved[ready] = False

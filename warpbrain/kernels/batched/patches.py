@@ -21,9 +21,9 @@ from warpbrain.kernels.batched.parts import Ints, bisected
 
 #: Local nodes of the six edges of an element.
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
-#: Of a node, that are read at a time.
+#: Edges of a node that a thread reads at a time; `Patches.spokes` are these edges.
 SPOKES = 4
-#: In `Patches.kept`, behind nine bits: the row of a pair on the diagonal that has what each node has once.
+#: In `Patches.kept`, behind nine bits: to this row of a node's diagonal block its mass is added, or 1 if it is held.
 FIRST = 1 << 9
 
 
@@ -207,27 +207,29 @@ def _tables(
     at = np.empty((*elements.shape, 6), dtype=np.int32)
     counts, spokes = [], []
     for patch, piece in enumerate(pieces):
-        (found, edge), (own, corner) = edges[patch], nodes[patch]
-        at[patch] = len(found)
+        (patch_edges, edge), (patch_nodes, corner) = edges[patch], nodes[patch]
+        count_of_edges = len(patch_edges)
+        at[patch] = count_of_edges
         for turn, chosen in enumerate(rounds[patch]):
             elements[patch, turn, : len(chosen)] = piece[chosen]
             corners[patch, turn, : len(chosen)] = corner.reshape(-1, 4)[chosen]
             at[patch, turn, : len(chosen)] = edge.reshape(-1, 6)[chosen]
-        at_ends = np.searchsorted(own, pairs[found])
+        at_ends = np.searchsorted(patch_nodes, pairs[patch_edges])
         all_ends = np.r_[at_ends[:, 0], at_ends[:, 1]]
-        count = np.bincount(all_ends, minlength=len(own))
+        count = np.bincount(all_ends, minlength=len(patch_nodes))
         counts.append(-(-count // SPOKES) * SPOKES)
         order = np.argsort(all_ends, kind="stable")
         # where those of each node begin with and without what is added at the end
         shift = np.cumsum(counts[-1]) - counts[-1] - np.cumsum(count) + count
-        spokes.append(np.full(counts[-1].sum(), len(found)))
+        spokes.append(np.full(counts[-1].sum(), count_of_edges))
         spokes[-1][np.arange(len(order)) + np.repeat(shift, count)] = np.r_[
-            np.arange(len(found)), -1 - np.arange(len(found))
+            np.arange(count_of_edges), -1 - np.arange(count_of_edges)
         ][order]
     return Patches(
         _ints(elements), corners, at, _ints(turns),
-        _ints([len(found) for found, _ in edges]),
-        _ints(np.cumsum([0, *(len(own) for own, _ in nodes)])), _ints(np.concatenate([own for own, _ in nodes])),
+        _ints([len(of_patch) for of_patch, _ in edges]),
+        _ints(np.cumsum([0, *(len(of_patch) for of_patch, _ in nodes)])),
+        _ints(np.concatenate([of_patch for of_patch, _ in nodes])),
         _ints(np.r_[0, np.cumsum(np.concatenate(counts))]), _ints(np.concatenate(spokes)),
         _ints(starts - starts[0]), rows, _ints(kept),
     )  # fmt: skip

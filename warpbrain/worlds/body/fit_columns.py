@@ -18,9 +18,9 @@ from warpbrain.worlds.body.nuisances import (
     LAW,
     Nuisances,
     field_columns,
-    law_column,
     law_columns,
     mesh_by_tissue,
+    shared_parameter,
     tissue_columns,
 )
 from warpbrain.worlds.body.sensors import Sensors
@@ -40,8 +40,8 @@ class Layout:
     effects: tuple[slice, ...]  # coefficients of each effect
     linear: Bools  # (q + e,), which of the first act linearly: all but tissue and field
     nonlinear: Bools  # (q + e + k,), which act through an equilibrium
-    #: Coordinates of the law's shape that an effect says, too: each with that of the effect, and how many times the
-    #: column of the effect its own is.
+    #: Parameters of laws that effects have as coefficients: coordinate as a nuisance, as a coefficient, and
+    #: `SharedParameter.ratio`.
     shared: tuple[tuple[int, int, float], ...]
 
     @classmethod
@@ -52,12 +52,12 @@ class Layout:
         linear[tissue] = linear[field] = False
         nonlinear = np.concatenate([~linear, np.ones(width_of(effects), dtype=bool)])
         law, parts = nuisances.part(LAW), column_slices(effects, count)
-        known = ((law_column(effect), part.start) for effect, part in zip(effects, parts, strict=True))
-        shared = tuple((law.start + number[0], at, number[1]) for number, at in known if number is not None)
+        parameters = ((shared_parameter(effect), part.start) for effect, part in zip(effects, parts, strict=True))
+        shared = tuple((law.start + each.column, at, each.ratio) for each, at in parameters if each is not None)
         return cls(tissue, field, law, slice(count, None), parts, linear, nonlinear, shared)
 
     def without_shared(self, z: Floats) -> Floats:
-        """Coordinates (q + e + k,) where what an effect says as well is said by the effect alone."""
+        """The same tissue as coordinates (q + e + k,) with shared parameters in the coefficients of effects alone."""
         z = z.copy()
         for law, effect, ratio in self.shared:
             z[effect] += ratio * z[law]
@@ -129,14 +129,12 @@ def law_columns_about(
     """Columns (n, k) of the shape of laws about a state with effects that have these coefficients.
 
     What that does is next to nothing where strains are small: about the base, which nothing but declared loads deforms.
-    It is not where a mechanism strains tissue by half, and would be taken for a cause. Of a number of the law that
-    an effect says the column is zero.
+    It is not where a mechanism strains tissue by half, and would be taken for a cause. The
+    column of a `SharedParameter` is zero.
     """
     relaxed = _relaxation_factor(effects, coefficients, at.sensors)
     columns = relaxed * law_columns(Effects(at, mesh_errors=mesh_errors), states)
-    for effect in effects:
-        if (law := law_column(effect)) is not None:
-            columns[:, law[0]] = 0.0
+    columns[:, [each.column for each in map(shared_parameter, effects) if each is not None]] = 0.0
     return columns
 
 

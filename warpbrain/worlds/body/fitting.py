@@ -126,7 +126,7 @@ class FitSearch:
         for number, start in enumerate(starts, 1):
             z = self._clipped(self._layout.without_shared(start))
             try:
-                self._accept_if_better(*self._with_best_linear(z, *self._evaluate(z, nearby)))
+                self._accept_if_better(*self._trial(z, nearby))
             except (SolveError, InputError):
                 if number == len(starts) and not np.isfinite(self._best):
                     raise
@@ -173,7 +173,7 @@ class FitSearch:
         far = self.z
         for share in (0.5, 0.0):
             between = base + share * (far - base)
-            if not self._accept_if_better(*self._with_best_linear(between, *self._evaluate(between, self.state))):
+            if not self._accept_if_better(*self._trial(between, self.state)):
                 return
 
     def minimise(self, enough: float = _ENOUGH) -> None:
@@ -363,7 +363,7 @@ class FitSearch:
         for _ in range(trials):
             trial, shorter = self._clipped(self.z + length * step), _SHORT
             try:
-                trial, state, residual = self._with_best_linear(trial, *self._evaluate(trial, self.state))
+                trial, state, residual = self._trial(trial, self.state)
             except (SolveError, InputError):
                 pass
             else:
@@ -381,10 +381,17 @@ class FitSearch:
     def _renew(self, residual: Floats) -> None:
         """Take another residual (n,) at the best point, whose objective is another one from now on."""
         self._best = np.inf
-        self._accept_if_better(*self._with_best_linear(self.z, self.state, residual))
+        z, residual = self._with_best_linear(self.z, residual)
+        self._accept_if_better(z, self.state, residual)
 
-    def _with_best_linear(self, z: Floats, state: SolvedState, residual: Floats) -> tuple[Floats, SolvedState, Floats]:
-        """A point with its linear coordinates at their best, which needs no equilibrium.
+    def _trial(self, z: Floats, nearby: SolvedState) -> tuple[Floats, SolvedState, Floats]:
+        """Coordinates with the linear ones at their best, and the state and residual there."""
+        state, residual = self._evaluate(z, nearby)
+        z, residual = self._with_best_linear(z, residual)
+        return z, state, residual
+
+    def _with_best_linear(self, z: Floats, residual: Floats) -> tuple[Floats, Floats]:
+        """Coordinates with the linear ones at their best, which needs no equilibrium, and the residual there.
 
         Variable projection (Golub and Pereyra 1973): a step that is shortened for the sake of the state is not so for
         these, and where columns of laws are made anew these follow at once.
@@ -401,7 +408,7 @@ class FitSearch:
         change[self._linear] = cho_solve(factor, gradient, check_finite=False)
         z = z.copy()
         z[: len(change)] += change
-        return z, state, residual - self._U @ change
+        return z, residual - self._U @ change
 
     def _accept_if_better(self, z: Floats, state: SolvedState, residual: Floats) -> bool:
         objective = self._objective(z, residual)

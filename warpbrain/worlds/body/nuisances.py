@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -168,17 +168,24 @@ def law_columns(effects: Effects, states: States) -> Floats:
     return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
 
 
-def law_column(effect: Effect) -> tuple[int, float] | None:
-    """Number of the column of the shape of laws that an effect says, too, and how many times its own that is.
+class SharedParameter(NamedTuple):
+    """A parameter of tissues' laws that is a nuisance and the coefficient of an effect."""
 
-    A cause that is a number of the law is that number with a wider prior, not another one beside it: both at once would
-    be a number twice, once linear and once not. None if no column is.
+    column: int  # its number in the family `LAW`
+    ratio: float  # standard deviation that it has as a nuisance, relative to that of the effect's coefficient
+
+
+def shared_parameter(effect: Effect) -> SharedParameter | None:
+    """The parameter of the law that is the coefficient of an effect, such as Ogden's exponent; None if none is.
+
+    The effect stands for it, with a wider prior. The nuisance beside it would be the same parameter once more, which
+    acts linearly.
     """
     proposal = effect.proposed
     key = proposal.make(proposal.mean).always if len(proposal.mean) == 1 else ""
     if key not in _ALWAYS or proposal.over_time is not None:
         return None
-    return _ALWAYS.index(key), belief(key) / float(proposal.sd[0])
+    return SharedParameter(_ALWAYS.index(key), belief(key) / float(proposal.sd[0]))
 
 
 def other_volume(states: States) -> Proposal:

@@ -31,7 +31,7 @@ from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, mar
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
-from warpbrain.worlds.body.nuisances import LAW, UNKNOWN_MESH, law_column
+from warpbrain.worlds.body.nuisances import LAW, UNKNOWN_MESH, shared_parameter
 from warpbrain.worlds.body.states import SolvedState
 
 #: The sum over sizes ends where a term is below this part of the largest.
@@ -136,8 +136,9 @@ class Refit:
         """The same point without one of its effects, from which a set without it is fitted."""
         part = column_slices(self.effects, 0)[number]
         share, nuisances = self.mesh_share, self.nuisances.copy()
-        if (law := law_column(self.effects[number])) is not None:
-            nuisances[base.nuisances.part(LAW).start + law[0]] += float(self.coefficients[number][0]) / law[1]
+        if (shared := shared_parameter(self.effects[number])) is not None:
+            coordinate = base.nuisances.part(LAW).start + shared.column
+            nuisances[coordinate] += float(self.coefficients[number][0]) / shared.ratio
 
         def others(values: tuple[Any, ...]) -> tuple[Any, ...]:
             return values[:number] + values[number + 1 :]
@@ -301,10 +302,11 @@ class WeightedSet:
         """The set less one of its mechanisms, linear about the same point, with an evidence to be compared with its."""
         number = self.mechanisms.index(mechanism)
         columns = np.delete(self.columns, self.slices[number], axis=1)
-        residual, law = self.residual + self.effects[number].mean, law_column(self.effects[number])
-        if law is not None and self.refit is not None:
-            own = self.columns[:, self.slices[number].start]
-            columns[:, base.nuisances.part(LAW).start + law[0]] = law[1] * own
+        residual, shared = self.residual + self.effects[number].mean, shared_parameter(self.effects[number])
+        if shared is not None and self.refit is not None:
+            # as a nuisance, which it is again
+            of_effect = self.columns[:, self.slices[number].start]
+            columns[:, base.nuisances.part(LAW).start + shared.column] = shared.ratio * of_effect
         columns, reduced = evidence_of(base, columns, residual, self.marginal.scale, self.marginal.sizes)
         at = self.hypothesis.causes.index(mechanism)
         hypothesis = replace(
