@@ -1,10 +1,11 @@
-"""What can go wrong while building meshes, and volumes that no brain has: in one line for the user."""
+"""What can go wrong while building meshes, and volumes that no brain or body has: in one line for the user."""
 
 from __future__ import annotations
 
 import importlib.util
 from collections.abc import Collection
 
+from warpbrain.cases.parts.anatomy import LARGEST_VOLUME, SMALLEST_VOLUME
 from warpbrain.errors import InputError
 from warpbrain.frame import METRES
 
@@ -23,7 +24,7 @@ def require_extra(modules: Collection[str] = ("mmgpy", "nilearn", "nibabel", "sc
         )
 
 
-#: From a small rodent's brain to a phantom larger than any head [m3].
+#: Of what is labelled in a scan [m3]: from a small rodent's brain to a phantom larger than any head.
 SMALLEST, LARGEST = 1e-6, 1e-2
 _HINT = "are its lengths in millimetres?"
 
@@ -35,17 +36,18 @@ def check_volume(what: str, volume: float) -> None:
 
 
 def check_volume_in(what: str, volume: float, unit: str) -> None:
-    """As `check_volume`, for lengths that were read in a unit of `METRES`: says which other unit would do."""
-    if SMALLEST <= volume <= LARGEST:
+    """`InputError` if a volume [m3], of lengths read in a unit of `METRES`, is no body's: says which unit would do."""
+    if SMALLEST_VOLUME < volume < LARGEST_VOLUME:
         return
     for other, metres in METRES.items():
         meant = volume * (metres / METRES[unit]) ** 3
-        if SMALLEST <= meant <= LARGEST:
+        if SMALLEST_VOLUME < meant < LARGEST_VOLUME:
             hint = f"in {other} it would be {cm3(meant)}: --units {other}"
             break
     else:
         hint = _HINT
-    raise InputError(f"{what} has a volume of {cm3(volume)} in {unit}, expected 1 to 10000 cm3; {hint}")
+    expected = f"{cm3(SMALLEST_VOLUME).removesuffix(' cm3')} to {cm3(LARGEST_VOLUME)}"
+    raise InputError(f"{what} has a volume of {cm3(volume)} in {unit}, expected {expected}; {hint}")
 
 
 def cm3(volume: float) -> str:
