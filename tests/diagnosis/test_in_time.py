@@ -118,6 +118,16 @@ def test_one_course_is_that_of_every_permeability(tmp_path) -> None:
         np.testing.assert_allclose(of_fit, effect.mean, atol=1e-6 * np.abs(effect.mean).max())
 
 
+def test_no_fluid_flows_in_a_body_at_rest(tmp_path) -> None:
+    """Where no load is declared there is nothing that fluid could carry, and drainage moves nothing."""
+    case = write_slow(tmp_path / "case", CAUSES["drainage"])
+    states = States(replace(case, boundaries=case.boundaries[:1]), "cpu")
+    base = states.solve(Hypothesis(declared(states.case, states.parameters), np.zeros(states.modes.shape[1])))
+    effects = Effects(Linearisation(base.system, base.u, base.reactions, base.sensors))
+    for effect in effects.of(dictionary_of(states.case, ("drainage",), len(TIMES)).proposals["drainage"]):
+        assert not effect.mean.any() and not effect.columns.any()
+
+
 @pytest.fixture(scope="module")
 def relaxing(diagnosed: tuple[str, Diagnosis]) -> tuple[Base, Candidates]:
     base = diagnosed[1].base

@@ -73,6 +73,9 @@ def consolidation(at: Linearisation, term: Term) -> Course:
     from scipy.linalg import eigh_tridiagonal
 
     b, B, N, H = _matrices(at, term)
+    if not b.any():
+        # of a body at rest, whose fluid carries nothing
+        return Course(at.sensors, np.zeros((len(at.sensors), 1)), np.ones(1), np.zeros((1, 1)))
     flow = SparseFactors(H)
     v = flow.solve(-b)
     length = float(np.sqrt(max(v @ (H @ v), np.finfo(np.float64).tiny)))
