@@ -6,6 +6,8 @@ import numpy as np
 
 from warpbrain.diagnosis.checking import Confirming
 from warpbrain.diagnosis.ranking import Ranking
+from warpbrain.physics.mechanisms.swelling import Swelling
+from warpbrain.physics.proposal import Proposal
 
 
 def test_a_cause_that_could_not_be_simulated_says_why(small_diagnosis):
@@ -20,3 +22,17 @@ def test_a_cause_that_could_not_be_simulated_says_why(small_diagnosis):
     assert row.rejected_because == (
         "as large as it is seen it could not be simulated: no equilibrium at 3 % of the load"
     )
+
+
+def test_a_size_that_cannot_be_is_told_of_no_linear_model(small_diagnosis):
+    search = small_diagnosis.search
+    linear = next(s for s in search.weighted_sets if s.mechanisms == ("swelling",) and s.refit is None)
+    ranking = Ranking(search, Confirming(search, 100, np.random.default_rng(0), 0.05))
+    [row] = ranking.named(linear, ("swelling",))
+    assert "amount" in {value.name for value in row.values}
+    # the same columns, of a body that would shrink by all of its volume and more
+    shrunk = Proposal.of_one(lambda g: Swelling(amount=1e-3 * g - 1.32), 0.0, 1.0, "smooth")
+    [effect] = linear.effects
+    [row] = ranking.named(replace(linear, effects=(replace(effect, proposal=shrunk),)), ("swelling",))
+    assert "amount" not in {value.name for value in row.values}
+    assert row.rejected_because.endswith("would not be -90 to 400 %")

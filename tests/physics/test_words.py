@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.physics.sizes import size_in_words, smallest_in_words
+from warpbrain.physics.sizes import beyond_in_words, size_in_words, smallest_in_words
 from warpbrain.physics.words import Smallest, Value, along, length, measured, number, place, tabled, towards
 
 
@@ -65,13 +65,30 @@ def test_a_place_is_as_fine_as_the_body_is_small(extent, said):
         ("viscoelasticity", Smallest(0.41, "", "moduli"), "from a tissue that at first is 1.4 times as stiff"),
         ("contact", Smallest(0.65, "of being there", "share"), "would have been seen"),
         ("contact", Smallest(1.2, "of being there", "share"), "would not have been seen"),
-        ("inclusion", Smallest(5137.0, "", "ratio"), "would not have been seen, whatever its size"),
-        ("asymmetry", Smallest(15000.0, "", "exponent"), "would not have been seen, whatever its size"),
+        ("inclusion", Smallest(5137.0, "", "ratio", deviations=7.1), "would not have been seen, whatever its size"),
+        ("swelling", Smallest(14.8, "%", "amount", deviations=0.74), "from 15 %"),
+        ("gravity", Smallest(3.1, "", "share"), "would not have been seen, whatever its size"),
         ("drainage", Smallest(math.inf, "", ""), "would not have been seen, whatever its size"),
     ],
 )
 def test_smallest(kind, smallest, said):
     assert smallest_in_words(kind, smallest).startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "said"),
+    [
+        ("compressibility", Value("poisson", -0.88, 3.3, ""), "poisson would not be 0.35 to 0.4999"),
+        ("compressibility", Value("poisson", 0.4467, 0.002, ""), ""),
+        ("swelling", Value("amount", -132.0, 8.0, "%"), "amount would not be -90 to 400 %"),
+        ("swelling", Value("amount", 24.8, 3.4, "%"), ""),
+        ("fibres", Value("stiffness", -1.0, 3.0, "Pa"), "stiffness would not be above 0 Pa"),
+        ("traction", Value("value_x", -3e4, 1.0, "Pa"), ""),
+        ("end friction", Value("share", 7.0, 1.0, ""), ""),
+    ],
+)
+def test_a_number_that_cannot_be_is_said(kind, value, said):
+    assert beyond_in_words(kind, value) == said
 
 
 def test_a_direction_is_the_nearest_of_axes_and_halves_between_two():

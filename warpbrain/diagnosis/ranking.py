@@ -10,6 +10,7 @@ from warpbrain.diagnosis.locating import ball_of
 from warpbrain.diagnosis.result import Ranked
 from warpbrain.inference import Cause, GaussianModel, Kind
 from warpbrain.inference.subsets import Blocks
+from warpbrain.physics.sizes import beyond_in_words
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.parameters import scanned_values, values_of
@@ -50,6 +51,9 @@ class Ranking:
         scanned = self._search.causes.effects[cause.name]
         values = values_of(effect, *weighted_set.coefficients[number])
         fitted = {value.name for value in values}
+        # linear about another state, a size may go beyond what there can be: it says nothing
+        beyond = {} if weighted_set.refit is not None else {v.name: beyond_in_words(cause.name, v) for v in values}
+        values = tuple(value for value in values if not beyond.get(value.name))
         values += tuple(value for value in scanned_values(scanned, weights) if value.name not in fitted)
         centre, radius = _place(effect, scanned, weights)
         change = None
@@ -60,6 +64,7 @@ class Ranking:
         why = "" if weighted_set.refit is not None else "less probable than what was fitted"
         if weighted_set.failure:
             why = f"as large as it is seen it could not be simulated: {weighted_set.failure}"
+        why = "; ".join(filter(None, (why, *beyond.values())))
         return Ranked(
             cause.name,
             True,

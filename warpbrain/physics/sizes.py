@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import Smallest, Value, measured, number
 
-#: An effect that is seen only this improbably far out of what is expected [part] is no effect that is seen.
-_FAR = 1e-4
+#: An effect that is seen only so many standard deviations out of what is looked for, where hardly any is (1e-4), is no
+#: effect that is seen.
+FARTHEST = 3.72
 #: How many times as large as it can be nothing is.
 _WHOLE = 3.0
 
@@ -33,7 +34,8 @@ def smallest_in_words(kind: str, smallest: Smallest) -> str:
     size = smallest.size
     if smallest.unit == "of being there":
         return "would have been seen" if size <= 1.0 else "would not have been seen"
-    if not math.isfinite(size) or _implausible(kind, smallest):
+    farthest = _WHOLE if smallest.name == "share" else math.inf
+    if not math.isfinite(size) or size > farthest or smallest.deviations > FARTHEST:
         return "would not have been seen, whatever its size"
     if smallest.name == "share":
         return f"from {number(100.0 * size)} % of its full size"
@@ -42,14 +44,15 @@ def smallest_in_words(kind: str, smallest: Smallest) -> str:
     return mechanisms()[kind].smallest_in_words(smallest)
 
 
-def _implausible(kind: str, smallest: Smallest) -> bool:
-    """Whether hardly any effect of a kind is so large."""
-    name = smallest.name
-    if name == "share":
-        return smallest.size > _WHOLE
-    stem = name[:-2] if name[-2:] in ("_x", "_y", "_z") else name.removesuffix("_size")
-    says = mechanisms()[kind].parameters().get(stem) if kind in mechanisms() else None
-    if says is None or says.expectation is None:
-        return False
-    low, middle, high = (says.expectation.quantile(part) for part in (_FAR, 0.5, 1.0 - _FAR))
-    return smallest.size >= max(high - middle, middle - low)
+def beyond_in_words(kind: str, value: Value) -> str:
+    """Which range a number is out of that its parameter has, by its limits or what is expected alike; empty if none."""
+    says = mechanisms()[kind].parameters().get(value.name) if kind in mechanisms() else None
+    if says is None or says.kind != "number":
+        return ""
+    low, high = says.above, says.below
+    if says.expectation is not None and not says.expectation.is_normal:
+        low, high = says.expectation.quantile(0.0), says.expectation.quantile(1.0)
+    if low <= value.value <= high:
+        return ""
+    span = f"above {low:g}" if high == math.inf else f"below {high:g}" if low == -math.inf else f"{low:g} to {high:g}"
+    return f"{value.name} would not be {span} {says.unit}".rstrip()

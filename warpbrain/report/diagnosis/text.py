@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -66,11 +67,17 @@ def _candidate_rows(summary: Summary) -> list[list[str]]:
             numbers = f"{candidate['log_evidence']:+.1f}", "" if d is None else f"{d:.1f}"
             change = "" if held is None else f"{factor * held:+.3g} {unit}"
             words = candidate["says"], candidate["rejected_because"]
-            values = [(name, v, v["unit"]) for name, v in list(candidate["estimate"].items())[:3]]
-            estimate = ", ".join(f"{name} {v['value']:.3g} ± {v['sd']:.2g} {unit}".rstrip() for name, v, unit in values)
+            values = list(candidate["estimate"].items())[:3]
+            estimate = ", ".join(f"{name} {_estimated(**value)}" for name, value in values)
             head = candidate["mechanism"], percent(candidate["probability"])
             rows.append([*head, *numbers, change, *words, estimate])
     return rows
+
+
+def _estimated(value: float | None, sd: float | None, unit: str) -> str:
+    """A number with its spread, lengths of positions in millimetres; what is not finite is null in JSON."""
+    numbers = (math.nan if number is None else (MILLIMETRES if unit == "m" else 1.0) * number for number in (value, sd))
+    return measured(*numbers, "mm" if unit == "m" else unit)
 
 
 def _rejected_rows(summary: Summary) -> list[list[str]]:

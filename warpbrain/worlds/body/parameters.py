@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.sizes import FARTHEST
 from warpbrain.physics.words import Smallest, Value
 from warpbrain.worlds.body.effects import Effect
 
@@ -93,8 +95,9 @@ def smallest_of(effect: Effect, whitened_length: float, seen: float, named: floa
     it is there). `seen`, `named`: detectabilities at which it raises an alarm, and at which it is named; infinite if it
     never is.
     """
-    size, unit, name = _size_at(effect, seen / max(whitened_length, 1e-12))
-    return Smallest(size, unit, name, _size_at(effect, named / max(whitened_length, 1e-12))[0])
+    part, part_named = (d / max(whitened_length, 1e-12) for d in (seen, named))
+    size, unit, name = _size_at(effect, part)
+    return Smallest(size, unit, name, _size_at(effect, part_named)[0] if part_named <= FARTHEST else math.inf, part)
 
 
 def _size_at(effect: Effect, factor: float) -> tuple[float, str, str]:
