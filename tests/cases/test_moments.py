@@ -45,6 +45,11 @@ def test_every_time_of_a_marker_counts(times: int, tmp_path) -> None:
         require_observable(case)
 
 
+def test_a_marker_is_counted_once() -> None:
+    assert marker(17).content.startswith("1 tracked point at 17 times, moved by 0.6")
+    assert replace(marker(2), time=None, points=np.eye(2, 3)).content.startswith("2 tracked points, moved by")
+
+
 def test_what_has_no_weight_or_no_time_is_not_counted() -> None:
     weights = np.ones(17)
     weights[:2] = 0.0

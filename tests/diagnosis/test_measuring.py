@@ -20,6 +20,8 @@ def test_a_head_that_is_turned_shows_weight_anew(small_diagnosis: Diagnosis) -> 
     # a second look at the same points tells no less, and no measurement less than none
     assert turned > told["nothing more"] > 0.0
     assert min(told.values()) == told["nothing more"]
+    # a surface without a node set of its own is called what people call it
+    assert "25 more tracked points on 'outer surface'" in told
 
 
 def test_what_turns_with_the_head_is_not_told_apart_by_turning_it(small_diagnosis: Diagnosis) -> None:

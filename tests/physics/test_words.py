@@ -7,7 +7,7 @@ import pytest
 
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import beyond_in_words, size_in_words, smallest_in_words
-from warpbrain.physics.words import Smallest, Value, along, length, measured, number, place, tabled, towards
+from warpbrain.physics.words import Smallest, Value, along, length, measured, number, place, seconds, tabled, towards
 
 
 @pytest.mark.parametrize(
@@ -40,6 +40,13 @@ def test_number():
 )  # fmt: skip
 def test_a_length_that_is_not_zero_is_not_said_to_be(metres, said):
     assert length(metres) == said
+
+
+@pytest.mark.parametrize(
+    ("time", "said"), [(60.0, "60"), (2.5, "2.5"), (0.0123, "0.0123"), (1020.0, "1020"), (86400.0, "86400")]
+)
+def test_a_time_has_no_exponent(time, said):
+    assert seconds(time) == said
 
 
 def test_a_number_in_a_table_is_not_said_to_be_zero():

@@ -27,6 +27,7 @@ from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.parameters import smallest_of
 from warpbrain.worlds.body.sensors import spread_points
+from warpbrain.worlds.body.surfaces import free_surfaces
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
 #: Points of a further recording.
@@ -142,10 +143,11 @@ def _places(base: Base) -> dict[str, Floats]:
     mesh = base.at.system.model.mesh
     places = {"throughout the tissue": mesh.centres[spread_points(mesh.centres, 0.0, _POINTS)]}
     still = base.at.system.model.constrained.all(axis=1)
+    words = {surface.name: surface.words for surface in free_surfaces(base.states.case)}
     for name, members in mesh.node_sets.items():
         points = mesh.points[members & ~still]
         if len(points) >= _POINTS:
-            places[f"on '{name}'"] = points[spread_points(points, 0.0, _POINTS)]
+            places[f"on '{words.get(name, name)}'"] = points[spread_points(points, 0.0, _POINTS)]
     return places
 
 

@@ -96,6 +96,11 @@ def pascals(stress: float) -> str:
     return f"{number(1e-3 * stress, 3)} kPa" if abs(stress) >= 1000.0 else f"{stress:.3g} Pa"
 
 
+def seconds(time: float) -> str:
+    """A time [s] for people, three digits that count; whole seconds of what is longer."""
+    return f"{time:.3g}" if abs(time) < 1000.0 else f"{time:.0f}"
+
+
 def place(position: ArrayLike, extent: float) -> str:
     """A position (3,) [m] in millimetres, to a hundredth of an extent [m] or finer; whole ones from 1 cm up."""
     decimals = max(0, 1 - math.floor(math.log10(1e3 * extent)))

@@ -75,7 +75,10 @@ class PointsRecording(TrackedPoints, Recording):
     def content(self) -> str:
         sizes = np.linalg.norm(self.displacement, axis=1)
         rms, most = length(float(np.sqrt(np.mean(sizes**2)))), length(float(sizes.max()))
-        return f"{self.count} tracked points, moved by {rms} RMS, {most} at most"
+        count = len(np.unique(self.points, axis=0))
+        times = 0 if self.time is None else len(np.unique(self.time))
+        points = f"{count} tracked point{'s' if count > 1 else ''}{f' at {times} times' if times > 1 else ''}"
+        return f"{points}, moved by {rms} RMS, {most} at most"
 
     def check(self, mesh: TetMesh, path: Path, problems: Problems) -> None:
         check_possible(mesh, path, problems, [self.sigma, self.sigmas], self.displacement)

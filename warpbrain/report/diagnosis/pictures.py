@@ -11,7 +11,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.inference.calibration import percent
-from warpbrain.physics.words import length, number
+from warpbrain.physics.words import length, number, seconds
 from warpbrain.report import views
 from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.diagnosis.files import Recorded, file_of_map
@@ -159,7 +159,7 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
         return figure
 
     times = np.unique(recorded["time_s"][recorded.lengths])
-    when = f", at the last of {len(times)} times, {times[-1]:.3g} s" if len(times) > 1 else ""
+    when = f", at the last of {len(times)} times, {seconds(times[-1])} s" if len(times) > 1 else ""
     hidden = f" {int(vectors.aside.sum())} set aside: cross." if vectors.aside.any() else ""
     caption = (
         f"What is left at each of {len(vectors.where)} recorded points: arrows from the computed to the observed "

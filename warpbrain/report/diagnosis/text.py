@@ -8,7 +8,7 @@ from typing import Any
 
 from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import NOTHING
-from warpbrain.physics.words import measured, number, place
+from warpbrain.physics.words import measured, number, place, seconds
 from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page import lines
@@ -149,14 +149,14 @@ def when_in_words(when: Summary) -> str:
     first, last = when["seconds"]
     if "course" not in when:
         # of a laboratory test it is the part of the record
-        return f"{first:.3g} to {last:.3g} s"
+        return f"{seconds(first)} to {seconds(last)} s"
     if (sizes := when.get("sizes")) is not None:
         # at the first and the last time, and at a few between
         rows = list(zip(sizes["seconds"], sizes["values"], sizes["deviations"], strict=True))
         chosen = [rows[k] for k in sorted({round(k * (len(rows) - 1) / (_TIMES - 1)) for k in range(_TIMES)})]
-        each = (f"{measured(value, sd, sizes['unit'])} at {time:.3g} s" for time, value, sd in chosen)
+        each = (f"{measured(value, sd, sizes['unit'])} at {seconds(time)} s" for time, value, sd in chosen)
         return f"it changes with time: {sizes['says']} {', '.join(each)}"
-    between = f"by {last:.3g} s" if first == 0.0 else f"between {first:.3g} and {last:.3g} s"
+    between = f"by {seconds(last)} s" if first == 0.0 else f"between {seconds(first)} and {seconds(last)} s"
     sure = "" if when["probability"] is None else f" (probability {percent(when['probability'])})"
     course = f", {when['course']}" if when["course"] else ""
     return f"it set in {between}{sure}{course}"
