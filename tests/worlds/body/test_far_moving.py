@@ -24,8 +24,10 @@ from warpbrain.worlds.options import DiagnosisOptions
 LENGTH, HEIGHT, NOISE, POINTS = 0.1, 0.03, 2e-4, 45
 
 
-@pytest.mark.slow(15)
-def test_its_weight_is_found_where_the_mesh_is_taken_for_exact() -> None:
+@pytest.mark.slow(30)
+@pytest.mark.parametrize("mesh_error", [False, True])
+def test_its_weight_is_found(mesh_error: bool) -> None:
+    """With the mesh taken for exact, and with its error as it is found."""
     points = box((10, 3, 3), (LENGTH, HEIGHT, HEIGHT))
     mesh = TetMesh(points.points, points.tetrahedra, node_sets={"clamp": points.points[:, 0] < 1e-9})
     case = Case(
@@ -48,5 +50,5 @@ def test_its_weight_is_found_where_the_mesh_is_taken_for_exact() -> None:
     x = np.array([LENGTH, HEIGHT, HEIGHT]) * rng.uniform(0.03, 0.97, (POINTS, 3))
     moved = locate(mesh.points, mesh.tetrahedra, x).interpolate(u) + NOISE * rng.normal(size=x.shape)
     beads = PointsRecording(name="beads", file="beads.csv", role="fit", points=x, displacement=moved, sigma=NOISE)
-    found = diagnose(replace(case, recordings=(beads,)), DiagnosisOptions(mesh_error=False), "cpu")
+    found = diagnose(replace(case, recordings=(beads,)), DiagnosisOptions(mesh_error=mesh_error), "cpu")
     assert found.decision.causes == ("gravity",)

@@ -97,7 +97,11 @@ def smallest_of(effect: Effect, whitened_length: float, seen: float, named: floa
     """
     part, part_named = (d / max(whitened_length, 1e-12) for d in (seen, named))
     size, unit, name = _size_at(effect, part)
-    return Smallest(size, unit, name, _size_at(effect, part_named)[0] if part_named <= FARTHEST else math.inf, part)
+    named_from = _size_at(effect, part_named)[0]
+    if name == "share":
+        # of what acts in full or not at all: a part of it is far from either
+        return Smallest(size, unit, name, named_from)
+    return Smallest(size, unit, name, named_from if part_named <= FARTHEST else math.inf, part)
 
 
 def _size_at(effect: Effect, factor: float) -> tuple[float, str, str]:
