@@ -76,8 +76,9 @@ def _candidate_rows(summary: Summary) -> list[list[str]]:
 
 def _estimated(value: float | None, sd: float | None, unit: str) -> str:
     """A number with its spread, lengths of positions in millimetres; what is not finite is null in JSON."""
-    numbers = (math.nan if number is None else (MILLIMETRES if unit == "m" else 1.0) * number for number in (value, sd))
-    return measured(*numbers, "mm" if unit == "m" else unit)
+    scale = MILLIMETRES if unit == "m" else 1.0
+    known, spread = (math.nan if number is None else scale * number for number in (value, sd))
+    return measured(known, spread, "mm" if unit == "m" else unit)
 
 
 def _rejected_rows(summary: Summary) -> list[list[str]]:
