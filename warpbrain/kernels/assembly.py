@@ -1,4 +1,5 @@
-"""Ordered sums of element results into nodal forces and matrix blocks, and the kernels of a step of backward Euler.
+"""Ordered sums of element results into nodal forces and matrix blocks, inverses of these, and the kernels of a step of
+backward Euler.
 
 Every sum is a gather, one thread for a result, over a list of contributions in a fixed order: no atomics, so the same
 bits come out of every run on a device.
@@ -120,6 +121,12 @@ def assembly_kernels(precision: Precision) -> KernelSet:
                     K = wp.transpose(K)
                 f += K * d
         load[i] = load[i] - wp.cw_mul(free[i], k * f)
+
+    @kernels.add
+    def invert_diagonal(start: int, diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
+        """One thread for a node: the inverse of the diagonal block of its row."""
+        i = start + wp.tid()
+        inverse[i] = wp.inverse(values[diagonal[i]])
 
     return kernels
 

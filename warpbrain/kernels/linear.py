@@ -33,6 +33,7 @@ from scipy.linalg import lapack
 from warp.sparse import BsrMatrix
 
 from warpbrain.arrays import Floats
+from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together, team_kernels
 from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernels, sync_words
@@ -73,7 +74,7 @@ _CHUNK = 64
 
 @cache
 def linear_kernels(precision: Precision) -> KernelSet:
-    """Make (once) the kernels of the linear solver in a precision."""
+    """Make (once) the kernels that Warp's conjugate gradients call, in a precision."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"linear_{precision.name}")
     chunk = wp.constant(_CHUNK)
@@ -99,11 +100,6 @@ def linear_kernels(precision: Precision) -> KernelSet:
         if beta != scalar(0.0):
             s += beta * y[i]
         z[i] = s
-
-    @kernels.add
-    def invert_diagonal(start: int, diagonal: wp.array[int], values: wp.array[mat33], inverse: wp.array[mat33]):
-        i = start + wp.tid()
-        inverse[i] = wp.inverse(values[diagonal[i]])
 
     @kernels.add
     def apply_diagonal(
@@ -164,10 +160,11 @@ def linear_kernels(precision: Precision) -> KernelSet:
     return kernels
 
 
-def solver_kernels(precision: Precision, device: wp.Device) -> list[Any]:
-    """Of each module that `ConjugateGradient` needs on a device, with its default preconditioner, a kernel."""
-    on_cores = [gradients_kernels(precision).multiply, team_kernels()[0]] if device.is_cpu else []
-    return [linear_kernels(precision).multiply, *on_cores]
+def solver_kernels(precision: Precision, device: wp.Device, *, only_blocks: bool = True) -> list[Any]:
+    """Of each module that `conjugate_gradient` needs on a device, with its default preconditioner, a kernel."""
+    of_rows = gradients_kernels if device.is_cpu and only_blocks else linear_kernels
+    on_cores = [team_kernels()[0]] if device.is_cpu else []
+    return [of_rows(precision).multiply, assembly_kernels(precision).invert_diagonal, *on_cores]
 
 
 @contextmanager
@@ -265,7 +262,6 @@ class ConjugateGradient(abc.ABC):
         self._precision, self._tolerance, self._max_iterations = precision, tolerance, max_iterations
         self._kind, self._watch, self._beyond, self._nodes = preconditioner, watch_curvature, beyond, nodes
         self._size, self._device = len(right_hand_side), right_hand_side.device
-        self._kernels = linear_kernels(precision)
         self._inverse = wp.empty(self._size, dtype=precision.mat33, device=self._device)
         self._solved = False
         self._begin()
@@ -291,14 +287,9 @@ class ConjugateGradient(abc.ABC):
         if self._device.is_cuda:
             wp.launch(row_product_kernel(self._precision), dim=LANES * self._size, inputs=inputs, device=self._device)
         else:
-            launch(self._kernels.multiply, self._size, inputs, self._device)
+            launch(linear_kernels(self._precision).multiply, self._size, inputs, self._device)
         if self._beyond is not None:
             self._beyond(x, alpha, z)
-
-    def _apply_diagonal(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        scalar = self._precision.scalar
-        inputs = [self._inverse, x, y, z, scalar(alpha), scalar(beta)]
-        launch(self._kernels.apply_diagonal, self._size, inputs, self._device)
 
     def multiply(self, x: wp.array, z: wp.array) -> None:
         """`z = A x`."""
@@ -307,8 +298,12 @@ class ConjugateGradient(abc.ABC):
     def prepare(self) -> None:
         """Renew the preconditioner after the values of the matrix changed; its pattern is kept."""
         if self._kind == "block-jacobi":
-            inputs = [self._diagonal, self._matrix.values, self._inverse]
-            launch(self._kernels.invert_diagonal, self._size, inputs, self._device)
+            self._invert(self._diagonal, self._inverse)
+
+    def _invert(self, diagonal: wp.array, inverse: wp.array) -> None:
+        """Write the inverses of the blocks at places (n,) of the matrix."""
+        inputs = [diagonal, self._matrix.values, inverse]
+        launch(assembly_kernels(self._precision).invert_diagonal, self._size, inputs, self._device)
 
     def solve(self, tolerance: float | None = None) -> None:
         """Run CG from the present content of the solution array.
@@ -457,8 +452,7 @@ class CoresGradient(ConjugateGradient):
         launch(
             self._on_cores.copy_blocks, len(self._copied), [self._copied, self._matrix.values, self._copy], self._device
         )
-        inputs = [self._copied_diagonal, self._matrix.values, self._copied_inverse]
-        launch(self._kernels.invert_diagonal, self._size, inputs, self._device)
+        self._invert(self._copied_diagonal, self._copied_inverse)
         inputs = [self._offsets, self._columns, self._copy, self._aggregate, self._free, self._places, self._coarse]
         launch(self._on_cores.coarse_matrix, self._count, inputs, self._device, least=1)
         k = self._count
@@ -557,6 +551,7 @@ class WarpGradient(ConjugateGradient):
     """Of Warp, captured once in a graph for each tolerance and replayed."""
 
     def _begin(self) -> None:
+        self._kernels = linear_kernels(self._precision)
         self._least = wp.full(1, math.inf, dtype=self._precision.scalar, device=self._device)
         self._partial = self._zeros(((self._size + _CHUNK - 1) // _CHUNK, 2))
         self._fsai: Any = None
@@ -602,7 +597,9 @@ class WarpGradient(ConjugateGradient):
             launch(self._kernels.least_curvature, 1, [self._partial, self._least], self._device)
 
     def _precondition_scalars(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        self._apply_diagonal(self._vectors(x), self._vectors(y), self._vectors(z), alpha, beta)
+        scalar = self._precision.scalar
+        inputs = [self._inverse, *map(self._vectors, (x, y, z)), scalar(alpha), scalar(beta)]
+        launch(self._kernels.apply_diagonal, self._size, inputs, self._device)
 
     def prepare(self) -> None:
         super().prepare()

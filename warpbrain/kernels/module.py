@@ -27,8 +27,8 @@ _CPU_FLAGS = (
 
 #: Compilers at most: a third gains nothing beside the first module, which the others wait for.
 _MOST = 2
-#: What was begun to be compiled and may not be done.
-_begun: list[Future[None]] = []
+#: What was begun to be compiled and may not be done, by process, device and name of the module.
+_begun: dict[tuple[int, str, str], Future[None]] = {}
 
 
 def compiled_module(name: str, unroll: int | None = None) -> Any:
@@ -84,10 +84,15 @@ def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], Non
     What is returned waits for them, and raises what went wrong. The first of a process is compiled alone: with it Warp
     precompiles its header, which takes longer than four of our modules and which those after it share.
     """
-    modules = {kernel.module.name: kernel.module for kernel in kernels}
-    compilers = _compilers(os.getpid())
-    begun = [compilers.threads.submit(compilers.load, device, module) for module in modules.values()]
-    _begun[:] = [*(loaded for loaded in _begun if not loaded.done()), *begun]
+    process = os.getpid()
+    compilers = _compilers(process)
+    begun = []
+    for name, module in {kernel.module.name: kernel.module for kernel in kernels}.items():
+        which = process, device.alias, name
+        # two threads that find a module missing would both compile it
+        if which not in _begun or _begun[which].done():
+            _begun[which] = compilers.threads.submit(compilers.load, device, module)
+        begun.append(_begun[which])
 
     def wait() -> None:
         for loaded in begun:
@@ -98,7 +103,7 @@ def begin_loading(kernels: Iterable[Any], device: wp.Device) -> Callable[[], Non
 
 def is_compiling() -> bool:
     """Whether the threads of `begin_loading` are at work, which nothing stops before they are done."""
-    return any(not loaded.done() for loaded in _begun)
+    return any(not loaded.done() for loaded in _begun.values())
 
 
 class _Compilers:

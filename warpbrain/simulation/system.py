@@ -541,7 +541,7 @@ class System:
     def begin_loading_kernels(self) -> Callable[[], None]:
         """Begin to compile what is known to be needed, see `begin_loading`; `load_kernels` does the rest."""
         of_laws = [kernel for g in self.groups for kernel in (g.kernels.forces_and_tangents, g.kernels.stress)]
-        others = [self._kernels.gather_matrix, *solver_kernels(self.precision, self.device)]
+        others = solver_kernels(self.precision, self.device, only_blocks=self.assembled)
         return begin_loading([*of_laws, *others], self.device)
 
     def load_kernels(self) -> float:
