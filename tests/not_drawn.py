@@ -6,7 +6,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from types import SimpleNamespace
 from typing import Any, BinaryIO
 from unittest.mock import patch
 
@@ -40,9 +39,9 @@ def _empty(view: Any, name: str, _axis: int, _place: float) -> dict[str, object]
     return {"name": name, "points": "", "triangles": "", "moves": None, "values": [""] * len(view.fields)}
 
 
-def _no_cut(_points: object, _cells: object, _values: object, axis: int, _position: float) -> Cut:
-    section = SimpleNamespace(n_cells=0, lines=np.zeros(0, np.int64), points=np.zeros((0, 3)))
-    return Cut(axis, section, [], np.zeros(0, np.int64), np.zeros(0))
+def _no_cut(_points: object, _cells: object, _values: object, _axis: int, _position: float) -> Cut:
+    none, numbers = np.zeros(0), np.zeros((0, 3), np.int64)
+    return Cut([], np.zeros(0, np.int64), none, np.zeros((0, 2)), numbers, none)
 
 
 def _no_outline(*_args: object) -> np.ndarray:

@@ -115,6 +115,23 @@ def test_polygons_know_their_elements():
         assert (polygon <= corners[:, 1:].max(axis=0) + 1e-12).all()
 
 
+@pytest.mark.parametrize("position", [0.25, 0.31])
+def test_polygons_turn_the_same_way(position):
+    """A view adds up the normals of those that share a point; some have corners in one place, if nodes are on the plane."""
+    section = cut(*flat(distorted(box((4, 4, 4)), 0.03), position), np.zeros(125), 2, position)
+    a, b, c = section.points[section.triangles].transpose(1, 2, 0)
+    twice = (b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]
+    assert (twice >= -1e-15).all()
+    assert 0.5 * twice.sum() == pytest.approx(sum(area(polygon) for polygon in section.polygons), rel=1e-12)
+
+
+def flat(mesh: TetMesh, height: float) -> tuple[Floats, NDArray[np.integer]]:
+    """Points of a body with those that were within 0.1 of a height moved to it, and its tetrahedra."""
+    points = mesh.points.copy()
+    points[np.abs(points[:, 2] - height) < 0.1, 2] = height
+    return points, mesh.tetrahedra
+
+
 def test_nothing_to_cut():
     mesh = box((1, 1, 1))
     section = cut(mesh.points, mesh.tetrahedra, np.zeros(8), 0, 5.0)

@@ -19,6 +19,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page import part
 from warpbrain.report.page.figures import shades
+from warpbrain.report.slices import plane_section
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,25 +141,14 @@ def _field(field: Field, used: Any) -> dict[str, Any]:
 
 def _cut(view: View, name: str, axis: int, place: float) -> dict[str, Any]:
     """A plane through the body with what its fields and its displacement are there."""
-    import pyvista
-
     mesh = view.mesh
-    grid = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: mesh.tetrahedra}, np.array(mesh.points))
-    for k, field in enumerate(view.fields):
-        grid.point_data[f"field {k}"] = np.asarray(field.values, dtype=np.float64)
-    if view.u is not None:
-        grid.point_data["moves"] = view.u
-    origin = np.zeros(3)
-    origin[axis] = place
-    section = grid.slice(normal=np.eye(3)[axis], origin=origin).triangulate()
-    # a plane beside the body has neither points nor what they carry
-    there = section.point_data if section.n_points else dict.fromkeys(grid.point_data.keys(), np.zeros(0))
+    section = plane_section(mesh.points, mesh.tetrahedra, axis, place)
     return {
         "name": name,
-        "points": _packed(MILLIMETRES * section.points),
-        "triangles": _packed(section.regular_faces if section.n_cells else np.zeros(0), np.uint32),
-        "moves": None if view.u is None else _packed(MILLIMETRES * there["moves"]),
-        "values": [_packed(there[f"field {k}"]) for k in range(len(view.fields))],
+        "points": _packed(MILLIMETRES * section.at_points(mesh.points)),
+        "triangles": _packed(section.triangles, np.uint32),
+        "moves": None if view.u is None else _packed(MILLIMETRES * section.at_points(view.u)),
+        "values": [_packed(section.at_points(np.asarray(field.values, dtype=np.float64))) for field in view.fields],
     }
 
 
