@@ -1,4 +1,7 @@
-"""`warpbrain run`: what it was asked for, and its kernels, which are compiled while all else is imported and read."""
+"""`warpbrain run`: what it was asked for, and what takes long and can be begun while all else is imported and read.
+
+That is to load what renders, in a process of its own, and to compile kernels.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,20 @@ import argparse
 import math
 
 from warpbrain.errors import InputError
+from warpbrain.report.rendering import ready_to_render
 from warpbrain.terminal.quiet import start_warp_quietly
 
 
 def run(options: argparse.Namespace) -> None:
     """Simulate a case, print what happened and write it."""
     _check(options)
-    start_warp_quietly()
-    _begin_loading_kernels(options)
-    # takes as long as all that is imported so far, beside the compiler
-    from warpbrain.cli.run_case import run_case
+    with ready_to_render():
+        start_warp_quietly()
+        _begin_loading_kernels(options)
+        # takes as long as all that is imported so far, beside the compiler
+        from warpbrain.cli.run_case import run_case
 
-    run_case(options)
+        run_case(options)
 
 
 def _begin_loading_kernels(options: argparse.Namespace) -> None:

@@ -19,13 +19,15 @@ from warpbrain.cli import run_specimen, warp
 from warpbrain.cli.log import drawn, note_device
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
+from warpbrain.kernels.module import is_compiling
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 from warpbrain.physics.words import tabled
 from warpbrain.report import summary as tables
+from warpbrain.report import views
 from warpbrain.report.comparison import describe_comparisons, describe_mesh_error, recorded_rows, write_comparisons
 from warpbrain.report.files import write_result, write_summary
 from warpbrain.report.page import lines
-from warpbrain.report.rendering import ready_to_render
+from warpbrain.report.rendering import render_nothing
 from warpbrain.report.run_page import write_run_page
 from warpbrain.report.state_files import read_state
 from warpbrain.report.summary import describe_prior
@@ -54,10 +56,10 @@ def run_case(options: argparse.Namespace) -> None:
     out = choose_folder(options.out, f"warpbrain-{safe_name(case.name)}-{options.tissue}", options.overwrite)
     prior = None if drawn_laws is None else describe_prior(drawn_laws)
     if case.specimen is not None:
+        render_nothing()
         run_specimen.run(options, case, out, prior)
         return
-    with ready_to_render():
-        _run_body(options, case, out, prior, to_warp)
+    _run_body(options, case, out, prior, to_warp)
 
 
 def _run_body(
@@ -84,6 +86,8 @@ def _run_body(
 
     with Progress("kernels", options.quiet) as loading:
         loading.show(0.0, "the first run on a machine compiles them")
+        if is_compiling():
+            views.load_libraries()
         loaded = system.load_kernels()
     with watching(options, say) as watched:
         done = running.run(watched)

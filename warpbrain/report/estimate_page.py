@@ -69,7 +69,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     whole, state, moved = posterior.case.mesh, read_state(folder / "state.vtu"), moved_of(posterior)
     titles = {label: tissue.name for label, tissue in posterior.case.tissues.items()}
     subtitles = ["the most probable state of the estimate", *judged.sentences]
-    rendered = begin_pictures(whole, state.mesh, state.u, titles, moved)
+    begun = begin_pictures(whole, state.mesh, state.u, titles, moved)
     places = views.places(whole)
     tissue = [parameter_row(parameter) for parameter in summary["parameters"]]
     names = ", ".join(f"{row[0]}, {row[1]}" for row in tissue)
@@ -80,7 +80,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
             lambda narrow: agreement_figure(posterior, narrow), "Observed beside predicted components.", words
         )
     causes = [] if nothing is None else [cause for cause in nothing["causes"] if cause["probability"] >= _LIKELY]
-    pictures = draw(folder / "deformation.png", rendered, case["title"], subtitles)
+    pictures = draw(folder / "deformation.png", begun, case["title"], subtitles)
     sections = sections_of(
         "estimate.html", summary=summary, agreement=agreement,
         tissue=tissue,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -62,31 +63,36 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """Renderings (height, width, 3) uint8 of a scene, and what makes a figure of them."""
+    """Renderings of a scene, and what makes a figure of them."""
 
     scene: Scene
-    images: dict[str, Any]
     cameras: dict[str, Camera]
     #: The anatomy, elements (m,) of it that were taken out, and the names of its tissues.
     whole: TetMesh
     resected: Bools
     names: dict[int, str]
+    _rendered: Callable[[], dict[str, Any]]
+
+    @cached_property
+    def images(self) -> dict[str, Any]:
+        """The pictures (height, width, 3) uint8 by name, when they are there; `RenderingError` if none can be here."""
+        return self._rendered()
 
 
 def begin_pictures(
     whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved
-) -> Callable[[], Pictures]:
-    """Begin to render a deformed body, beside what else there is to do; what is returned waits for its pictures.
+) -> Pictures:
+    """Begin to render a deformed body, beside what else there is to do.
 
     `whole` is the anatomy before anything was resected, `mesh` what is left of it, of whose nodes u (n, 3) [m] is the
     displacement; `names` are those of the tissues by label.
 
-    Then `RenderingError`, if nothing can be rendered here. To be called where `ready_to_render` lasts: it ends with it.
+    To be called where `ready_to_render` lasts: rendering ends with it.
     """
     scene, resected = scene_of(whole, mesh, u, names, moved), taken_out(whole, mesh)
     cameras = cameras_of(scene)
     rendered = beside(lambda: render(scene, cameras, _SIZE))
-    return lambda: Pictures(scene, rendered(), cameras, whole, resected, names)
+    return Pictures(scene, cameras, whole, resected, names, rendered)
 
 
 def taken_out(whole: TetMesh, mesh: TetMesh) -> Bools:
@@ -181,10 +187,10 @@ def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
     return Camera(right, up, centre, 1.14 * float(max(high_, across * _SIZE[1] / _SIZE[0], 1e-3)))
 
 
-def draw(path: Path, rendered: Callable[[], Pictures], title: str, subtitles: Sequence[str]) -> Pictures | str:
-    """Write the picture of a deformed body, what `begin_pictures` returns, below a title and more lines.
+def draw(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -> Pictures | str:
+    """Write the pictures of a deformed body below a title and more lines.
 
-    Returns why, if nothing can be rendered here: no picture is then left at `path`, which would be one of something
+    Returns them, or why, if nothing can be rendered here: no picture is then left at `path`, which would be one of something
     else.
     """
     from matplotlib.cm import ScalarMappable
@@ -194,14 +200,10 @@ def draw(path: Path, rendered: Callable[[], Pictures], title: str, subtitles: Se
     figure, axes = views.panels(2, 3, (13.8, high))
     # room for the title, which has any number of lines
     figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1.0 - 0.24 * lines / high))
-    try:
-        pictures = rendered()
-    except RenderingError as error:
-        path.unlink(missing_ok=True)
-        return str(error)
     scene = pictures.scene
-    for panel, (name, image) in zip(axes, pictures.images.items(), strict=True):
-        show(panel, image, annotations_of(pictures, name))
+    shown = {}
+    for panel, name in zip(axes, pictures.cameras, strict=True):
+        shown[name] = show(panel, np.full((*_SIZE[::-1], 3), 255, np.uint8), annotations_of(pictures, name))
         panel.set_title(heading(pictures, name), fontsize=10)
     shades = ScalarMappable(cmap="viridis")
     shades.set_clim(0.0, scene.top)
@@ -210,7 +212,17 @@ def draw(path: Path, rendered: Callable[[], Pictures], title: str, subtitles: Se
     entries = views.tissue_entries(pictures.names, pictures.whole, pictures.resected)
     entries += [(views.line(color=colour, linewidth=2.5), name) for name, colour in arrow_colours(scene).items()]
     views.legend(figure, entries, loc="outside lower center", fontsize=9, ncols=6)
-    views.save(figure, path, "\n".join([title, *subtitles]), y=1.0 - 0.08 / high, va="top")
+    views.entitle(figure, "\n".join([title, *subtitles]), y=1.0 - 0.08 / high, va="top")
+    # while pictures are rendered
+    views.lay_out(figure)
+    try:
+        images = pictures.images
+    except RenderingError as error:
+        path.unlink(missing_ok=True)
+        return str(error)
+    for name, image in images.items():
+        shown[name].set_data(image)
+    views.save(figure, path)
     return pictures
 
 
@@ -254,7 +266,7 @@ class Annotations:
 
 def annotations_of(pictures: Pictures, name: str) -> Annotations:
     """What is written on a picture."""
-    return notes_on(pictures.cameras[name], pictures.images[name].shape, pictures.whole)
+    return notes_on(pictures.cameras[name], _SIZE[::-1], pictures.whole)
 
 
 def notes_on(
@@ -284,9 +296,12 @@ def notes_on(
     return Annotations(across, high, tuple(letters), tuple(lines), bar)
 
 
-def show(panel: Any, image: Any, notes: Annotations) -> None:
-    """Draw a picture and what is written on it into a panel of a figure, whose units are then mm from its middle."""
-    panel.imshow(image, extent=(-notes.across, notes.across, -notes.high, notes.high))
+def show(panel: Any, image: Any, notes: Annotations) -> Any:
+    """Draw a picture and what is written on it into a panel of a figure, whose units are then mm from its middle.
+
+    Returns what shows the picture.
+    """
+    shown = panel.imshow(image, extent=(-notes.across, notes.across, -notes.high, notes.high))
     views.bare(panel)
     for x, y, letter in notes.letters:
         panel.text(x, y, letter, fontsize=10, color="#6a6a6a", va="center", ha="center")
@@ -295,3 +310,4 @@ def show(panel: Any, image: Any, notes: Annotations) -> None:
     left, low, length, words = notes.bar
     panel.plot([left, left + length], [low, low], color="#333333", linewidth=2.0)
     panel.text(left + 0.5 * length, low + 0.03 * notes.high, words, fontsize=8, ha="center", color="#333333")
+    return shown

@@ -55,7 +55,7 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     names = {label: tissue.name for label, tissue in run.case.tissues.items()}
     left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
     subtitles = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
-    rendered = begin_pictures(whole, result.mesh, result.u, names, moved)
+    begun = begin_pictures(whole, result.mesh, result.u, names, moved)
     fields = [
         Field(
             name.replace("_", " "), f"{name.replace('_', ' ')} [Pa]", values, float(values.min()), float(values.max())
@@ -64,7 +64,7 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     ]
     places = views.places(whole)
     view = body_view(result.mesh, result.u, fields, moved, places)
-    pictures = draw(folder / "deformation.png", rendered, run.case.title, subtitles)
+    pictures = draw(folder / "deformation.png", begun, run.case.title, subtitles)
     solved = [f"{solution['kind']}, {len(solution['history'])} recorded steps"]
     if "time_s" in solution:
         solved.append(f"until {solution['time_s']:.4g} s")

@@ -42,6 +42,13 @@ COLOUR_OF = {
 TISSUE_COLOURS = ("#b9aea6", "#efe8df", "#d3b8a8", "#c9d3c0", "#c5c3d8", "#d9cfa8", "#bfd5d3", "#dcc3cb")
 RESECTED = "#d9483b"
 TISSUE_EDGE = "#4d4640"
+_DPI = 110.0
+
+
+def load_libraries() -> None:
+    """Load what figures are made with, while there is nothing else to do."""
+    import matplotlib.backends.backend_agg
+    import matplotlib.figure  # noqa: F401
 
 
 def panels(
@@ -54,11 +61,26 @@ def panels(
     return figure, list(figure.subplots(rows, columns, squeeze=False, **options).ravel())
 
 
-def save(figure: Any, path: Path, title: str = "", fontsize: float = 12.0, dpi: float = 110.0, **options: Any) -> None:
-    """Write a figure as PNG, whole, below a title that may be a user's free text."""
+def entitle(figure: Any, title: str, fontsize: float = 12.0, **options: Any) -> None:
+    """Write a title above a figure, which may be a user's free text."""
+    # a dollar sign in it begins no formula
+    figure.suptitle(title, parse_math=False, fontsize=fontsize, **options)
+
+
+def lay_out(figure: Any, dpi: float = _DPI) -> None:
+    """Place all of a figure once and for all, before what its panels show is known, if it is as large."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.set_dpi(dpi)
+    FigureCanvasAgg(figure)
+    figure.get_layout_engine().execute(figure)
+    figure.set_layout_engine("none")
+
+
+def save(figure: Any, path: Path, title: str = "", fontsize: float = 12.0, dpi: float = _DPI, **options: Any) -> None:
+    """Write a figure as PNG, whole, below a title if there is one."""
     if title:
-        # a dollar sign in it begins no formula
-        figure.suptitle(title, parse_math=False, fontsize=fontsize, **options)
+        entitle(figure, title, fontsize, **options)
     with whole_file(path) as temporary, temporary.open("wb") as stream:
         write_png(figure, stream, dpi)
 

@@ -128,7 +128,7 @@ def render(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -
 def ready_to_render() -> Iterator[None]:
     """While it lasts, the process of the next `render` is there, and loads its libraries beside whatever else is done.
 
-    It ends with the block, rendering or not, and by itself if this process is gone.
+    It ends with the block, rendering or not, with `render_nothing`, and by itself if this process is gone.
     """
     process = _begin()
     _ready.append(process)
@@ -140,6 +140,12 @@ def ready_to_render() -> Iterator[None]:
             _ready.remove(process)
             with process:
                 pass
+
+
+def render_nothing() -> None:
+    """End the process that waits for a scene, if there is one."""
+    for process in _ready:
+        process.kill()
 
 
 def _begin() -> subprocess.Popen[str]:
