@@ -5,6 +5,7 @@ import pytest
 from bodies import model_of
 from shapes import box, distorted
 
+from warpbrain.errors import InputError
 from warpbrain.kernels.batched.patches import FIRST, Patches, Sums, patches_of, rounds_of
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
@@ -87,6 +88,11 @@ def test_what_patches_add_up_is_the_matrix(groups: int, numbers: int, clamped: S
     expected = clamped.matrix.values.numpy()[clamped.pair_positions.numpy()[:, 0]]
     found = assembled(clamped, made, sums, 1e-3, 1.0)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14 * np.abs(expected).max())
+
+
+def test_no_room_for_one_element_is_an_error(clamped: System) -> None:
+    with pytest.raises(InputError, match="no room for one element"):
+        shared_out(clamped, [np.arange(clamped.elements)], 9 * 7 + 3 * 4 - 1)
 
 
 def test_no_two_elements_of_a_round_share_an_edge() -> None:

@@ -117,7 +117,7 @@ def test_polygons_know_their_elements():
 
 @pytest.mark.parametrize("position", [0.25, 0.31])
 def test_polygons_turn_the_same_way(position):
-    """A view adds up the normals of those that share a point; some have corners in one place, if nodes are on the plane."""
+    """A view adds up the normals of those that share a point; with nodes on the plane, corners are in one place."""
     section = cut(*flat(distorted(box((4, 4, 4)), 0.03), position), np.zeros(125), 2, position)
     a, b, c = section.points[section.triangles].transpose(1, 2, 0)
     twice = (b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]

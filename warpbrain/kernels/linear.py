@@ -26,8 +26,6 @@ from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
-import warp._src.optim.linear as warp_linear_internals
-import warp.optim.linear as warp_linear
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 from warp.sparse import BsrMatrix
@@ -176,6 +174,7 @@ def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
 
     Replaces a function of Warp for that moment, in the whole process: not for captures in several threads at once.
     """
+    import warp._src.optim.linear as warp_linear_internals
 
     def loop(
         do_cycle: Callable[[], None],
@@ -551,6 +550,10 @@ class WarpGradient(ConjugateGradient):
     """Of Warp, captured once in a graph for each tolerance and replayed."""
 
     def _begin(self) -> None:
+        # its kernels, which hardly anybody needs, take a tenth of a second to be read
+        import warp.optim.linear as warp_linear
+
+        self._warp = warp_linear
         self._kernels = linear_kernels(self._precision)
         self._least = wp.full(1, math.inf, dtype=self._precision.scalar, device=self._device)
         self._partial = self._zeros(((self._size + _CHUNK - 1) // _CHUNK, 2))
@@ -564,7 +567,7 @@ class WarpGradient(ConjugateGradient):
         if self._kind == "block-jacobi":
             self._preconditioner = warp_linear.LinearOperator(*of, self._precondition_scalars)
         self._graphs: dict[float, Graph] = {}
-        self._solvers: dict[float, warp_linear.CG] = {}
+        self._solvers: dict[float, Any] = {}
         self._outcome: tuple[wp.array, ...] = ()
         self._outcomes: dict[float, tuple[wp.array, ...]] = {}
 
@@ -575,7 +578,7 @@ class WarpGradient(ConjugateGradient):
                 wp.array(ptr=vectors.ptr, shape=(3 * self._size,), dtype=self._precision.scalar, device=self._device)
                 for vectors in (self._b, self._x)
             )
-            self._solvers[tolerance] = warp_linear.CG(
+            self._solvers[tolerance] = self._warp.CG(
                 self._operator, b, x, tol=tolerance, atol=0.0, maxiter=self._max_iterations, M=self._preconditioner,
                 check_every=0, use_cuda_graph=True,
             )  # fmt: skip
@@ -610,7 +613,7 @@ class WarpGradient(ConjugateGradient):
             self._fsai.update(self._matrix)
             return
         try:
-            self._fsai = warp_linear.FSAI(self._matrix, reuse_pattern=True)
+            self._fsai = self._warp.FSAI(self._matrix, reuse_pattern=True)
         except ValueError:
             # it refuses a diagonal that is not positive, which no positive definite matrix has
             blocks = self._matrix.values.numpy()[self._diagonal.numpy()]

@@ -79,9 +79,7 @@ class Pictures:
         return self._rendered()
 
 
-def begin_pictures(
-    whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved
-) -> Pictures:
+def begin_pictures(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Pictures:
     """Begin to render a deformed body, beside what else there is to do.
 
     `whole` is the anatomy before anything was resected, `mesh` what is left of it, of whose nodes u (n, 3) [m] is the
@@ -190,8 +188,8 @@ def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
 def draw(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -> Pictures | str:
     """Write the pictures of a deformed body below a title and more lines.
 
-    Returns them, or why, if nothing can be rendered here: no picture is then left at `path`, which would be one of something
-    else.
+    Returns them, or why, if nothing can be rendered here: no picture is then left at `path`, which would be one of
+    something else.
     """
     from matplotlib.cm import ScalarMappable
 

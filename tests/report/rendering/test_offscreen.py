@@ -11,7 +11,16 @@ import pytest
 from busy import slowness
 
 from warpbrain.report import rendering
-from warpbrain.report.rendering import Camera, RenderingError, Scene, read_scene, ready_to_render, render, write_scene
+from warpbrain.report.rendering import (
+    Camera,
+    RenderingError,
+    Scene,
+    read_scene,
+    ready_to_render,
+    render,
+    render_nothing,
+    write_scene,
+)
 
 SCENE = Scene(
     points=np.eye(4, 3), tetrahedra=np.array([[0, 1, 2, 3]]), removed=np.array([False]),
@@ -59,6 +68,10 @@ def test_a_process_that_is_not_needed_ends(monkeypatch):
     with ready_to_render():
         assert begun[0].poll() is None
     assert begun[0].returncode is not None and not rendering._ready
+    with ready_to_render():
+        render_nothing()
+        assert begun[1].wait(60.0 * slowness()) != 0
+    assert not rendering._ready
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="asks Linux what processes there are")

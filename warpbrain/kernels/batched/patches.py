@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats
+from warpbrain.errors import InputError
 from warpbrain.kernels.batched.parts import Ints, bisected
 
 #: Local nodes of the six edges of an element.
@@ -162,7 +163,9 @@ def patches_of(
 
 
 def _parted(centres: Floats, tetrahedra: Ints, edges: Ints, fits: Callable[[int, int], bool]) -> list[NDArray[np.intp]]:
-    """The elements of each patch: the fewest, of a power of two, that all have room."""
+    """The elements of each patch: the fewest, of a power of two, that all have room; `InputError` if not one has."""
+    if not fits(len(EDGES), 4):
+        raise InputError("device: a block of its threads has no room for one element: expected another GPU, or the CPU")
     parts = 1
     while True:
         part = bisected(centres, np.ones(len(centres), dtype=np.int32), parts)
