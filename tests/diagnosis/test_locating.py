@@ -31,7 +31,6 @@ def test_a_single_source_is_found_where_it_is(number: int, small_diagnosis: Diag
         pytest.skip("all of it is held")
     direction = np.random.default_rng(number).normal(size=3)
     residual = 1e-2 * answers[:, number] @ direction
-    draws = base.model.draws(50, np.random.default_rng(1))
-    found = score_map(base.at, base.model, residual, draws, LENGTH, SPACING)
+    found = score_map(base.at, base.model, residual, 50, np.random.default_rng(1), LENGTH, SPACING)
     np.testing.assert_array_equal(found.sites[found.best], sites[number])
     assert np.all(found.scores <= found.scores[number] * (1.0 + 1e-9))

@@ -27,7 +27,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
-from warpbrain.inference.predict import p_value
+from warpbrain.inference.predict import own_axes, p_value
 from warpbrain.mesh import nodes_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -97,17 +97,18 @@ def map_of_search(search: HypothesisSearch, draws: int, random: np.random.Genera
     `draws`: of recordings if nothing else acts.
     """
     nothing = search.nothing
-    model = nothing.marginal.model
-    rows = model.draws(draws, random)
     length = _PATCH * search.spacing
-    return score_map(search.base.at, model, nothing.residual, rows, length, search.spacing, alpha)
+    return score_map(
+        search.base.at, nothing.marginal.model, nothing.residual, draws, random, length, search.spacing, alpha
+    )
 
 
 def score_map(
     at: Linearisation,
     model: GaussianModel,
     residual: Floats,
-    draws: Floats,
+    draws: int,
+    random: np.random.Generator,
     length: float,
     spacing: float,
     alpha: float = 0.05,
@@ -116,7 +117,7 @@ def score_map(
 
     `model`: of noise and nuisances.
     `residual` (n,).
-    `draws` (n, b): of rows if no cause acts.
+    `draws`: of rows if no cause acts, the same in any axes and order of rows (`FieldFactors.drawn`).
     `length`, `spacing`: of patches and between them [m].
     """
     from scipy.special import chdtrc, chdtri
@@ -128,12 +129,16 @@ def score_map(
     size = np.trace(information, axis1=1, axis2=2)
     information += 1e-9 * max(float(size.max()), 1e-300) * np.eye(3)
 
-    def scores(rows: Floats) -> Floats:
-        s = np.einsum("nsi,nb->sib", columns, model.standardised(rows), optimize=True)
+    def scores(white: Floats) -> Floats:
+        s = np.einsum("nsi,nb->sib", columns, white, optimize=True)
         return np.asarray(np.einsum("sib,sib->sb", s, np.linalg.solve(information, s)))
 
-    observed = scores(residual[:, None])[:, 0]
-    largest = scores(draws).max(axis=0)
+    white = model.standardised(residual)
+    observed = scores(white[:, None])[:, 0]
+    # the sum of the quadratic forms that scores are
+    form = np.einsum("nsi,sij,msj->nm", columns, np.linalg.inv(information), columns, optimize=True)
+    axes = own_axes(form, white)
+    largest = scores(axes @ random.normal(size=(len(axes), draws))).max(axis=0)
     threshold = float(np.quantile(largest, 1.0 - alpha))
     # the noncentrality at which one place exceeds the threshold for all with the power that is asked for
     needed = _noncentrality(threshold)

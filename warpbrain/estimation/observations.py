@@ -28,6 +28,7 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.noise import noise_covariance
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.free_surfaces import faces_of_set
+from warpbrain.mesh.quality import extent
 from warpbrain.mesh.surface import feature_normals
 from warpbrain.recordings.closest import closest_points
 from warpbrain.recordings.location import locate
@@ -354,7 +355,7 @@ def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Made:
     mesh = case.remaining[0]
     positions = recording.points[rows]
     faces = faces_of_set(mesh, recording.nodes, f"recording '{recording.name}'")
-    size = float(np.ptp(mesh.points, axis=0).max())
+    size = extent(mesh.points)
     shape = (len(rows), 3 * len(mesh.points))
 
     def at(u: Floats, _reactions: Floats, centre: Floats, motion: Floats) -> tuple[Floats, Floats, Any, Any]:

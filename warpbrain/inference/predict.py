@@ -119,8 +119,7 @@ class FieldFactors:
             ratio = np.mean(self._sizes[:, None] ** 2 / (1.0 + self._sizes[:, None] ** 2 * values), axis=0)
             half = directions * np.sqrt(np.exp(weight) * ratio)
             form += half @ half.T
-        vectors = np.linalg.eigh(form)[1][:, ::-1]
-        vectors = vectors * np.where(vectors.T @ self._model.standardised(residual) < 0.0, -1.0, 1.0)
+        vectors = own_axes(form, self._model.standardised(residual))
 
         def draw(count: int, random: np.random.Generator) -> Floats:
             return self._of_standardised(vectors @ random.normal(size=(len(vectors), count)))
@@ -137,6 +136,12 @@ class FieldFactors:
         return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(self._sizes)))
 
 
+def own_axes(form: Floats, along: Floats) -> Floats:
+    """Eigenvectors (k, k) of a quadratic form (k, k), the largest first, each in the direction of a vector (k,)."""
+    vectors = np.linalg.eigh(form)[1][:, ::-1]
+    return np.asarray(vectors * np.where(vectors.T @ along < 0.0, -1.0, 1.0))
+
+
 def along_own_axes(model: GaussianModel, columns: Floats, residual: Floats) -> Floats:
     """Columns (n, k) of independent coefficients with one variance, mixed into ones that are the same in any axes.
 
@@ -144,9 +149,7 @@ def along_own_axes(model: GaussianModel, columns: Floats, residual: Floats) -> F
     (n,) lies.
     """
     Z = model.standardised(columns)
-    vectors = np.linalg.eigh(Z.T @ Z)[1][:, ::-1]
-    along = (Z @ vectors).T @ model.standardised(residual)
-    return columns @ (vectors * np.where(along < 0.0, -1.0, 1.0))
+    return columns @ own_axes(Z.T @ Z, Z.T @ model.standardised(residual))
 
 
 def predictive_p(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from folders import write_recorded
 from hollow import hollow
+from scipy.stats import special_ortho_group
 from slow_block import CAUSES, write_slow
 
 from warpbrain.cases.case import Case
@@ -103,12 +104,17 @@ def test_states_have_a_set_for_every_place(block: Case) -> None:
     assert {surface.name for surface in free} <= states.case.mesh.node_sets.keys()
 
 
+def _at_one_point() -> Linearisation:
+    """Of a body whose extent is 1.6 m, where one point is recorded."""
+    model = SimpleNamespace(mesh=SimpleNamespace(points=np.eye(3)))
+    sensors = SimpleNamespace(is_displacement=np.ones(3, dtype=bool), groups=np.zeros(3, dtype=int))
+    return cast(Linearisation, SimpleNamespace(system=SimpleNamespace(model=model), sensors=sensors))
+
+
 @pytest.mark.parametrize("mechanism", [Fibres(stiffness=1.0, direction=(1.0, 0.0, 0.0)), Swelling(amount=0.1)])
 @pytest.mark.parametrize("follows", ["proportional", "smooth"])
 def test_only_loads_may_move_a_body_by_more_than_its_size(follows: Follows, mechanism: Mechanism) -> None:
-    mesh = SimpleNamespace(points=np.eye(3))
-    sensors = SimpleNamespace(is_displacement=np.ones(3, dtype=bool))
-    at = cast(Linearisation, SimpleNamespace(system=SimpleNamespace(model=SimpleNamespace(mesh=mesh)), sensors=sensors))
+    at = _at_one_point()
 
     def of(made: Mechanism, response: float) -> Effect:
         return Effect(Proposal.of_one(lambda _: made, 0.0, 1.0, follows), np.zeros(3), np.full((3, 1), response))
@@ -116,3 +122,11 @@ def test_only_loads_may_move_a_body_by_more_than_its_size(follows: Follows, mech
     assert is_linear(of(mechanism, 0.1), at)
     assert not is_linear(of(mechanism, 1e200), at)
     assert is_linear(of(Traction(centre=(0.0, 0.0, 0.0), value=(0.0, 0.0, 1.0), radius=0.1), 1e3), at)
+
+
+def test_whether_an_effect_is_linear_is_the_same_in_any_axes() -> None:
+    at, rotation = _at_one_point(), special_ortho_group.rvs(3, random_state=0)
+    proposal = Proposal.of_one(lambda _: Swelling(amount=0.1), 0.0, 1.0, "smooth")
+    for size, linear in ((1.62, True), (1.64, False)):
+        for direction in (np.eye(3)[:, :1], rotation[:, :1]):
+            assert is_linear(Effect(proposal, np.zeros(3), size * direction), at) == linear

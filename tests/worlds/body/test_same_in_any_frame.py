@@ -3,16 +3,21 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from sinking_block import write_sinking
 
 from warpbrain.cases.case import Case
+from warpbrain.errors import SolveError
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import decide
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.quality import extent
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
+from warpbrain.worlds.body.states import States
 
 _KINDS = ("gravity", "pressure", "swelling", "traction")
 
@@ -85,3 +90,20 @@ def test_sets_are_as_probable(change: str, case: Case, as_it_is: HypothesisSearc
         decide([one.hypothesis for one in own.weighted_sets], own.probabilities, losses)[0] for own in (as_it_is, found)
     ]
     assert said[0] == said[1]
+
+
+def test_the_largest_displacement_of_a_state_is_the_same_in_any_axes() -> None:
+    """Seed 40400 of `same-diagnose`: a step of a fit led to a state in one frame and to none in another."""
+    points = np.random.default_rng(0).normal(size=(9, 3))
+    for R in (np.eye(3), _TURN):
+        model = SimpleNamespace(mesh=SimpleNamespace(points=points @ R.T), reactions=lambda *_: None)
+        system: Any = SimpleNamespace(model=model)
+        for part in (0.99, 1.01):
+            u = np.zeros((9, 3))
+            u[4] = part * extent(points) * R[:, 0]
+            state: Any = SimpleNamespace(u=u, internal=u)
+            if part < 1.0:
+                States._instant(0.0, system, state, u)
+                continue
+            with pytest.raises(SolveError, match="more than its size"):
+                States._instant(0.0, system, state, u)

@@ -191,9 +191,11 @@ def is_linear(effect: Effect, at: Linearisation) -> bool:
     """
     if effect.proposal is None or isinstance(effect.proposed.make(effect.proposed.mean), Load):
         return bool(np.isfinite(effect.columns).all())
-    largest = extent(at.system.model.mesh.points)
-    moved = effect.columns[at.sensors.is_displacement]
-    return bool(np.isfinite(effect.columns).all() and np.abs(moved).max(initial=0.0) < largest)
+    rows, largest = at.sensors.is_displacement, extent(at.system.model.mesh.points)
+    # components of a point, and of a vector of coefficients, together: in other axes each is another
+    parts = np.minimum(np.abs(effect.columns[rows]) / largest, 1.0)
+    squares = np.bincount(at.sensors.groups[rows], np.sum(parts**2, axis=1))
+    return bool(np.isfinite(effect.columns).all() and squares.max(initial=0.0) < 1.0)
 
 
 def switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:

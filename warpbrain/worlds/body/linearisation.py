@@ -118,7 +118,7 @@ class HeldSurface:
                 displacement[normal], displacement[along] = lifted, sliding - by_normal @ lifted
         except np.linalg.LinAlgError:
             displacement[normal] = np.inf
-        if not np.abs(displacement).max() < self._farthest:
+        if not np.linalg.norm(displacement.reshape(-1, 3), axis=1).max() < self._farthest:
             raise SolveError(f"letting go of {count} nodes: no equilibrium is near")
         return displacement
 

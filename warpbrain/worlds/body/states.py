@@ -25,6 +25,7 @@ from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.registration import realigned, registration_of
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.quality import extent
 from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.proposal import Patch
@@ -288,8 +289,7 @@ class States:
     @staticmethod
     def _instant(time: float, system: System, state: Equilibrium, external: Floats) -> Instant:
         # tissue that is stretched without end resists no more, which balances any load that follows it
-        size = float(np.linalg.norm(np.ptp(system.model.mesh.points, axis=0)))
-        if not np.abs(state.u).max(initial=0.0) < size:
+        if not np.linalg.norm(state.u, axis=1).max(initial=0.0) < extent(system.model.mesh.points):
             raise SolveError("the body would move by more than its size")
         return Instant(time, system, state.u, system.model.reactions(state.internal, external))
 
