@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -69,6 +71,23 @@ def test_datum_is_the_lowest_point_against_gravity() -> None:
     load = Gravity(direction=(0.0, 0.0, 2.0), density=DENSITY, csf_level=0.03)
     assert load.datum(moved) == pytest.approx(-3.1)
     np.testing.assert_allclose(load.nodal_forces(moved), load.nodal_forces(MESH), atol=1e-12)
+
+
+@pytest.mark.parametrize("mesh", [MESH, distorted(MESH, 0.002)], ids=["flat below", "with one lowest point"])
+def test_a_tilt_is_linear_in_its_two_components(mesh: TetMesh) -> None:
+    """Or what is concluded depends on which two axes across gravity it is counted along: 40662 of `same-diagnose`."""
+    situation: Any = SimpleNamespace(mesh=mesh, gravity_axis=DOWN, density=DENSITY)
+    proposal = Gravity.proposals(situation)[8]
+
+    def change(angle: float, step: float = 1e-6) -> np.ndarray:
+        tilt = step * np.array([0.0, math.cos(angle), math.sin(angle)])
+        ends = [proposal.make(proposal.mean + sign * tilt) for sign in (1.0, -1.0)]
+        assert all(isinstance(end, Gravity) and end.csf_level is not None for end in ends)
+        return np.asarray((ends[0].nodal_forces(mesh) - ends[1].nodal_forces(mesh)) / (2.0 * step))
+
+    along = [change(0.0), change(0.5 * math.pi)]
+    expected = math.cos(0.6) * along[0] + math.sin(0.6) * along[1]
+    assert np.abs(change(0.6) - expected).max() < 1e-6 * np.abs(expected).max()
 
 
 def test_drowned_and_dry() -> None:

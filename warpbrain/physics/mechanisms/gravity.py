@@ -36,6 +36,7 @@ from warpbrain.mesh import (
     integrals_on_plane,
     tangents,
 )
+from warpbrain.mesh.quality import SAME_PLACE, extent
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.load import Along, BodyForce
 from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
@@ -166,20 +167,25 @@ class Gravity(BodyForce, Mechanism):
 
             return [Proposal(anywhere, np.zeros(3), np.full(3, 0.5), region="all tissue")]
         down = unit_vector("gravity_axis", situation.gravity_axis)
-        height = float(np.ptp(points @ down))
+        depths = points @ down
+        height = float(np.ptp(depths))
+        # of a head that is tilted another point is the lowest one, and at once where the body is flat there: what has a
+        # derivative in every direction is the height of this one
+        deepest = points[depths >= depths.max() - SAME_PLACE * extent(points)].mean(axis=0)
         across = tangents(down)
         proposals = []
         for level in np.linspace(-0.05, 0.9, _LEVELS) * height:
 
             def drained(c: Floats, middle: float = float(level)) -> Gravity:
-                level = middle + (float(c[3]) if len(c) > 3 else 0.0)
-                direction = down + c[1] * across[0] + c[2] * across[1]
-                # of a head that is tilted another point is the lowest one, as for a case that is read
-                lowest = float((-points @ unit_vector("direction", tuple(direction.tolist()))).min())
+                direction = tuple((down + c[1] * across[0] + c[2] * across[1]).tolist())
+                up = -unit_vector("direction", direction)
+                surface = middle + (float(c[3]) if len(c) > 3 else 0.0) + float(deepest @ up)
+                # levels are counted from the lowest point, as for a case that is read
+                lowest = float((points @ up).min())
                 return cls(
-                    direction=tuple(direction.tolist()),
+                    direction=direction,
                     density=situation.density,
-                    csf_level=level,
+                    csf_level=surface - lowest,
                     lowest=lowest,
                     ramp=((0.0, float(c[0])),),
                 )
