@@ -7,12 +7,17 @@ import pytest
 from command import warpbrain
 from reliability.kinds import KINDS
 
-from subsets.tries import case_of, every_subset, one_try, subsets
+from subsets.tries import case_of, drawn_for_this_commit, every_subset, one_try, subsets
 from warpbrain.cases.writing import write_case
 
 
 def test_all_subsets():
     assert [len(some) for some in subsets(case_of("0684", "multi").recordings)] == [2, 1, 1, 0]
+
+
+def test_a_commit_draws_the_same_in_every_process():
+    drawn = drawn_for_this_commit(86, 3)
+    assert drawn == drawn_for_this_commit(86, 3) and len(set(drawn)) == 3 and set(drawn) <= set(range(86))
 
 
 def test_without_recordings_it_is_a_sentence():
@@ -35,7 +40,8 @@ def test_every_case_without_recordings_is_a_sentence(tmp_path):
     every = every_subset()
     assert len(every) == KINDS["subsets"].promised
     bare = [(name, tissue) for name, tissue, recordings in every if not recordings]
-    assert len(bare) == 56
+    assert len(bare) == 56 == len(every) - _WITH_RECORDINGS
+    assert all(recordings for *_, recordings in every[:_WITH_RECORDINGS])
     for name, tissue in bare:
         case = write_case(tmp_path / f"{name}-{tissue}", replace(case_of(name, tissue), recordings=()))
         ran = warpbrain("diagnose", "--case", case, "--out", tmp_path / "out", "--quiet")
@@ -43,27 +49,31 @@ def test_every_case_without_recordings_is_a_sentence(tmp_path):
         assert not (tmp_path / "out").exists()
 
 
-#: Walls of a brain, landmarks of another, markers of a beam, which has one tissue only: every subset of each that is
-#: not empty, some with one tissue and some with two. Landmarks with two tissues: tests/cases/test_resect.py.
-_TRIED = (
-    ("0684", "multi", ("ventricles", "cavity")),
-    ("0684", "single", ("ventricles",)),
-    ("0684", "multi", ("cavity",)),
-    ("resect-02", "single", ("landmarks",)),
-    ("beam-gravity", "single", ("markers", "markers, again")),
-    ("beam-gravity", "single", ("markers",)),
-    ("beam-gravity", "single", ("markers, again",)),
-)
+#: Subsets that are not empty, and how many of them are diagnosed with each commit: a try takes up to two minutes.
+_WITH_RECORDINGS, _WITH_EACH_COMMIT = 86, 3
 
 
-@pytest.mark.parametrize(
-    ("name", "tissue", "names"),
-    [pytest.param(*tried, marks=pytest.mark.slow(16 if "beam" in tried[0] else 100)) for tried in _TRIED],
-)
-def test_a_verdict_or_a_sentence(name, tissue, names):
-    every = case_of(name, tissue).recordings
+@pytest.mark.slow(120)
+@pytest.mark.parametrize("number", drawn_for_this_commit(_WITH_RECORDINGS, _WITH_EACH_COMMIT))
+def test_some_with_recordings_with_each_commit(number):
+    """`python -m reliability subsets --seed NUMBER --tries 1` does the same with the error of the mesh."""
+    _diagnose(*every_subset()[number])
+
+
+#: A beam, which has one tissue only: every subset that is not empty. Landmarks: tests/cases/test_resect.py.
+_OF_BEAM = (("markers", "markers, again"), ("markers",), ("markers, again",))
+
+
+@pytest.mark.slow(16)
+@pytest.mark.parametrize("names", _OF_BEAM)
+def test_every_subset_of_a_beam(names):
+    every = case_of("beam-gravity", "single").recordings
     some = tuple(recording for recording in every if recording.name in names)
     assert len(some) == len(names)
+    _diagnose("beam-gravity", "single", some)
+
+
+def _diagnose(name, tissue, some):
     ended = one_try(name, tissue, some, ["--no-discretisation"])
     assert not ended.defect
-    assert ended.verdict or len(some) < len(every)
+    assert ended.verdict or len(some) < len(case_of(name, tissue).recordings)
