@@ -169,8 +169,8 @@ class Gravity(BodyForce, Mechanism):
         down = unit_vector("gravity_axis", situation.gravity_axis)
         depths = points @ down
         height = float(np.ptp(depths))
-        # of a head that is tilted another point is the lowest one, and at once where the body is flat there: what has a
-        # derivative in every direction is the height of this one
+        # of a head that is tilted another point is the lowest one, and at once where the body is flat there: levels are
+        # counted from this one, whose height has a derivative in every direction
         deepest = points[depths >= depths.max() - SAME_PLACE * extent(points)].mean(axis=0)
         across = tangents(down)
         proposals = []
@@ -178,15 +178,11 @@ class Gravity(BodyForce, Mechanism):
 
             def drained(c: Floats, middle: float = float(level)) -> Gravity:
                 direction = tuple((down + c[1] * across[0] + c[2] * across[1]).tolist())
-                up = -unit_vector("direction", direction)
-                surface = middle + (float(c[3]) if len(c) > 3 else 0.0) + float(deepest @ up)
-                # levels are counted from the lowest point, as for a case that is read
-                lowest = float((points @ up).min())
                 return cls(
                     direction=direction,
                     density=situation.density,
-                    csf_level=surface - lowest,
-                    lowest=lowest,
+                    csf_level=middle + (float(c[3]) if len(c) > 3 else 0.0),
+                    lowest=-float(deepest @ unit_vector("direction", direction)),
                     ramp=((0.0, float(c[0])),),
                 )
 
