@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.estimation.observations import Sensors
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gaussian import GaussianModel
@@ -42,6 +42,18 @@ def _beginnings(rows: Sensors) -> tuple[Floats, list[Bools], list[Bools]]:
     members = [rows.recordings == number for number in np.unique(rows.recordings)]
     sigma = np.where(undeclared, 1.0 / np.sqrt(rows.weights), rows.sigma)
     return sigma, [m for m in members if not undeclared[m].any()], [m for m in members if undeclared[m].any()]
+
+
+def typical_size(numbers: Floats, groups: Ints) -> float:
+    """Standard deviation of numbers (n,) of which few are gross errors, by the median length of points.
+
+    In any axes the same, which that of components is not. `groups` (n,): the point of each number.
+    """
+    from scipy.special import chdtri
+
+    counts = np.bincount(groups)
+    squares = np.bincount(groups, numbers**2)[counts > 0]
+    return float(np.sqrt(np.median(squares / chdtri(counts[counts > 0], 0.5))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,8 +192,8 @@ class Likelihood:
         """
         sigma, declared, undeclared = _beginnings(rows)
         for members in undeclared:
-            # few of them are gross errors
-            sigma[members] *= max(1.4826 * float(np.median(np.abs(left[members] / sigma[members]))), LEAST_SIGMA)
+            size = typical_size(left[members] / sigma[members], rows.groups[members])
+            sigma[members] *= max(size, LEAST_SIGMA)
 
         def settled(noise: Noise) -> Noise:
             """Gross errors, undeclared noise and scale in turn until they stay."""
