@@ -11,7 +11,7 @@ from synthetic import GREY, WHITE, beads, block, lid, scale, truth
 from warpbrain.errors import InputError
 from warpbrain.estimation.finer_mesh import NAMES, Discretisation, FinerMesh, discretisation_error
 from warpbrain.estimation.forward import Forward
-from warpbrain.estimation.likelihood import Likelihood, Noise
+from warpbrain.estimation.likelihood import Likelihood, Noise, typical_size
 from warpbrain.estimation.observations import Observations, Sensors
 from warpbrain.estimation.parameters import Gaussian, PriorMode
 from warpbrain.estimation.problem import Nuisances, Problem
@@ -150,3 +150,16 @@ def test_a_mechanism_that_says_the_law_is_refused() -> None:
     case = block({"grey": GREY, "white": WHITE}, "moved")
     with pytest.raises(InputError, match="'asymmetry': says what law tissues have"):
         Forward(replace(case, mechanisms=(*case.mechanisms, Asymmetry(exponent=-5.0))), THETA, "cpu")
+
+
+def test_the_size_of_noise_is_the_same_in_any_axes():
+    """Few gross errors do not matter, and of one number for each point it is the median deviation."""
+    rng = np.random.default_rng(0)
+    vectors = 3.0 * rng.normal(size=(2000, 3))
+    vectors[:100] *= 50.0
+    R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    sizes = [typical_size((vectors @ turn.T).ravel(), np.repeat(np.arange(2000), 3)) for turn in (np.eye(3), R)]
+    assert sizes[1] == pytest.approx(sizes[0], rel=1e-12) and sizes[0] == pytest.approx(3.0, rel=0.05)
+    numbers = vectors[:, 0]
+    deviation = 1.4826 * np.median(np.abs(numbers))
+    assert typical_size(numbers, np.arange(2000)) == pytest.approx(deviation, rel=1e-4)

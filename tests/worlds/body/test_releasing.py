@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
+from scipy.stats import special_ortho_group
 
 from warpbrain.errors import SolveError
 from warpbrain.worlds.body.factors import Factors
@@ -49,6 +50,21 @@ def test_what_lifts_off_is_not_pulled_and_what_stays_is_not_drawn_in(problem):
     # nothing holds it along the wall
     np.testing.assert_allclose((force - pull[:, None] * normals[held])[on], 0.0, atol=1e-9)
     assert (gap[on] < 0.0).any() and (pull[on] < 0.0).any()
+
+
+def test_beside_a_following_pressure_it_is_the_same_in_any_axes(problem):
+    """Whose tangent is not symmetric: what acts on free nodes changes with those that are held, and not back."""
+    K, normals, held, reactions = problem
+    own = np.repeat(held, 3)
+    K[np.ix_(~own, own)] += np.random.default_rng(5).normal(size=(21, 15))
+    moved = []
+    for R in (np.eye(3), special_ortho_group.rvs(3, random_state=1)):
+        turn = np.kron(np.eye(12), R)
+        turned = turn @ K @ turn.T, normals @ R.T, held, reactions @ R.T
+        surface = surface_of(*turned)
+        u = np.einsum("ak,aki->ai", surface.moved(held, True).reshape(-1, 3), surface._frames)
+        moved.append(u @ R)
+    np.testing.assert_allclose(moved[1], moved[0], atol=1e-12)
 
 
 def test_what_nothing_holds_any_more_is_no_neighbour(problem):

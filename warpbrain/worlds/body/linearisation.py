@@ -68,6 +68,9 @@ class HeldSurface:
         coupling = stiffness[free][:, components].tocsc()
         condensed = np.asarray(stiffness[components][:, components].todense())
         condensed -= at.factors.between(stiffness[components][:, free], coupling)
+        # beside a pressure that follows its surface it is not symmetric, and Cholesky's method reads one half of it,
+        # which is another one in other axes
+        condensed = 0.5 * (condensed + condensed.T)
         self._coupling = coupling
         # two tangents and the normal
         tangent_vectors = tangents(normals[self.members])
