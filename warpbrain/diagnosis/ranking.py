@@ -54,7 +54,11 @@ class Ranking:
         # linear about another state, a size may go beyond what there can be: it says nothing
         beyond = {} if weighted_set.refit is not None else {v.name: beyond_in_words(cause.name, v) for v in values}
         values = tuple(value for value in values if not beyond.get(value.name))
-        values += tuple(value for value in scanned_values(scanned, weights) if value.name not in fitted)
+        # on a node set it has other parameters than on a patch
+        alike = np.array([other.proposed.declared == effect.proposed.declared for other in scanned])
+        of_alike = [other for other, is_alike in zip(scanned, alike.tolist(), strict=True) if is_alike]
+        of_places = scanned_values(of_alike, weights[alike] / max(float(weights[alike].sum()), 1e-300))
+        values += tuple(value for value in of_places if value.name not in fitted)
         centre, radius = _place(effect, scanned, weights)
         change = None
         if alone is not None and alone.refit is not None:

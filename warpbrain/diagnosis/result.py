@@ -154,7 +154,7 @@ def sentence_of(diagnosis: Diagnosis) -> str:
         unnamed="a force without a name",
         named=[effect_sentence(ranked, diagnosis.case.gravity_axis) for ranked in named],
         grounds=grounds([ranked.probability for ranked in named], "points", errors),
-        members=[(sentence_of_kind(kind), chances.get(kind, 0.0)) for kind in diagnosis.group if kind != UNKNOWN],
+        members=[(_member(diagnosis, kind), chances.get(kind, 0.0)) for kind in diagnosis.group if kind != UNKNOWN],
         perhaps=[clause(sentence_of_kind(ranked.kind)) for ranked in likely],
         nothing_acts=sum(each.probability for each in diagnosis.combinations if not each.causes),
         only_physics=all(ranked.physics for ranked in likely),
@@ -166,11 +166,21 @@ def sentence_of(diagnosis: Diagnosis) -> str:
 
 def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | None = None) -> str:
     """What a mechanism is, how large it was found to be, and where."""
+    return f"{_sized(ranked, gravity_axis)}{_where(ranked)}"
+
+
+def _sized(ranked: Ranked, gravity_axis: tuple[float, float, float] | None) -> str:
+    """What a mechanism is, and how large it was found to be."""
     sizes = "; ".join(size_in_words(ranked.kind, ranked.values, gravity_axis))
-    parts = [sentence_of_kind(ranked.kind).rstrip(".")]
-    if sizes:
-        parts.append(f": {sizes}")
-    return f"{''.join(parts)}.{_where(ranked)}"
+    return f"{sentence_of_kind(ranked.kind).rstrip('.')}{f': {sizes}' if sizes else ''}."
+
+
+def _member(diagnosis: Diagnosis, kind: str) -> str:
+    """What a member of a group is, and how large it would be if it was fitted."""
+    ranked = next((ranked for ranked in diagnosis.ranking if ranked.kind == kind), None)
+    if ranked is None or ranked.rejected_because:
+        return sentence_of_kind(kind)
+    return _sized(ranked, diagnosis.case.gravity_axis)
 
 
 def confusion_sentences(confusion: Confusion) -> tuple[str, ...]:

@@ -76,6 +76,8 @@ class Situation:
     axes: tuple[str, str, str] = ("from left to right", "from posterior to anterior", "from inferior to superior")
     #: Every part of the surface that can move, with what people call it: what something acts on already, too
     named: tuple[tuple[str, Int32s], ...] = ()
+    #: Node sets of the surface without a face, edges and points, that the case declares and nothing in it names
+    unused: tuple[str, ...] = ()
 
     @cached_property
     def _names(self) -> tuple[Any, list[str]]:
@@ -217,6 +219,8 @@ class Proposal:
     centre: Floats | None = None  # (3,), where it acts, if somewhere [m]
     radius: float | None = None  # [m]
     region: str = ""  # where it acts in words
+    odds: str = "causes.mechanism"  # key of the belief of the odds that its kind acts
+    declared: bool = False  # whether it acts on a node set of `Situation.unused`
     #: Numbers of the coefficients that may be functions of time: all of them where it is in proportion to them
     varying: tuple[int, ...] = ()
     #: Whether what acts at one time gives way to what acts at the next; else each coefficient has a ramp

@@ -148,6 +148,11 @@ def _nearest(vector: Floats) -> list[str]:
     return [_ENDS[axis][int(vector[axis] > 0.0)] for axis in (most, second)[:count]]
 
 
+def name_of_set(name: str) -> str:
+    """What people call a set of a mesh, by the name that it has there."""
+    return name.replace("-", " ").replace("_", " ")
+
+
 def unsure(value: Value) -> bool:
     """Whether its spread is larger than itself, so that not even its sign is known."""
     return value.sd > abs(value.value)

@@ -1,4 +1,4 @@
-"""Traction on a patch: one piece of the surface, whatever else of it comes into the ball."""
+"""Traction on a patch: one piece of the surface, whatever else of it comes into the ball; or a force on nodes."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from shapes import box, sphere
 from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import QuadraticMesh, TetMesh, closed_surfaces, face_vectors, nodes_of, patch_around
 from warpbrain.mesh.patches import nearest_to_origin
+from warpbrain.physics.mechanism import ParameterError
 from warpbrain.physics.mechanisms.traction import Traction
 
 RADIUS = 0.015
@@ -113,3 +114,42 @@ def test_a_patch_of_a_brain_is_one_piece_that_faces_one_way(name):
         more += len(np.setdiff1d(np.flatnonzero(ball), found)) > 0
     # where a ball alone would hold a wall behind
     assert more > 0
+
+
+def edged() -> TetMesh:
+    """A slab with the upper edge at its far end as a set without a face."""
+    mesh = slab(cells=6)
+    edge = (mesh.points[:, 0] > 0.06 - 1e-9) & (mesh.points[:, 2] > 0.02 - 1e-9)
+    return mesh.with_node_sets({"edge": edge})
+
+
+def test_nodes_share_a_force_and_carry_it_with_their_elements():
+    mesh, force = edged(), np.array([0.1, 0.0, -0.5])
+    hung = Traction(nodes="edge", force=tuple(force))
+    hung.check(mesh)
+    forces = hung.nodal_forces(mesh)
+    members = mesh.node_sets["edge"]
+    np.testing.assert_allclose(forces[members], np.tile(force / members.sum(), (members.sum(), 1)))
+    assert not forces[~members].any()
+    carried = hung.acts_on(mesh)
+    assert carried.any() and members[mesh.tetrahedra[carried]].any(axis=1).all()
+    assert not members[mesh.tetrahedra[~carried]].any()
+
+
+@pytest.mark.parametrize(
+    ("given", "key"),
+    [
+        ({}, "centre"),
+        ({"centre": (0.0, 0.0, 0.0)}, "value"),
+        ({"value": (0.0, 0.0, 1.0)}, "centre"),
+        ({"force": (0.0, 0.0, 1.0)}, "nodes"),
+        ({"nodes": "edge"}, "force"),
+        ({"nodes": "edge", "force": (0.0, 0.0, 1.0), "radius": 0.01}, "radius"),
+        ({"nodes": "edge", "force": (0.0, 0.0, 1.0), "centre": (0.0, 0.0, 0.0)}, "centre"),
+        ({"centre": (0.0, 0.0, 0.0), "value": (0.0, 0.0, 1.0), "force": (0.0, 0.0, 1.0)}, "nodes"),
+    ],
+)
+def test_it_acts_on_a_patch_or_on_nodes(given, key):
+    with pytest.raises(ParameterError) as caught:
+        Traction(**given)
+    assert caught.value.key == key

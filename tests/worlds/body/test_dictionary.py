@@ -14,14 +14,16 @@ from slow_block import CAUSES, write_slow
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.reading import read_case
+from warpbrain.cases.shipped import find_case
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.mechanisms.fibres import Fibres
+from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.traction import Traction
 from warpbrain.physics.proposal import Follows, Proposal
-from warpbrain.worlds.body.dictionary import dictionary_of, is_linear
+from warpbrain.worlds.body.dictionary import dictionary_of, is_linear, situation_of
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.states import States
@@ -130,3 +132,37 @@ def test_whether_an_effect_is_linear_is_the_same_in_any_axes() -> None:
     for size, linear in ((1.62, True), (1.64, False)):
         for direction in (np.eye(3)[:, :1], rotation[:, :1]):
             assert is_linear(Effect(proposal, np.zeros(3), size * direction), at) == linear
+
+
+def bare_beam() -> Case:
+    """The silicone beam without its weight and what hangs at its tip."""
+    beam = find_case("beam-52g")
+    clamp = tuple(boundary for boundary in beam.boundaries if boundary.kind == "fixed")
+    return replace(beam, boundaries=clamp, mechanisms=())
+
+
+def test_what_is_stiffer_than_brain_has_its_weight_in_air() -> None:
+    beam = bare_beam()
+    [hanging] = dictionary_of(beam, ["gravity"]).proposals["gravity"]
+    weight = cast(Gravity, hanging.make(hanging.mean)).nodal_forces(beam.mesh).sum(axis=0)
+    np.testing.assert_allclose(weight, [0.0, 0.0, -beam.density * 9.81 * beam.mesh.volume], rtol=1e-9, atol=1e-9)
+    assert hanging.odds == "causes.weight"
+    softer = Gravity.proposals(replace(situation_of(beam), stiffness=1.0))
+    assumed = Gravity.proposals(replace(situation_of(beam), assumed=frozenset({"gravity"})))
+    for levels in (softer, assumed):
+        assert len(levels) > 1 and {proposal.odds for proposal in levels} == {"causes.mechanism"}
+
+
+def test_something_hangs_on_an_edge_that_a_case_declares() -> None:
+    situation = situation_of(bare_beam())
+    [edge] = situation.unused
+    patches = [proposal for proposal in Traction.proposals(situation) if not proposal.declared]
+    assert all(proposal.centre is not None for proposal in patches)
+    [hung] = [proposal for proposal in Traction.proposals(situation) if proposal.declared]
+    assert hung.make(np.array([0.5])) == Traction(nodes=edge, force=(0.0, 0.0, -0.5))
+    anyhow = Traction.proposals(replace(situation, gravity_axis=None))[-1]
+    assert anyhow.make(np.array([0.5, 0.1, 0.2])) == Traction(nodes=edge, force=(0.5, 0.1, 0.2))
+    # as large as what a patch bears
+    largest = max(patches, key=lambda proposal: float(proposal.radius or 0.0))
+    of_patch = largest.make(np.array([0.0, 0.0, float(largest.sd[2])])).nodal_forces(situation.mesh).sum(axis=0)
+    np.testing.assert_allclose(hung.sd, np.linalg.norm(of_patch), rtol=0.5)

@@ -20,6 +20,7 @@ from warpbrain.worlds.body.surfaces import (
     connected_parts,
     free_surfaces,
     held_nodes,
+    unused_edges,
     with_free_surfaces,
     with_sets_that_act,
 )
@@ -44,6 +45,23 @@ def test_surfaces_without_a_set_get_one(resected: Case) -> None:
         "outer-surface": "outer surface",
         "wall-of-the-void": "wall of the void",
     }
+
+
+def test_an_edge_that_nothing_uses_is_one_and_a_surface_is_none() -> None:
+    beam = find_case("beam-52g")
+    [weight] = [one for one in beam.boundaries if one.kind == "force"]
+    without = replace(beam, boundaries=tuple(one for one in beam.boundaries if one is not weight))
+    assert unused_edges(beam) == ()
+    assert unused_edges(without) == (weight.nodes,)
+    held = Fixed(name="held", nodes=weight.nodes)
+    sets = {
+        **without.mesh.node_sets,
+        "end": without.mesh.points[:, 0] > 0.1 - 1e-9,
+        "none": without.mesh.points[:, 0] < -1.0,
+    }
+    more = replace(without, mesh=without.mesh.with_node_sets(sets))
+    assert unused_edges(more) == (weight.nodes,)
+    assert unused_edges(replace(more, boundaries=(*more.boundaries, held))) == ()
 
 
 def test_connected_parts_are_all_of_the_free_surface(resected: Case) -> None:

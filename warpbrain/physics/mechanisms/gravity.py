@@ -156,7 +156,10 @@ class Gravity(BodyForce, Mechanism):
 
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
-        """Levels of the fluid, with the head's pose known to some degrees; any direction if it is not known at all."""
+        """Levels of the fluid, with the head's pose known to some degrees; any direction if it is not known at all.
+
+        What is stiffer than brain is none: it is in air, and all of it has its weight.
+        """
         points = situation.mesh.points
         if situation.gravity_axis is None:
 
@@ -173,6 +176,15 @@ class Gravity(BodyForce, Mechanism):
         # counted from this one, whose height has a derivative in every direction
         deepest = points[depths >= depths.max() - SAME_PLACE * extent(points)].mean(axis=0)
         across = tangents(down)
+        sd, usual = np.array([_SHARE, _POSE, _POSE]), np.array([1.0, 0.0, 0.0])
+        if situation.stiffness > 1.0 and cls.kind not in situation.assumed:
+
+            def hanging(c: Floats) -> Gravity:
+                direction = down + c[1] * across[0] + c[2] * across[1]
+                return cls(direction=tuple(direction.tolist()), density=situation.density, ramp=((0.0, float(c[0])),))
+
+            return [Proposal(hanging, usual, sd, "smooth", usual, np.zeros(3), odds="causes.weight")]
+        over_time: dict[str, Any] = {"varying": (3,), "in_turns": True, "only_over_time": True}
         proposals = []
         for level in np.linspace(-0.05, 0.9, _LEVELS) * height:
 
@@ -186,12 +198,9 @@ class Gravity(BodyForce, Mechanism):
                     ramp=((0.0, float(c[0])),),
                 )
 
-            sd = np.array([_SHARE, _POSE, _POSE])
-            usual = np.array([1.0, 0.0, 0.0])
             proposals.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(3)))
-            sd, usual = np.append(sd, _FALL * height), np.append(usual, 0.0)
-            over_time: dict[str, Any] = {"varying": (3,), "in_turns": True, "only_over_time": True}
-            proposals.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(4), **over_time))
+            falling, at_first = np.append(sd, _FALL * height), np.append(usual, 0.0)
+            proposals.append(Proposal(drained, at_first, falling, "smooth", at_first, np.zeros(4), **over_time))
         return proposals
 
     @classmethod

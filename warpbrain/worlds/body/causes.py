@@ -108,7 +108,7 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
             continue
         # a mechanism with an expected size, such as a weight, has that one
         has_mean = any(place.mean is not None for place in places)
-        sized, log_prior = unit_sizes if has_mean else sizes, math.log(belief("causes.mechanism"))
+        sized, log_prior = unit_sizes if has_mean else sizes, math.log(belief(of_kind[0].proposal.odds))
         causes.append(Cause(kind, places, log_prior, sized, shares=_shares(of_kind)))
     # setting in at any recorded time, or changing from one to the next as mechanisms may
     times, sensors = base.states.times, base.at.sensors
@@ -122,13 +122,18 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
 def _shares(effects: Sequence[Effect]) -> Floats | None:
     """Probability (p,) of each place of a mechanism; None if all are equally probable.
 
-    A scan has hundreds of places, and that all tissue swells is not as improbable as any one of these.
+    A scan has hundreds of places, and neither that all tissue swells nor that something hangs where a case has a node
+    set for it is as improbable as any one of these.
     """
-    local = np.array([effect.proposed.centre is not None for effect in effects])
-    if local.all() or not local.any():
-        return None
-    in_one = belief("causes.in_one_place")
-    return np.where(local, in_one / local.sum(), (1.0 - in_one) / (~local).sum())
+    declared = np.array([effect.proposed.declared for effect in effects])
+    local = np.array([effect.proposed.centre is not None for effect in effects]) & ~declared
+    in_one, on_declared = belief("causes.in_one_place"), belief("causes.on_declared")
+    shares = np.ones(len(effects))
+    for chosen, others, share in ((local, ~local & ~declared, in_one), (declared, ~declared, on_declared)):
+        if chosen.any() and others.any():
+            shares[chosen] *= share / shares[chosen].sum()
+            shares[others] *= (1.0 - share) / shares[others].sum()
+    return None if (shares == 1.0).all() else shares / shares.sum()
 
 
 def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:

@@ -23,7 +23,13 @@ from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.states import SolvedState
-from warpbrain.worlds.body.surfaces import connected_parts, free_surfaces, named_triangles, with_free_surfaces
+from warpbrain.worlds.body.surfaces import (
+    connected_parts,
+    free_surfaces,
+    named_triangles,
+    unused_edges,
+    with_free_surfaces,
+)
 from warpbrain.worlds.body.time_courses import over_time
 
 #: About how many sites a scan has in the tissue, and on its surface.
@@ -74,6 +80,7 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
         spacing,
         _stiffness(case),
         named=named_triangles(case, free),
+        unused=unused_edges(case),
     )
 
 

@@ -14,9 +14,10 @@ import numpy as np
 from warpbrain.arrays import Bools, Int32s
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
-from warpbrain.mesh import TetMesh, nodes_of, split_boundary
+from warpbrain.mesh import TetMesh, faces_of, nodes_of, split_boundary
 from warpbrain.mesh.free_surfaces import FreePart, FreeSurface, free_faces, free_parts, rim_corners, set_of
 from warpbrain.mesh.surface import in_rows
+from warpbrain.physics.words import name_of_set
 
 #: Names of the wall that a resection leaves, and of the outside.
 WALL, OUTSIDE = "wall of the cavity", "outer surface"
@@ -66,7 +67,7 @@ def free_surfaces(case: Case) -> tuple[FreeSurface, ...]:
 
     for name, members in mesh.node_sets.items():
         if name not in used:
-            add(name, name.replace("-", " ").replace("_", " "), members)
+            add(name, name_of_set(name), members)
     if case.resection is not None and case.resection.elements not in mesh.node_sets:
         # a mechanism may name the wall by the element set already
         add(case.resection.elements, WALL, nodes_of(mesh.cut, len(mesh.points)))
@@ -76,6 +77,21 @@ def free_surfaces(case: Case) -> tuple[FreeSurface, ...]:
         names.add(name)
         add(name, words, members)
     return tuple(surfaces)
+
+
+def unused_edges(case: Case) -> tuple[str, ...]:
+    """Node sets of the surface without a face, edges and points, that a case declares and nothing in it names.
+
+    Those with faces are surfaces: `free_surfaces`.
+    """
+    mesh, _ = case.remaining
+    free = nodes_of(mesh.boundary, len(mesh.points)) & ~held_nodes(case)
+    used = _named_sets(case)
+    return tuple(
+        name
+        for name, members in mesh.node_sets.items()
+        if name not in used and members.any() and not (members & ~free).any() and not len(faces_of(mesh, members))
+    )
 
 
 def named_triangles(case: Case, surfaces: Sequence[FreeSurface]) -> tuple[tuple[str, Int32s], ...]:
@@ -105,13 +121,19 @@ def with_free_surfaces(case: Case, surfaces: Sequence[FreeSurface] | None = None
 
 def with_sets_that_act(case: Case, declared: TetMesh) -> Case:
     """The same case without node sets that a mesh does not declare and nothing in the case names."""
+    named = _named_sets(case)
+    sets, declared_sets = case.mesh.node_sets.items(), declared.node_sets
+    kept = {name: members for name, members in sets if name in declared_sets or name in named}
+    return replace(case, mesh=case.mesh.with_node_sets(kept))
+
+
+def _named_sets(case: Case) -> set[str]:
+    """Node sets on which a case declares a boundary or a mechanism."""
     named = {boundary.nodes for boundary in case.boundaries}
     for mechanism in case.mechanisms:
         kinds = mechanism.parameters().items()
         named |= {getattr(mechanism, name) for name, says in kinds if says.kind == "node set"}
-    sets, declared_sets = case.mesh.node_sets.items(), declared.node_sets
-    kept = {name: members for name, members in sets if name in declared_sets or name in named}
-    return replace(case, mesh=case.mesh.with_node_sets(kept))
+    return named
 
 
 def _triangles_key(faces: Int32s, corners: Int32s) -> bytes:
@@ -155,7 +177,7 @@ def _name_of(case: Case, part: FreePart, inside: Bools) -> str:
     outside = nodes_of(mesh.boundary, len(inside)) & ~inside
     for name, members in mesh.node_sets.items():
         if members[part.faces].all() and not (members & outside).any():
-            return name.replace("-", " ").replace("_", " ")
+            return name_of_set(name)
     of_brain = any(word in f"{t.name} {t.prior}".lower() for t in case.tissues.values() for word in _OF_BRAIN)
     return "ventricle" if of_brain else "wall of the void"
 
