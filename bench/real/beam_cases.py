@@ -35,7 +35,7 @@ HELD, HELD_WITH_WEIGHT = 0.35, 0.6
 GRAVITY_FILES = ("beam_gravity_V2_a.c3d", "beam_gravity_V2_b.c3d")
 #: Its standard deviation there, relative: of a beam with a weight it is known. The weight of the beam is what tells it.
 MU_ACCURACY = 0.043
-#: Standard deviation of ln mu from place to place: a guess for silicone of one pour. Diagnoses are alike with 0.02.
+#: Standard deviation of ln mu from place to place: a guess for silicone of one pour; 0.02 and 0.1 give like verdicts.
 UNEVEN = 0.05
 WEIGHT_FILE, WEIGHT_GRAMS = "beam_load52_V2_a.c3d", 52.0
 
@@ -104,18 +104,18 @@ def beam_mesh(surface: Path) -> TetMesh:
     size = np.ptp(corners.reshape(-1, 3), axis=0)[[2, 1, 0]]
     if not (np.allclose(size, SIZE, atol=1e-6) and np.isclose(volume, SIZE.prod(), rtol=1e-4)):
         raise ValueError(f"{surface}: expected a box of {1e3 * SIZE} mm")
-    points, tetrahedra = _box()
+    points, tetrahedra = box(CELLS)
     tip_edge = (points[:, 0] > SIZE[0] - 1e-9) & (points[:, 2] > SIZE[2] - 1e-9)
     sets = {"clamp": points[:, 0] < 1e-9, "upper edge of the tip": tip_edge}
     return TetMesh(points, tetrahedra, node_sets=sets)
 
 
-def _box() -> tuple[Floats, NDArray[np.int64]]:
-    """Points and tetrahedra of a box: cells are cut along diagonals that neighbours mirror, so no side is weaker."""
-    axes = [np.linspace(0.0, length, n + 1) for n, length in zip(CELLS, SIZE, strict=True)]
+def box(cells_along: tuple[int, int, int]) -> tuple[Floats, NDArray[np.int64]]:
+    """Points and tetrahedra of the box: cells are cut along diagonals that neighbours mirror, so no side is weaker."""
+    axes = [np.linspace(0.0, length, n + 1) for n, length in zip(cells_along, SIZE, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    cells = np.stack(np.meshgrid(*[np.arange(n) for n in CELLS], indexing="ij"), axis=-1).reshape(-1, 3)
-    stride = np.array([(CELLS[1] + 1) * (CELLS[2] + 1), CELLS[2] + 1, 1])
+    cells = np.stack(np.meshgrid(*[np.arange(n) for n in cells_along], indexing="ij"), axis=-1).reshape(-1, 3)
+    stride = np.array([(cells_along[1] + 1) * (cells_along[2] + 1), cells_along[2] + 1, 1])
     mirrored = cells % 2
     found = []
     for order in ((0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):

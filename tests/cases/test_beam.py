@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from warpbrain.cases.shipped import BEAM, find_case
+from warpbrain.diagnosis.diagnose import diagnose
+from warpbrain.inference.decide import GROUP, NAMED
 from warpbrain.recordings.location import locate
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
@@ -40,3 +42,19 @@ def test_what_is_declared(name):
     assert gravity.nodal_forces(case.mesh).sum(axis=0)[2] == pytest.approx(weight, rel=1e-9)
     assert {boundary.kind for boundary in case.boundaries} == ({"fixed"} if name == BEAM[0] else {"fixed", "force"})
     assert case.tissues[1].accuracy == (None if name == BEAM[0] else 0.043)
+
+
+@pytest.mark.slow(90)
+@pytest.mark.parametrize("gravity", [True, False])
+def test_the_weight_that_was_withheld_is_named_or_in_a_group_to_10_percent(gravity):
+    """Where its set of nodes is declared, and gravity is, too, or is withheld."""
+    whole = find_case(BEAM[1])
+    [weight] = [boundary for boundary in whole.boundaries if boundary.kind == "force"]
+    boundaries = tuple(boundary for boundary in whole.boundaries if boundary is not weight)
+    found = diagnose(replace(whole, boundaries=boundaries, mechanisms=whole.mechanisms if gravity else ()))
+    causes = {"traction"} if gravity else {"traction", "gravity"}
+    assert found.verdict in (NAMED, GROUP) and causes <= set(found.decision.causes)
+    [traction] = [ranked for ranked in found.ranking if ranked.kind == "traction"]
+    [force] = [value for value in traction.values if value.name == "force_z"]
+    assert force.value == pytest.approx(weight.total[2], rel=0.1)
+    assert traction.region == weight.nodes
