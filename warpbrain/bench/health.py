@@ -25,6 +25,7 @@ from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
 from warpbrain.mesh import boundary_faces, nodes_of
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.report.page import lines
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
@@ -116,40 +117,8 @@ def _pictures() -> str | None:
 
 
 def health_lines(report: Mapping[str, Any]) -> list[str]:
-    """As printed; `found` is of `health`."""
-    memory, processor, cuda, kernels = (report[name] for name in ("memory_GiB", "processor", "cuda", "kernels"))
-    installed = [f"{name} {version}" for name, version in report["packages"].items() if version]
-    missing = [name for name, version in report["packages"].items() if not version]
-    driver = f"CUDA driver {cuda['driver']}" if cuda["driver"] else "no CUDA driver"
-    writable = "" if kernels["writable"] else "; CANNOT BE WRITTEN TO: set WARP_CACHE_PATH to a folder that can"
-    devices = []
-    for device in report["devices"]:
-        size = device["memory_GiB"]
-        more = size and f", architecture {device['arch']}, {_gib(size['total'])}, {_gib(size['free'])} free"
-        devices.append(f"device     {device['alias']}: {device['name']}{more or ''}")
-    lines = [
-        f"warpbrain  {report['warpbrain']['version']} in {report['warpbrain']['folder']}",
-        f"python     {report['python']} on {report['platform']}",
-        f"processor  {processor['name']}, {processor['usable']} usable, {processor['threads']} threads",
-        f"memory     {_gib(memory['total'])}, {_gib(memory['free'])} free",
-        f"installed  {', '.join(installed)}",
-        f"optional   {', '.join(missing) or 'nothing'} not installed",
-        f"cuda       {driver}, Warp built with {cuda['toolkit'] or 'none'}",
-        *devices,
-        f"kernels    {kernels['folder']}, {kernels['size_GiB']:.2f} GiB{writable}",
-        f"pictures   {report['pictures'] or 'an OpenGL library is there'}",
-    ]
-    for test in report["self_test"]:
-        result = f"FAILED: {test['problem']}" if test["problem"] else (
-            f"passed: {test['nodes']} nodes found to {test['error']:.0e} of their displacement in "
-            f"{test['solve_s']:.1f} s, after {test['kernels_s']:.1f} s for kernels"
-        )  # fmt: skip
-        lines.append(f"self-test  {test['device']}: {result}")
-    return lines
-
-
-def _gib(size: float | None) -> str:
-    return "not known" if size is None else f"{size:.1f} GiB"
+    """As printed; `report` is of `health`."""
+    return lines("doctor.txt", "health", report)
 
 
 #: Largest error of a displacement that passes, of the largest displacement: Newton stops at 1e-8 of the forces.
