@@ -8,13 +8,12 @@ from warpbrain.gp.leaving_out import (
     INTERVALS,
     Score,
     calibration,
-    calibration_lines,
     compared,
-    comparison_lines,
     folds,
     methods_of,
 )
 from warpbrain.gp.literature.studies import read_studies
+from warpbrain.report.generative_text import calibration_lines, comparison_lines
 
 
 def score(values, levels=(), name="a"):

@@ -17,11 +17,11 @@ from warpbrain.gp.leaving_out import (
     folds,
     leave_out,
     read_scores,
-    score_lines,
     write_scores,
 )
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import Study
+from warpbrain.report.generative_text import score_lines
 
 GREY = "hyperelastic/grey matter"
 SOME = [s for s in read_studies("corrected") if s.group in (GREY, "MRE/grey matter", "linear/brain")][::2]

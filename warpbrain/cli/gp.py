@@ -20,9 +20,12 @@ from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation,
 from warpbrain.report.generative_text import (
     LawRow,
     asymmetry_lines,
+    calibration_lines,
+    comparison_lines,
     law_lines,
     moduli_lines,
     redrawn_lines,
+    score_lines,
     write_laws,
     write_moduli,
 )
@@ -188,20 +191,15 @@ def compare(options: argparse.Namespace) -> None:
     papers = len({study.paper for study in studies})
     print(f"{len(studies)} studies of {papers} papers, one {options.leave} after the other left out:")
     shown = [score for score in scores if options.only in score.name]
-    print(*leaving_out.score_lines(shown), sep="\n")
+    print(*score_lines(shown), sep="\n")
     for score in shown:
         if score.levels:
-            calibrated = leaving_out.calibration_lines(
-                leaving_out.calibration(score, leaving_out.methods_of(left)), options.leave
-            )
+            calibrated = calibration_lines(leaving_out.calibration(score, leaving_out.methods_of(left)), options.leave)
             title = f"{score.name}: {options.leave}s whose level is within an interval (95 % interval of that part)"
             print("", title, *calibrated, sep="\n")
     default = next((score for score in scores if score.name == DEFAULT), None)
     others = [score for score in shown if score.name != DEFAULT]
     if default is not None and others:
-        print(
-            "",
-            *leaving_out.comparison_lines(default.name, [leaving_out.compared(default, other) for other in others]),
-            sep="\n",
-        )
+        compared = [leaving_out.compared(default, other) for other in others]
+        print("", *comparison_lines(default.name, compared), sep="\n")
     print("", f"written to {path}", sep="\n")

@@ -375,37 +375,3 @@ def read_scores(path: Path, held: Sequence[str]) -> list[Score]:
 
 def _level_columns(held: Sequence[str]) -> list[str]:
     return [f"level of {name}" for name in held]
-
-
-def score_lines(scores: Sequence[Score]) -> list[str]:
-    """The table for the terminal."""
-    width = max(len(score.name) for score in scores)
-    lines = [f"{'':{width}}  log density a point (median)        rms error   within 50 %   95 %"]
-    for score in scores:
-        density = f"{score.log_density:8.2f} +- {score.log_density_error:<6.2f} ({score.median:6.2f})"
-        within = f"{100 * score.coverage_50:10.0f} %  {100 * score.coverage_95:3.0f} %"
-        lines.append(f"{score.name:{width}}  {density}       {score.rms_error:8.2f}  {within}")
-    return lines
-
-
-def calibration_lines(calibrations: Sequence[Calibration], left: str) -> list[str]:
-    """The table of one model for the terminal: hits and what part of hits they are compatible with."""
-    heads = "".join(f"{f'{100 * part:g} % interval':>24}" for part in INTERVALS)
-    lines = [f"{'method':<14}{left + 's':>8}{heads}   {left + 's by probability, lowest quarter first':>}"]
-    for of in calibrations:
-        cells = ""
-        for hits, (low, high) in zip(of.within, of.ranges, strict=True):
-            cells += f"{hits:8d}: {100 * hits / of.count:3.0f} % ({100 * low:.0f} to {100 * high:.0f})".rjust(24)
-        lines.append(f"{of.method:<14}{of.count:>8}{cells}   {' '.join(map(str, of.histogram))}")
-    return lines
-
-
-def comparison_lines(name: str, comparisons: Sequence[Comparison]) -> list[str]:
-    """One model against the others for the terminal."""
-    width = max(len(comparison.other) for comparison in comparisons)
-    lines = [f"{name} against:".ljust(width + 2) + "   ahead in   sign test p   difference of log density a point"]
-    for comparison in comparisons:
-        ahead = f"{comparison.wins} of {comparison.count}"
-        difference = f"{comparison.difference:8.2f} +- {comparison.difference_error:.2f}"
-        lines.append(f"  {comparison.other:{width}}{ahead:>11}{comparison.p_value:>14.2g}   {difference}")
-    return lines
