@@ -10,6 +10,8 @@ from warpbrain.arrays import Floats, Ints
 from warpbrain.mesh import TetMesh, boundary_faces, nodes_of
 from warpbrain.mesh.tet_mesh import signed_volumes
 
+#: Strain at rest of each mode of a test: a stretch of 1, a shear of 0.
+REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0, "confined": 1.0, "biaxial": 1.0}
 #: Elements along the longest side of a block, and along the diameter of a cylinder.
 CELLS = 12
 # a cube is cut into six tetrahedra around one of its diagonals, the same way in every cube, so that faces match
@@ -23,6 +25,24 @@ class Specimen:
     shape: str  # "cylinder" or "block"
     size: tuple[float, float, float]  # extent along x, y and z [m]; a cylinder's axis is z
     grips: str  # whether its ends, the sets `bottom` and `top`, can widen: "glued" or "lubricated"
+
+    @property
+    def radius(self) -> float:
+        """Radius [m] of the circle that is as large as an end."""
+        x, y, _ = self.size
+        return 0.5 * x if self.shape == "cylinder" else float(np.sqrt(x * y / np.pi))
+
+    def strain_of(self, mode: str, quantity: str, imposed: Floats) -> Floats:
+        """Stretch or shear (n,), of torsion at the rim, of what was imposed (n,)."""
+        if quantity == "stretch":
+            return imposed
+        return REST[mode] + imposed * (self.radius if mode == "torsion" else 1.0) / self.size[2]
+
+    def stress_unit(self, quantity: str) -> float:
+        """Nominal stress [Pa], of torsion the torque over `int r dA`, of one unit of what a test answers."""
+        return {"stress": 1.0, "force": 1.0 / (np.pi * self.radius**2), "torque": 1.5 / (np.pi * self.radius**3)}[
+            quantity
+        ]
 
     def mesh(self) -> TetMesh:
         """The shape in tetrahedra, z from 0, centred on the z axis.

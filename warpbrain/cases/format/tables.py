@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from warpbrain.cases.boundary import BOUNDARIES, RAMP
 from warpbrain.frame import AXES, METRES
+from warpbrain.gp.literature.study import GROUPS
 from warpbrain.keys import Key, Table
 from warpbrain.physics.laws import FORMULATIONS, LAWS, Law
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.recordings.recording import RECORDINGS
 
-#: Groups of the generative model: method and anatomy of the published strain-energy functions.
-PRIOR_GROUPS = tuple(
-    f"{method}/{anatomy}"
-    for method in ("MRE", "linear", "hyperelastic")
-    for anatomy in ("grey matter", "white matter", "brain", "abnormal")
-)
 #: What stands in the place of a shear modulus that the generative model is to give.
 PRIOR = "prior"
 
@@ -78,7 +73,7 @@ TISSUE = Table(
     (
         Key("name", "text", "For people."),
         Key("formulation", "text", "How the law treats changes of volume", choices=FORMULATIONS, default="coupled"),
-        Key("prior", "text", "Group of the generative model.", choices=PRIOR_GROUPS),
+        Key("prior", "text", "Group of the generative model.", choices=GROUPS),
         Key(
             "accuracy",
             "number",

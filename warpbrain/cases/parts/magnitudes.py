@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from warpbrain.arrays import Floats
 from warpbrain.cases.case import Tissue
 from warpbrain.cases.case_template import OTHER_MU
 from warpbrain.cases.format.reading import Context
-from warpbrain.cases.specimen import Specimen
+from warpbrain.cases.specimen import REST, Specimen
 from warpbrain.recordings.recording import Recording, TestRecording
 
 #: A response that is so many times off is not that of another tissue: a unit that is off by 1000 is so of any tissue
@@ -31,7 +30,8 @@ def check_magnitudes(
     for recording in recordings:
         if not isinstance(recording, TestRecording):
             continue
-        strain, factor = _strain(specimen, recording), mu * _response_to_one_pascal(specimen, nu, recording)
+        strain = specimen.strain_of(recording.mode, recording.quantities[0], recording.imposed) - REST[recording.mode]
+        factor = mu * _response_to_one_pascal(specimen, nu, recording)
         strained = np.abs(strain)[strain != 0.0]
         if not strained.size:
             continue
@@ -61,33 +61,14 @@ def check_magnitudes(
         context.problems.add(context.file, f"[recording {number}] unit", f"{message} if it is in {unit}", cure)
 
 
-def _strain(specimen: Specimen, recording: TestRecording) -> Floats:
-    """What was imposed (n,) as a strain; of torsion the shear at the rim."""
-    height = specimen.size[2]
-    if recording.mode == "torsion":
-        return np.asarray(recording.imposed / height * _radius(specimen))
-    return np.asarray(recording.imposed - 1.0 if recording.quantities[0] == "stretch" else recording.imposed / height)
-
-
 def _response_to_one_pascal(specimen: Specimen, nu: float, recording: TestRecording) -> float:
     """The response to a strain of 1 of a linear elastic specimen with a shear modulus of 1 Pa."""
-    if recording.mode == "torsion":
-        # T = mu (angle / height) pi R^4 / 2
-        return 0.5 * np.pi * _radius(specimen) ** 3
     moduli = {
         "axial": 2.0 * (1.0 + nu),
         "shear": 1.0,
+        # the shear grows from the axis to the rim
+        "torsion": 0.75,
         "confined": 2.0 * (1.0 - nu) / (1.0 - 2.0 * nu),
         "biaxial": 2.0 * (1.0 + nu) / (1.0 - nu),
     }
-    return moduli[recording.mode] * (_area(specimen) if recording.quantities[1] == "force" else 1.0)
-
-
-def _area(specimen: Specimen) -> float:
-    x, y, _ = specimen.size
-    return float(np.pi * (0.5 * x) ** 2 if specimen.shape == "cylinder" else x * y)
-
-
-def _radius(specimen: Specimen) -> float:
-    """Of the cross-section, or of a round one with its area."""
-    return float(np.sqrt(_area(specimen) / np.pi))
+    return moduli[recording.mode] / specimen.stress_unit(recording.quantities[1])

@@ -7,8 +7,9 @@ import re
 from warpbrain.cases.case import Tissue
 from warpbrain.cases.case_template import DENSITY
 from warpbrain.cases.format.reading import Context, Reading
-from warpbrain.cases.format.tables import BODY, PRIOR, PRIOR_GROUPS, TISSUE
+from warpbrain.cases.format.tables import BODY, PRIOR, TISSUE
 from warpbrain.errors import InputError
+from warpbrain.gp.literature.study import GROUPS
 from warpbrain.keys import short
 from warpbrain.physics.laws import LAWS, Law
 
@@ -81,7 +82,7 @@ def _law(table: Reading) -> tuple[Law | None, bool]:
         for key in others:
             table.problem(key, f'means nothing with mu = "{PRIOR}", which gives the whole law')
         if not table.has("prior"):
-            table.problem("prior", f'missing, but mu = "{PRIOR}" needs it', f"one of {', '.join(PRIOR_GROUPS)}")
+            table.problem("prior", f'missing, but mu = "{PRIOR}" needs it', f"one of {', '.join(GROUPS)}")
             return None, False
         return None, not others
     missing = [key for key in law.keys if not table.has(key)]

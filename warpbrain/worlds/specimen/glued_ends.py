@@ -14,11 +14,12 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
+from warpbrain.cases.specimen import REST
 from warpbrain.errors import SolveError
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.specimen import HOMOGENEOUS, Rig, specimen_of
 from warpbrain.worlds.specimen.material import HomogeneousMaterial, NoStateError
-from warpbrain.worlds.specimen.protocol import REST, Protocol, radius_of, strain_of, stress_unit
+from warpbrain.worlds.specimen.protocol import Protocol
 
 #: Steps of the rig to the farther extreme; the largest strain it is asked for, of a stretch and of a shear.
 _STEPS, _STRETCH, _SHEAR = 4, 0.6, 0.8
@@ -64,18 +65,18 @@ class GluedEnds:
             recording = self._recording(mode, np.array([rest + shrink * low, rest + shrink * high]))
             try:
                 simulated = self._rig(material).run(recording, _STEPS)
-                strain = strain_of(self._specimen, mode, recording.quantities[0], simulated.imposed)
+                strain = self._specimen.strain_of(mode, recording.quantities[0], simulated.imposed)
                 moved = np.abs(strain - rest) > 0.05 * max(-low, high)
                 homogeneous = elastic.stress(mode, strain[moved], None)
             except (SolveError, NoStateError):
                 continue
-            unit = stress_unit(self._specimen, recording)
+            unit = self._specimen.stress_unit(recording.quantities[1])
             return strain[moved], unit * simulated.response[moved] / homogeneous
         return none
 
     def _recording(self, mode: str, strain: Floats) -> TestRecording:
         height = self._specimen.size[2]
-        to_imposed = {"axial": 1.0, "shear": height, "torsion": height / radius_of(self._specimen)}[mode]
+        to_imposed = {"axial": 1.0, "shear": height, "torsion": height / self._specimen.radius}[mode]
         return TestRecording(
             name=mode, file="", mode=mode, quantities=_QUANTITIES[mode], imposed=to_imposed * strain,
             response=np.zeros(len(strain)),

@@ -28,7 +28,7 @@ from functools import cached_property
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.cases.specimen import Specimen
+from warpbrain.cases.specimen import REST, Specimen
 from warpbrain.inference.beliefs import belief
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.simulation.history import corners_of, history_of
@@ -36,8 +36,6 @@ from warpbrain.simulation.history import corners_of, history_of
 #: Steps from rest to the largest imposed value, rows of a test without times, and the part of a test's duration that
 #: the first step of a rest takes: how rows are chosen.
 _STEPS, _ROWS, _FIRST = 4, 60, 0.005
-#: Strain at rest, of each mode.
-REST = {"axial": 1.0, "shear": 0.0, "torsion": 0.0, "confined": 1.0, "biaxial": 1.0}
 #: Patterns of a test at most, the smoothest.
 _PATTERNS = 8
 
@@ -189,8 +187,8 @@ def _goes_on(before: Test, after: Test) -> bool:
 
 def _test(specimen: Specimen, recording: TestRecording) -> Test:
     """A recording in stress and strain."""
-    unit = stress_unit(specimen, recording)
-    strain = strain_of(specimen, recording.mode, recording.quantities[0], recording.imposed)
+    unit = specimen.stress_unit(recording.quantities[1])
+    strain = specimen.strain_of(recording.mode, recording.quantities[0], recording.imposed)
     stress, rows = unit * recording.response, np.arange(len(strain))
     reach = max(float(np.abs(strain - REST[recording.mode]).max()), 1e-12)
     test = Test(
@@ -211,35 +209,18 @@ def _reading(specimen: Specimen, recording: TestRecording, strain: Floats, stres
     the stress at a strain is compared, whatever the machine imposed.
     """
     if not recording.force_controlled:
-        return _roughness(stress) if recording.sigma is None else stress_unit(specimen, recording) * recording.sigma
+        return (
+            _roughness(stress)
+            if recording.sigma is None
+            else specimen.stress_unit(recording.quantities[1]) * recording.sigma
+        )
     away = float(np.abs(strain - REST[recording.mode]).max())
     stiffness = float(np.abs(stress).max()) / max(away, 1e-12)
     if recording.sigma is None:
         return stiffness * _roughness(strain)
     # strains are linear in what was read
-    zero, deviation = strain_of(specimen, recording.mode, recording.quantities[0], np.array([0.0, recording.sigma]))
+    zero, deviation = specimen.strain_of(recording.mode, recording.quantities[0], np.array([0.0, recording.sigma]))
     return stiffness * abs(float(deviation - zero))
-
-
-def strain_of(specimen: Specimen, mode: str, quantity: str, imposed: Floats) -> Floats:
-    """Stretch or shear of what was imposed."""
-    height = specimen.size[2]
-    if REST[mode] == 1.0:
-        return imposed if quantity == "stretch" else 1.0 + imposed / height
-    return imposed / height if mode == "shear" else imposed * radius_of(specimen) / height
-
-
-def stress_unit(specimen: Specimen, recording: TestRecording) -> float:
-    """Nominal stress [Pa] of one unit of the recording's response."""
-    radius = radius_of(specimen)
-    of_one = {"stress": 1.0, "force": 1.0 / (np.pi * radius**2), "torque": 1.0 / (2.0 / 3.0 * np.pi * radius**3)}
-    return of_one[recording.quantities[1]]
-
-
-def radius_of(specimen: Specimen) -> float:
-    """Radius [m] of the circle that is as large as an end."""
-    x, y, _ = specimen.size
-    return 0.5 * x if specimen.shape == "cylinder" else float(np.sqrt(x * y / np.pi))
 
 
 def _roughness(values: Floats) -> float:

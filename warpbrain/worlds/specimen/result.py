@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.cases.specimen import REST
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import percent
 from warpbrain.inference.causes import Kind
@@ -19,7 +20,7 @@ from warpbrain.physics.words import Measurement, Smallest, Value, pascals
 from warpbrain.simulation.specimen import specimen_of
 from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.glued_ends import ELEMENTS
-from warpbrain.worlds.specimen.protocol import REST, Protocol, Test, noise_factor
+from warpbrain.worlds.specimen.protocol import Protocol, Test, noise_factor
 from warpbrain.worlds.specimen.search import Linear
 from warpbrain.worlds.verdict import Verdict, Words, clause, grounds, verdict_in_words
 
