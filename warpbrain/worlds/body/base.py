@@ -212,7 +212,7 @@ class _LinearModel:
     def __init__(self, finder: BaseFinder, state: SolvedState, errors: MeshErrors | None) -> None:
         sensors, states = state.sensors, finder.states
         self.at = state.linearised()
-        self.effects = Effects(self.at, SolvedSwitches(states, state, {}), errors)
+        self.effects = Effects(self.at, SolvedSwitches(states, state), errors)
         # first, since it makes the compliance, with which nuisances are products instead of equilibria
         self.lengths = (finder._spacing * beliefs("unknown.lengths")).tolist()
         self.body_forces = body_forces(self.at, self.lengths)

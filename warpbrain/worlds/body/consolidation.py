@@ -23,7 +23,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import Following
-from warpbrain.physics.term import Coupling, Term
+from warpbrain.physics.term import Term
 from warpbrain.simulation.sparse_factors import SparseFactors
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -112,7 +112,12 @@ def _matrices(at: Linearisation, term: Term) -> tuple[Floats, Any, Any, Any]:
     term.advance(system.u)
     content = coupling.content.numpy().astype(np.float64)
     # the flow is in proportion to the time step
-    steps = [_compliance(term, coupling, h) for h in (1.0, 2.0)]
+    steps = []
+    for h in (1.0, 2.0):
+        term.set_time_step(h)
+        values = coupling.compliance.numpy().astype(np.float64)
+        graph = coupling.columns.numpy(), coupling.offsets.numpy()
+        steps.append(csr_matrix((values, *graph), shape=(len(content), len(content))))
     H = steps[1] - steps[0]
     open_rows = np.flatnonzero(H.diagonal() > 0.0)
     term.evaluate_tangents(system.u)
@@ -123,12 +128,3 @@ def _matrices(at: Linearisation, term: Term) -> tuple[Floats, Any, Any, Any]:
     square = np.ix_(open_rows, open_rows)
     N = (2.0 * steps[0] - steps[1])[square]
     return content[open_rows], B[open_rows], N, H[square].tocsc()
-
-
-def _compliance(term: Term, coupling: Coupling, step: float) -> Any:
-    from scipy.sparse import csr_matrix
-
-    term.set_time_step(step)
-    size = len(coupling.content)
-    values = coupling.compliance.numpy().astype(np.float64)
-    return csr_matrix((values, coupling.columns.numpy(), coupling.offsets.numpy()), shape=(size, size))

@@ -243,14 +243,11 @@ def candidates_about_fit(
         if kind in acting_kinds:
             continue
         of_this_kind = list(at_base)
-        smooth = [k for k in places[kind].tolist() if _is_smooth(of_this_kind[k])]
+        # of which columns are derivatives at one state
+        tried = ((k, of_this_kind[k]) for k in places[kind].tolist())
+        smooth = [k for k, e in tried if e.proposal and not e.proposal.is_there_or_not and e.columns_at is None]
         for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
             if is_linear(effect, effects.at):
                 of_this_kind[k] = effect
         by_kind[kind] = tuple(of_this_kind)
     return replace(candidates, effects=by_kind, source=effects)
-
-
-def _is_smooth(effect: Effect) -> bool:
-    """Whether its columns are derivatives at one state: it is a mechanism, no switch, and no course in time."""
-    return effect.proposal is not None and not effect.proposal.is_there_or_not and effect.columns_at is None

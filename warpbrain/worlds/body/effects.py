@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, cast
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
@@ -33,45 +33,30 @@ _PUSHING: frozenset[type] = frozenset((Load, Following, Substituting))
 _ACTING = _PUSHING | {Weakening, Growing}
 
 
-class SparseColumns:
-    """Columns of one length, such as the forces of thousands of patches, collected; those that are zero are left out.
+def sparse_columns(size: int, columns: Iterable[tuple[int, Floats]]) -> tuple[list[int], Any]:
+    """Numbers (k,) of those columns (size,) that are not zero, and these as SciPy CSC (size, k)."""
+    from scipy.sparse import csc_matrix
 
-    `size`: rows. `numbers`: under which those that are not zero were added.
-    """
-
-    def __init__(self, size: int) -> None:
-        self.numbers: list[int] = []
-        self._size = size
-        self._rows: list[Ints] = []
-        self._values: list[Floats] = []
-
-    def add(self, number: int, column: Floats) -> None:
-        """Add a column (size,)."""
+    numbers: list[int] = []
+    rows, values = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+    for number, column in columns:
         # `flatnonzero` of booleans is eight times as fast as of numbers
-        rows = np.flatnonzero(column != 0.0)
-        if len(rows):
-            self.numbers.append(number)
-            self._rows.append(rows)
-            self._values.append(column[rows])
-
-    def matrix(self) -> Any:
-        """Those that are not zero: SciPy CSC (size, k), in the order of `numbers`."""
-        from scipy.sparse import csc_matrix
-
-        first = np.cumsum([0, *(len(rows) for rows in self._rows)])
-        shape = self._size, len(self.numbers)
-        return csc_matrix((np.concatenate(self._values), np.concatenate(self._rows), first), shape)
+        rows.append(np.flatnonzero(column != 0.0))
+        values.append(column[rows[-1]])
+        numbers += [number] * bool(len(rows[-1]))
+    ends = np.unique(np.cumsum([len(each) for each in rows]))
+    return numbers, csc_matrix((np.concatenate(values), np.concatenate(rows), ends), (size, len(numbers)))
 
 
 class SolvedSwitches:
     """Effects of switches, such as contact, that have no derivative: states with each are solved, and kept.
 
-    `state`: without the mechanisms. `solved_states`: states that were solved already, by the mechanism; further ones
-    are added.
+    `state`: without the mechanisms.
     """
 
-    def __init__(self, states: States, state: SolvedState, solved_states: dict[str, SolvedState]) -> None:
-        self._states, self._state, self._solved_states = states, state, solved_states
+    def __init__(self, states: States, state: SolvedState) -> None:
+        self._states, self._state = states, state
+        self._solved_states: dict[str, SolvedState] = {}
 
     def effect_of(self, mechanism: Mechanism, sensors: Sensors, instant: int) -> Floats:
         """What sensors (n,) record in the state with a mechanism, less that without it, at the time of a number."""
@@ -263,22 +248,20 @@ class Effects:
         mesh = system.model.mesh
         present_stiffness = present.stiffness_factor(mesh, 1.0) if isinstance(present, Weakening) else 1.0
         present_volume = 1.0 + present.growth(mesh, 1.0) if isinstance(present, Growing) else 1.0
-        forces = SparseColumns(3 * system.size)
-        stiffness, growth = SparseColumns(system.elements), SparseColumns(system.elements)
-        for number, mechanism in enumerate(mechanisms):
-            factor, faces = mechanism.factor(), _faces(mechanism.__class__)
-            if not faces.isdisjoint(_PUSHING):
-                forces.add(number, self._forces(mechanism, faces).ravel())
-            if Weakening in faces:
-                stiffness.add(number, mechanism.stiffness_factor(mesh, factor) / present_stiffness - 1.0)
-            if Growing in faces:
-                growth.add(number, (1.0 + mechanism.growth(mesh, factor)) / present_volume - 1.0)
+        each = [(number, m, _faces(m.__class__)) for number, m in enumerate(mechanisms)]
+        forces = ((k, self._forces(m, faces).ravel()) for k, m, faces in each if not faces.isdisjoint(_PUSHING))
+        stiffness = (
+            (k, m.stiffness_factor(mesh, m.factor()) / present_stiffness - 1.0) for k, m, f in each if Weakening in f
+        )
+        growth = ((k, (1.0 + m.growth(mesh, m.factor())) / present_volume - 1.0) for k, m, f in each if Growing in f)
         total = np.zeros((len(at.sensors), len(mechanisms)))
-        if forces.numbers:
-            total[:, forces.numbers] += at.answers_of_columns(forces.matrix())
-        for weights, forces_of in ((stiffness, "element_forces"), (growth, "growth_forces")):
-            if weights.numbers:
-                total[:, weights.numbers] += at.answers_of_elements(getattr(at, forces_of), weights.matrix())
+        pushing, matrix = sparse_columns(3 * system.size, forces)
+        if pushing:
+            total[:, pushing] += at.answers_of_columns(matrix)
+        for columns, forces_of in ((stiffness, "element_forces"), (growth, "growth_forces")):
+            numbers, weights = sparse_columns(system.elements, columns)
+            if numbers:
+                total[:, numbers] += at.answers_of_elements(getattr(at, forces_of), weights)
         if self.mesh_errors is not None and (volumes := self._volumes(mechanisms)).any():
             total += expected_answer(at.sensors, self.mesh_errors.by_volume)[:, None] * volumes
         return total

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -160,10 +161,10 @@ def law_columns(effects: Effects, states: States) -> Floats:
     """What another Poisson ratio, exponent, share of the second invariant and stiffening change: (n, 4)."""
     proposals = [
         *(_always(states, key) for key in _ALWAYS),
-        Proposal.of_one(
-            lambda share: _SecondInvariant(share=share), 0.5, belief("tissue.second_invariant"), "smooth", 0.5
+        *(
+            Proposal.of_one(partial(_with_share, of=of), 0.5, belief(f"tissue.{of}"), "smooth", 0.5)
+            for of in ("second_invariant", "stiffening")
         ),
-        Proposal.of_one(lambda share: _Stiffening(share=share), 0.5, belief("tissue.stiffening"), "smooth", 0.5),
     ]
     return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
 
@@ -207,33 +208,26 @@ def mesh_by_tissue(sensors: Sensors, mesh_errors: MeshErrors | None) -> Floats:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _SecondInvariant(Mechanism):
-    """A law with a share of the second invariant."""
+class _Share(Mechanism):
+    """A law with a share of the second invariant, or of one that stiffens alike in compression and in tension."""
 
     share: float
-    kind: ClassVar[str] = "second invariant"
-    sentence: ClassVar[str] = "The law has a share of the second invariant."
+    of: str
+    kind: ClassVar[str] = "shape of the law"
+    sentence: ClassVar[str] = "The law has another shape."
 
     def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
-        """See `warpbrain.physics.mechanism.Substituting`."""
-        mu = law.shear_modulus
-        return MooneyRivlin(0.5 * mu * (1.0 - self.share), 0.5 * mu * self.share), poisson, formulation
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Stiffening(Mechanism):
-    """A law with a share of one that stiffens alike in compression and in tension."""
-
-    share: float
-    kind: ClassVar[str] = "stiffening"
-    sentence: ClassVar[str] = "The law stiffens with strain."
-
-    def substitute(self, label: int, law: Law, poisson: float, formulation: str) -> tuple[Law, float, str]:
-        """See `warpbrain.physics.mechanism.Substituting`; Ogden's law of three terms."""
-        exponents = (NEO_HOOKEAN, _STIFFENS, -_STIFFENS)
-        shares = (1.0 - self.share, 0.5 * self.share, 0.5 * self.share)
-        moduli = tuple(2.0 * law.shear_modulus * part / alpha for part, alpha in zip(shares, exponents, strict=True))
+        """See `warpbrain.physics.mechanism.Substituting`; what stiffens is Ogden's law of three terms."""
+        mu, share = law.shear_modulus, self.share
+        if self.of == "second_invariant":
+            return MooneyRivlin(0.5 * mu * (1.0 - share), 0.5 * mu * share), poisson, formulation
+        exponents, shares = (NEO_HOOKEAN, _STIFFENS, -_STIFFENS), (1.0 - share, 0.5 * share, 0.5 * share)
+        moduli = tuple(2.0 * mu * part / alpha for part, alpha in zip(shares, exponents, strict=True))
         return Ogden(moduli, exponents), poisson, formulation
+
+
+def _with_share(share: float, of: str) -> _Share:
+    return _Share(share=share, of=of)
 
 
 def _known_loads(at: Linearisation) -> Floats:

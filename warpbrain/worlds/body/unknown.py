@@ -15,7 +15,7 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference.beliefs import belief
-from warpbrain.mesh import node_areas, node_vectors
+from warpbrain.mesh import node_areas, node_vectors, nodes_of
 from warpbrain.physics.words import number
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -57,20 +57,16 @@ def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ..
 
 
 def tractions(at: Linearisation, length: float) -> Floats:
-    """Columns (n, k) of a traction of a length [m] on all that is free of the surface; (n, 0) if nothing is."""
+    """Columns (n, k) of a traction of a length [m] on all that is free of the surface, which is not nothing."""
     mesh, free = at.system.model.mesh, _free_of_surface(at)
-    if not free.any():
-        return np.zeros((len(at.sensors), 0))
     shares = np.where(free, node_areas(mesh.points, mesh.boundary), 0.0)
     _, answers = _patches(at, mesh.points[free], shares, length, None)
     return _visible_modes(answers.reshape(len(answers), -1), at.sensors.is_displacement)
 
 
 def pressures(at: Linearisation, length: float) -> Floats:
-    """Columns (n, k) of a pressure of a length [m] on what is free of the deformed surface; (n, 0) if nothing is."""
+    """Columns (n, k) of a pressure of a length [m] on what is free of the deformed surface, which is not nothing."""
     mesh, free = at.system.model.mesh, _free_of_surface(at)
-    if not free.any():
-        return np.zeros((len(at.sensors), 0))
     _, weights = _weights(at, mesh.points[free], free.astype(np.float64), length)
     # each corner of a face bears a third of its load
     of_unit_pressure = node_vectors(mesh.points + at.u, mesh.boundary) / 3.0
@@ -81,8 +77,7 @@ def pressures(at: Linearisation, length: float) -> Floats:
 def _free_of_surface(at: Linearisation) -> Bools:
     """Nodes (N,) on the surface that are not held."""
     model = at.system.model
-    on_surface = np.zeros(len(model.mesh.points), dtype=bool)
-    on_surface[model.mesh.boundary] = True
+    on_surface = nodes_of(model.mesh.boundary, len(model.mesh.points))
     return np.asarray(on_surface & ~model.constrained.reshape(-1, 3).all(axis=1))
 
 
@@ -158,7 +153,7 @@ def stress_beside_held(at: Linearisation, length: float) -> Floats:
     # two lengths away a patch has an eighth of its stress
     columns = _stress_patches(at, sites[cKDTree(held).query(sites)[0] < 2.0 * length], length)
     rows = at.sensors.is_displacement
-    size = float(np.sqrt(np.mean(np.sum(columns[rows] ** 2, axis=1)))) if rows.any() and columns.size else 0.0
+    size = _root_mean_square(columns[rows]) if rows.any() and columns.size else 0.0
     return columns / size if size > 0.0 else np.zeros((len(at.sensors), 0))
 
 
@@ -196,8 +191,9 @@ def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]
         size = f"{number(1e3 * length)} mm"
         columns_by_name[f"body force, {size}"] = columns
         columns_by_name[f"eigenstress, {size}"] = eigenstresses(at, length)
-        columns_by_name[f"traction, {size}"] = tractions(at, length)
-        columns_by_name[f"pressure, {size}"] = pressures(at, length)
+        if _free_of_surface(at).any():
+            columns_by_name[f"traction, {size}"] = tractions(at, length)
+            columns_by_name[f"pressure, {size}"] = pressures(at, length)
     return {name: columns for name, columns in columns_by_name.items() if columns.shape[1]}
 
 
