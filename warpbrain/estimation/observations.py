@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import operator
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
@@ -212,6 +211,8 @@ class Observations:
         What was recorded was moved by a rigid motion (6,), see `registration`, about a centre (3,) [m]: by nothing, and
         about that of these recordings, unless given.
         """
+        from scipy.sparse import vstack
+
         about = self.centre if centre is None else centre
         by = np.zeros(6) if motion is None else motion
         # the state from which is counted, -1, is zero
@@ -222,27 +223,9 @@ class Observations:
             for seen in self.recordings
         ]
         residual, rigid = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-        by_u, by_R = (self._one_below_the_other([part[k] for part in parts]) for k in (2, 3))
+        by_u, by_R = (vstack([part[k] for part in parts], format="csr") for k in (2, 3))
         rows = Sensors(residual, residual, by_u, by_R, rigid, directions=rigid[:, :3].copy(), **self._rows)
         return replace(rows, computed=rows.answers_in_time(u[None], reactions[None])[:, 0])
-
-    def _one_below_the_other(self, matrices: list[Any]) -> Any:
-        """All as one (SciPy CSR), made once of those of points and forces, which are the same at every state."""
-        from scipy.sparse import vstack
-
-        if len(matrices) == 1:
-            return matrices[0]
-        for made_of, stacked in self._stacked:
-            if all(map(operator.is_, made_of, matrices)):
-                return stacked
-        stacked = vstack(matrices).tocsr()
-        self._stacked.append((matrices, stacked))
-        return stacked
-
-    @cached_property
-    def _stacked(self) -> deque[tuple[list[Any], Any]]:
-        """The last that were made, and of what: those of displacement and of reactions."""
-        return deque(maxlen=2)
 
     @cached_property
     def _rows(self) -> dict[str, Any]:
