@@ -26,6 +26,7 @@ from warpbrain.diagnosis.checking import HeldOut
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.estimation.registration import moved_back, registration_of
+from warpbrain.inference.predict import predict
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.recording import PointsRecording
 from warpbrain.worlds.body.effects import width_of
@@ -94,7 +95,7 @@ def diagnosed(name: str) -> dict[str, Any]:
     left_out = HeldOut(found.base.at.sensors, local=True)
     # a landmark is a block: each from all others
     assert np.array_equal(np.unique(left_out.blocks), np.arange(len(points)))
-    prediction = left_out.predict(best.marginal.model, best.residual)
+    prediction = predict(best.marginal.model, best.residual, left_out.blocks)
     squared = np.bincount(left_out.blocks, weights=prediction.errors**2)
     by_rigid = left_out_by_rigid(points, moved)
     worse = 1e6 * (squared - by_rigid**2)

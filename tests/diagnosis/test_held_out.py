@@ -44,7 +44,7 @@ def test_a_block_is_as_probable_as_a_normal_distribution_says() -> None:
     rng = np.random.default_rng(1)
     given, residual = model(rng.normal(size=(N, 4))), rng.normal(size=N)
     blocks = blocks_of(sensors(), False)
-    found = HeldOut(sensors(), False).predict(given, residual)
+    found = predict(given, residual, blocks)
     S = given.covariance
     for number, block in enumerate(np.unique(blocks)):
         own, rest = blocks == block, blocks != block
@@ -69,7 +69,7 @@ def test_patterns_that_mean_nothing_do_not_predict() -> None:
     truth, given = rng.normal(size=(N, 1)), model(np.zeros((N, 0)))
     residual = 5.0 * truth[:, 0] + given.noise_factor @ rng.normal(size=N)
     way = HeldOut(sensors(), True)
-    own = way.predict(given.with_columns(5.0 * truth), residual)
+    own = predict(given.with_columns(5.0 * truth), residual, way.blocks)
     patterns = way.with_patterns(given, residual, rng.normal(size=(N, 8)), 1, 2, rng)
     assert p_value(own.log_density, [pattern.log_density for pattern in patterns]) < 0.02
     assert min(way.error(pattern) for pattern in patterns) > way.error(own)

@@ -73,24 +73,14 @@ def distance(sensors: Sensors, errors: Floats) -> float:
 
 
 class HeldOut:
-    """Predicts the rows of one case. `local`: whether all that acts is local."""
+    """Blocks of the rows of one case, each predicted from the others. `local`: whether all that acts is local."""
 
     def __init__(self, sensors: Sensors, local: bool) -> None:
         self.sensors, self.blocks = sensors, blocks_of(sensors, local)
 
-    def predict(self, model: GaussianModel, residual: Floats) -> Prediction:
-        """Predict every block from the others."""
-        return predict(model, residual, self.blocks)
-
     def error(self, prediction: Prediction) -> float:
         """Root mean square [m]."""
         return distance(self.sensors, prediction.errors)
-
-    def improvement(
-        self, prediction: Prediction, over: Prediction, random: np.random.Generator
-    ) -> tuple[float, float, float]:
-        """Part of another prediction's error that is removed, and its 95 % interval."""
-        return prediction.improvement(over, self.sensors.is_displacement, random)
 
     def with_patterns(
         self,
@@ -178,7 +168,7 @@ class Confirming:
 
     def predict(self, weighted_set: WeightedSet, held_out: HeldOut) -> Prediction:
         """Held-out rows predicted with a set."""
-        return held_out.predict(weighted_set.marginal.model, weighted_set.residual)
+        return predict(weighted_set.marginal.model, weighted_set.residual, held_out.blocks)
 
     def confirmations(self, weighted_set: WeightedSet) -> tuple[Confirmation, ...]:
         """Of each mechanism of a set, given those that explain more.
@@ -212,7 +202,7 @@ class Confirming:
             name,
             weighted_set.hypothesis.log_evidence - others.hypothesis.log_evidence,
             full.gain(reduced),
-            held_out.improvement(full, reduced, self._random),
+            full.improvement(reduced, held_out.sensors.is_displacement, self._random),
             p_value(full.log_density, [pattern.log_density for pattern in patterns]),
         )
 
@@ -237,7 +227,8 @@ class Confirming:
         patterns = self._patterns(nothing, held_out, width_of(weighted_set.effects), weighted_set.mechanisms)
         low, high = np.quantile([held_out.error(pattern) for pattern in patterns], [0.05, 0.95]).tolist()
         without, explained = self.predict(nothing, held_out), self.predict(weighted_set, held_out)
-        return (low, high), held_out.improvement(explained, without, self._random)
+        lengths = held_out.sensors.is_displacement
+        return (low, high), explained.improvement(without, lengths, self._random)
 
     def ceiling(self, nothing: WeightedSet, held_out: HeldOut) -> float:
         """Least held-out error [m] with an unknown field of any size."""

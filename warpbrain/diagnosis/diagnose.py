@@ -9,7 +9,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
 from warpbrain.diagnosis.checking import Confirming, check_errors, distance
-from warpbrain.diagnosis.locating import ScoreMap, Traits, map_of_search, traits_of
+from warpbrain.diagnosis.locating import map_of_search, traits_of
 from warpbrain.diagnosis.measuring import imitations, next_measurements, smallest
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time
 from warpbrain.diagnosis.ranking import Ranking, about_base
@@ -130,7 +130,9 @@ class Diagnosing:
             ranked = ranking.all()
         with self.seconds.of("where"):
             where = map_of_search(search, options.draws, random, options.alpha)
-            unknown = self._traits(checked.decision, search, best, where)
+            unknown, base, model = None, search.base, best.marginal.model
+            if checked.decision.verdict in (UNKNOWN, NAMED_AND_REST):
+                unknown = traits_of(base.at, model, best.residual, base.typical_noise, search.spacing, where.centre)
         with self.seconds.of("what would be seen"):
             confusion = imitations(search.causes, nothing.marginal.model)
             seen = smallest(search.causes, nothing.marginal.model, confusion)
@@ -173,7 +175,10 @@ class Diagnosing:
             return _Checked(claimed, (), nothing, (), None)
         best = search.fitted_with(frozenset(claimed.causes))
         if best is None:
-            return _not_fitted(search, claimed.causes)
+            # no verdict on causes that cannot be simulated at the size that the data ask for
+            failure = search.failure_with(frozenset(claimed.causes))
+            doubt = f"{' and '.join(claimed.causes)}, as large as it is seen, could not be simulated: {failure}"
+            return _Checked(Decision(CANNOT_SAY, claimed.causes), (doubt,), nothing, (), None)
         confirmations, p_left = confirming.confirmations(best), confirming.p_left(best)
         decision, doubts = after_checks(claimed, confirmations, p_left, alpha)
         if decision.verdict not in (NAMED, NAMED_AND_REST):
@@ -185,14 +190,6 @@ class Diagnosing:
                 return _Checked(Decision(CANNOT_SAY, claimed.causes), doubts, nothing, confirmations, p_left)
             p_left = confirming.p_left(best)
         return _Checked(decision, doubts, best, confirmations, p_left)
-
-    @staticmethod
-    def _traits(decision: Decision, search: HypothesisSearch, best: WeightedSet, where: ScoreMap) -> Traits | None:
-        """Of an unknown force, alone or in addition to what is named."""
-        if decision.verdict not in (UNKNOWN, NAMED_AND_REST):
-            return None
-        base, model = search.base, best.marginal.model
-        return traits_of(base.at, model, best.residual, base.typical_noise, search.spacing, where.centre)
 
     def _explained(self, search: HypothesisSearch, best: WeightedSet, named: tuple[str, ...]) -> Case | None:
         if not named:
@@ -271,13 +268,6 @@ def _decided(search: HypothesisSearch) -> Decision:
     """The verdict of least expected loss."""
     hypotheses = [weighted_set.hypothesis for weighted_set in search.weighted_sets]
     return decide(hypotheses, search.probabilities, calibration().losses)[0]
-
-
-def _not_fitted(search: HypothesisSearch, causes: tuple[str, ...]) -> _Checked:
-    """No verdict on causes that cannot be simulated at the size that the data ask for."""
-    failure = search.failure_with(frozenset(causes))
-    doubt = f"{' and '.join(causes)}, as large as it is seen, could not be simulated: {failure}"
-    return _Checked(Decision(CANNOT_SAY, causes), (doubt,), search.nothing, (), None)
 
 
 def _combinations(search: HypothesisSearch) -> tuple[Combination, ...]:

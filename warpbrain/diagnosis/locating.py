@@ -120,7 +120,8 @@ def score_map(
     `draws`: of rows if no cause acts, the same in any axes and order of rows (`FieldFactors.drawn`).
     `length`, `spacing`: of patches and between them [m].
     """
-    from scipy.special import chdtrc, chdtri
+    from scipy.optimize import brentq
+    from scipy.special import chdtrc, chdtri, chndtr
 
     sites, answers = force_patches(at, length, spacing)
     columns = model.standardised(answers.reshape(len(answers), -1)).reshape(answers.shape)
@@ -141,7 +142,8 @@ def score_map(
     largest = scores(axes @ random.normal(size=(len(axes), draws))).max(axis=0)
     threshold = float(np.quantile(largest, 1.0 - alpha))
     # the noncentrality at which one place exceeds the threshold for all with the power that is asked for
-    needed = _noncentrality(threshold)
+    missed = 1.0 - belief("checks.power")
+    needed = brentq(lambda c: chndtr(threshold, 3, c) - missed, 1e-6, 10.0 * threshold + 100.0)
     weakest = np.linalg.eigvalsh(information)[:, 0]
     return ScoreMap(
         sites,
@@ -152,15 +154,6 @@ def score_map(
         float(chdtrc(3, observed.max())),
         np.sqrt(needed / np.maximum(weakest, 1e-300)),
         observed.max() - observed <= float(chdtri(3, 0.05)),
-    )
-
-
-def _noncentrality(threshold: float) -> float:
-    from scipy.optimize import brentq
-    from scipy.special import chndtr
-
-    return float(
-        brentq(lambda c: 1.0 - chndtr(threshold, 3, c) - belief("checks.power"), 1e-6, 10.0 * threshold + 100.0)
     )
 
 
@@ -206,7 +199,7 @@ def traits_of(
     A = answers.reshape(len(answers), -1)
     rows = at.sensors.is_displacement
     unit = noise / np.sqrt(np.mean(np.sum(A[rows] ** 2, axis=1)))
-    functionals = unit * np.concatenate([_summed(sites), _turned(sites - centre)])
+    functionals = unit * _summed(sites, centre)
     covariance = model.scale**2 * (model.noise_factor @ model.noise_factor.T) + model.columns @ model.columns.T
     resultant = partial(_Resultant.of, unit * A, functionals, covariance, residual)
     plain, with_hiding = resultant(None), resultant(noise * stress_beside_held(at, length))
@@ -268,17 +261,11 @@ class _Resultant:
         return square > float(chdtri(3, 1.0 - belief("checks.sure")))
 
 
-def _summed(sites: Floats) -> Floats:
-    """Net force (3, 3 s) of forces at sites."""
-    return np.tile(np.eye(3), len(sites))
-
-
-def _turned(arms: Floats) -> Floats:
-    """Net moment (3, 3 s) of forces at arms (s, 3)."""
-    x, y, z = arms.T
-    zero = np.zeros_like(x)
-    rows = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
-    return np.asarray(rows.transpose(0, 2, 1).reshape(3, -1))
+def _summed(sites: Floats, centre: Floats) -> Floats:
+    """Net force and net moment about a centre (6, 3 s) of forces at sites (s, 3)."""
+    # the columns of a cross product with the arm
+    moments = np.cross((sites - centre)[:, None], np.eye(3))
+    return np.concatenate([np.tile(np.eye(3), len(sites)), moments.reshape(-1, 3).T])
 
 
 def _surface_nats(

@@ -19,7 +19,7 @@ from warpbrain.arrays import Floats
 from warpbrain.diagnosis.result import Confusion
 from warpbrain.inference import Cause, GaussianModel, Kind
 from warpbrain.inference.beliefs import belief
-from warpbrain.inference.calibration import Calibration, calibration
+from warpbrain.inference.calibration import calibration
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import Measurement, Smallest
 from warpbrain.worlds.body.base import Base
@@ -57,7 +57,9 @@ def imitations(causes: BodyCauses, model: GaussianModel) -> Confusion:
 
 def smallest(causes: BodyCauses, model: GaussianModel, confusion: Confusion) -> dict[str, Smallest]:
     """Of each mechanism, the size that is detected nearly always, and that which is expected to be named."""
-    seen, needed = belief("checks.seen"), _log_odds(calibration())
+    seen, losses = belief("checks.seen"), calibration().losses
+    # difference of log evidence from which a name has a lower expected loss than no name
+    needed = calibration().temperature * math.log(losses["false name"] / losses["cannot say"] - 1.0)
     sizes = {}
     for name, others in confusion.rows.items():
         cause = causes.named(name)
@@ -68,12 +70,6 @@ def smallest(causes: BodyCauses, model: GaussianModel, confusion: Confusion) -> 
         named = math.sqrt(2.0 * needed / (1.0 - imitated)) if imitated < 1.0 - 1e-9 else math.inf
         sizes[name] = smallest_of(causes.effects[name][place], length, seen, max(seen, named))
     return sizes
-
-
-def _log_odds(calibrated: Calibration) -> float:
-    """Difference of log evidence from which a name has a lower expected loss than no name."""
-    odds = calibrated.losses["false name"] / calibrated.losses["cannot say"] - 1.0
-    return calibrated.temperature * math.log(odds)
 
 
 def _pattern(cause: Cause, place: int) -> Floats:

@@ -147,7 +147,8 @@ def size_over_time(effect: Effect, z: Floats, covariance: Floats) -> SizeOverTim
     values, unit = numbers[name]
     spread, along = np.linalg.eigh(covariance)
     factor = along * np.sqrt(np.maximum(spread, 0.0))
-    changes = [(_values(varying, effect.coefficients(z + 0.1 * column), name) - values) / 0.1 for column in factor.T]
+    shifted = (_numbers(varying, effect.coefficients(z + 0.1 * column))[name][0] for column in factor.T)
+    changes = [(moved - values) / 0.1 for moved in shifted]
     says = varying.base.make(varying.base.mean).parameters()[name.removesuffix("_size")].doc
     return SizeOverTime(
         name,
@@ -164,7 +165,3 @@ def _numbers(varying: Varying, c: Floats) -> dict[str, tuple[Floats, str]]:
     by_time = [mechanism_numbers(varying.base.make(varying.at(c, time))) for time in varying.times.tolist()]
     names = [name for name in by_time[0] if name != "share" and all(name in numbers for numbers in by_time)]
     return {name: (np.array([numbers[name][0] for numbers in by_time]), by_time[0][name][1]) for name in names}
-
-
-def _values(varying: Varying, c: Floats, name: str) -> Floats:
-    return _numbers(varying, c)[name][0]

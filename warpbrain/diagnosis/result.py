@@ -148,6 +148,7 @@ def sentence_of(diagnosis: Diagnosis) -> str:
     least = belief("checks.perhaps")
     likely = [ranked for ranked in ranking if ranked.kind != UNKNOWN and ranked.probability > least][:2]
     errors = None if fit.explained is None else (length(fit.explained[1]), length(fit.refitted[1]))
+    extent = 0.0 if diagnosis.unknown is None else float(np.ptp(diagnosis.case.mesh.points, axis=0).max())
     words = Words(
         data="these data",
         nothing="nothing was looked for",
@@ -158,7 +159,7 @@ def sentence_of(diagnosis: Diagnosis) -> str:
         perhaps=[clause(sentence_of_kind(ranked.kind)) for ranked in likely],
         nothing_acts=sum(each.probability for each in diagnosis.combinations if not each.causes),
         only_physics=all(ranked.physics for ranked in likely),
-        rest=_traits(diagnosis),
+        rest="" if diagnosis.unknown is None else traits_in_words(diagnosis.unknown, extent),
     )
     sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.alpha, diagnosis.smallest, words)
     return " ".join([sentence, *diagnosis.doubts])
@@ -211,13 +212,6 @@ def _where(ranked: Ranked) -> str:
     radius = f", within {number(1e3 * ranked.radius, 1)} mm" if ranked.radius else ""
     surface = f", on the {ranked.region}" if ranked.region else ""
     return f" It lies about {place(ranked.centre, 10.0 * (ranked.radius or 1.0))}{radius}{surface}."
-
-
-def _traits(diagnosis: Diagnosis) -> str:
-    """What is known of an unknown force, to follow a sentence; empty if nothing is."""
-    if diagnosis.unknown is None:
-        return ""
-    return traits_in_words(diagnosis.unknown, float(np.ptp(diagnosis.case.mesh.points, axis=0).max()))
 
 
 def traits_in_words(unknown: Traits, extent: float) -> str:

@@ -105,7 +105,11 @@ def loss(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float
     if decision.verdict == NOTHING:
         return losses["nothing for something"] * (truth.physical or bool(truth.not_physics))
     if decision.verdict == NOT_PHYSICS:
-        return _not_physics(decision, truth, losses)
+        if truth.physical:
+            return losses["not physics for physics"]
+        # where no physics is missing to take nothing for an error costs what the reverse does
+        wrong = losses["name left out"] * (decision.causes[0] not in truth.not_physics)
+        return wrong if truth.not_physics else losses["nothing for something"]
     if not truth.physical:
         return losses["name where nothing is"]
     if decision.verdict == UNKNOWN:
@@ -113,15 +117,6 @@ def loss(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float
     if decision.verdict == GROUP:
         return _group(decision, truth, losses)
     return _named(decision, truth, losses)
-
-
-def _not_physics(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float:
-    if truth.physical:
-        return losses["not physics for physics"]
-    if not truth.not_physics:
-        # no physics is missing: to take nothing for an error costs what the reverse does
-        return losses["nothing for something"]
-    return losses["name left out"] * (decision.causes[0] not in truth.not_physics)
 
 
 def _group(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float:

@@ -232,17 +232,14 @@ class _Search:
         """Log density (g, k) with every inflation of each point, less that with its current one."""
         logs = np.empty((len(self.kinds), len(self._variances)))
         for group, precision in zip(self._rows.groups, self._precisions, strict=True):
+            # of each point's variance (g, k) in units of its noise
             changes = self._variances - self._variances[self.kinds[group.numbers]][:, None]
-            logs[group.numbers] = _log_ratios(self.weighted[group.rows], precision, group.noise, changes)
+            v, noise = self.weighted[group.rows], group.noise
+            inner = np.eye(v.shape[1]) + changes[:, :, None, None] * (noise @ precision)[:, None]
+            right = changes[:, :, None] * np.einsum("gij,gj->gi", noise, v)[:, None]
+            solved, determinant = _solved(inner, right)
+            logs[group.numbers] = 0.5 * (np.einsum("gi,gki->gk", v, solved) - np.log(determinant))
         return logs
-
-
-def _log_ratios(v: Floats, P: Floats, noise: Floats, changes: Floats) -> Floats:
-    """Log densities (g, k) with `changes` (g, k) of each point's variance in units of its noise, less those without."""
-    inner = np.eye(v.shape[1]) + changes[:, :, None, None] * (noise @ P)[:, None]
-    right = changes[:, :, None] * np.einsum("gij,gj->gi", noise, v)[:, None]
-    solved, determinant = _solved(inner, right)
-    return np.asarray(0.5 * (np.einsum("gi,gki->gk", v, solved) - np.log(determinant)))
 
 
 def _solved(A: Floats, b: Floats) -> tuple[Floats, Floats]:

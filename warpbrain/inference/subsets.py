@@ -221,8 +221,12 @@ class _Sums:
                 known = self.by_place.setdefault(int(blocks.cause[low]), {})
                 for place, log in zip(blocks.place[low:high].tolist(), of_places.tolist(), strict=True):
                     known[place] = float(np.logaddexp(known.get(place, -np.inf), log))
+            at_places = self.at_places.setdefault(best[-1].members[-1].cause, {})
             for other in np.argsort(-greatest)[: 0 if members else self._places].tolist():
-                self._add_place(self._configuration(blocks, low + other, of_cause[other], (), scale))
+                configuration = self._configuration(blocks, low + other, of_cause[other], (), scale)
+                known_there = at_places.get(configuration.members[0].place)
+                if known_there is None or configuration.log_density > known_there.log_density:
+                    at_places[configuration.members[0].place] = configuration
         return best
 
     @staticmethod
@@ -233,12 +237,6 @@ class _Sums:
         size = int(np.argmax(logs))
         last = Member(int(blocks.cause[number]), int(blocks.place[number]), size)
         return Configuration((*members, last), scale, float(logs[size]))
-
-    def _add_place(self, configuration: Configuration) -> None:
-        [member] = configuration.members
-        places = self.at_places.setdefault(member.cause, {})
-        if member.place not in places or configuration.log_density > places[member.place].log_density:
-            places[member.place] = configuration
 
     def with_share(self, configuration: Configuration) -> Configuration:
         """A configuration with the share of its place, if it is of a single cause."""

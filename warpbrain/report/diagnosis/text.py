@@ -29,7 +29,7 @@ def shown_of(summary: Summary) -> dict[str, Any]:
         "unit": unit_of(summary)[2],
         "sets": _set_rows(summary),
         "candidates": _candidate_rows(summary),
-        "rejected": _rejected_rows(summary),
+        "rejected": [[c["mechanism"], c["rejected_because"]] for c in summary["ranking"] if c["log_evidence"] is None],
         "fit": _fit_rows(summary),
         "placebos": _placebo_sentences(summary),
         "smallest": _smallest_rows(summary),
@@ -79,15 +79,6 @@ def _estimated(value: float | None, sd: float | None, unit: str) -> str:
     scale = MILLIMETRES if unit == "m" else 1.0
     known, spread = (math.nan if number is None else scale * number for number in (value, sd))
     return measured(known, spread, "mm" if unit == "m" else unit)
-
-
-def _rejected_rows(summary: Summary) -> list[list[str]]:
-    """What was not tried, and why."""
-    return [
-        [candidate["mechanism"], candidate["rejected_because"]]
-        for candidate in summary["ranking"]
-        if candidate["log_evidence"] is None
-    ]
 
 
 def _fit_rows(summary: Summary) -> list[list[str]]:
