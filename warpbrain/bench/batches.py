@@ -19,7 +19,6 @@ from warpbrain.ensemble.batch import parts_of_clusters
 from warpbrain.ensemble.course import step_batch
 from warpbrain.ensemble.run import chosen_samples
 from warpbrain.ensemble.workers import Here, Job, Processes, bytes_per_slot
-from warpbrain.errors import InputError
 from warpbrain.kernels.batched.layout import TANGENT
 from warpbrain.kernels.module import find_device
 from warpbrain.simulation.dynamics import Simulator
@@ -34,18 +33,10 @@ STEPS = 20
 REPEATS = 3
 
 
-def _sizes(name: str, text: str) -> list[int]:
-    numbers = text.split(",")
-    for number in numbers:
-        if not number.isdecimal() or int(number) < 1:
-            raise InputError(f"--{name} {text}: expected whole numbers of at least 1, as 1,2,4")
-    return [int(number) for number in numbers]
-
-
 def bench(options: argparse.Namespace) -> None:
     """Measure and print."""
-    batches = None if options.batches is None else _sizes("batches", options.batches)
-    processes = [] if options.processes is None else _sizes("processes", options.processes)
+    batches = None if options.batches is None else command.numbers("--batches", options.batches)
+    processes = [] if options.processes is None else command.numbers("--processes", options.processes)
     versions, device = command.start(options), find_device(options.device)
     if batches is None:
         batches = [1, 4, 16, 32, 64, 128, 256, 512] if device.is_cuda else [1, 2, 4, 8]

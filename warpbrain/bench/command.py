@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import platform
 from collections.abc import Mapping, Sequence
@@ -21,6 +22,15 @@ def chosen(option: str, text: str | None, known: Sequence[str]) -> list[str]:
         if name not in known:
             raise InputError(f"{option} {name}: expected some of {', '.join(known)}")
     return names
+
+
+def numbers(option: str, text: str, most: float = math.inf) -> list[int]:
+    """Whole numbers of a list with commas, from 1 to `most`."""
+    words = text.split(",")
+    if not all(word.strip().isdecimal() and 0 < int(word) <= most for word in words):
+        upwards = "of at least 1" if most == math.inf else f"from 1 to {most}"
+        raise InputError(f"{option} {text}: expected whole numbers {upwards}, with commas between them")
+    return [int(word) for word in words]
 
 
 def write(path: Path | None, measured: Any) -> None:

@@ -32,14 +32,8 @@ def bench(options: argparse.Namespace) -> None:
     """Measure and print."""
     if options.row not in TABLE3:
         raise InputError(f"--row {options.row}: expected one of {', '.join(TABLE3)}")
-    listed = options.counts
-    counts = (
-        [n for n in COUNTS if n <= processors()]
-        if listed is None
-        else [int(n) if n.strip().isdecimal() else 0 for n in listed.split(",")]
-    )
-    if not counts or not all(0 < n <= MOST for n in counts):
-        raise InputError(f"--counts {listed}: expected whole numbers from 1 to {MOST}, with commas between them")
+    usual = [n for n in COUNTS if n <= processors()]
+    counts = usual if options.counts is None else command.numbers("--counts", options.counts, MOST)
 
     versions, where = command.start(options), command.host()
     print(
