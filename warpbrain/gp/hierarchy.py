@@ -451,7 +451,6 @@ class Hierarchical:
     variant: str = "corrected"
     sample: tuple[Hierarchy, ...] = ()
     name = "hierarchical"
-    _structures_of: dict[tuple[Any, ...], Structures] = field(default_factory=dict, init=False, repr=False)
     _moduli: dict[tuple[Any, ...], tuple[Floats, Floats]] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -520,19 +519,11 @@ class Hierarchical:
         which = min(int(ndtr(normal[0]) * len(self.conditionals)), len(self.conditionals) - 1)
 
         def moments(groups: tuple[str, ...], at: Floats, other: Floats) -> tuple[Floats, Floats]:
-            # all hierarchies share structures; the last ones are kept, for many draws at the same stretches
-            key = groups, at.tobytes(), other.tobytes()
-            if key not in self._structures_of:
-                if len(self._structures_of) > 1:
-                    self._structures_of.clear()
-                seen, here = self._seen.places, self.places(groups, at)
-                to = to_others = Structure.of(seen, here)
-                there = here
-                if other is not at:
-                    there = self.places(groups, other)
-                    to_others = Structure.of(seen, there)
-                self._structures_of[key] = Structures(to, to_others, Structure.of(here, there))
-            return self.conditionals[which].moments(self._structures_of[key])
+            seen, here = self._seen.places, self.places(groups, at)
+            there = here if other is at else self.places(groups, other)
+            to = Structure.of(seen, here)
+            to_others = to if other is at else Structure.of(seen, there)
+            return self.conditionals[which].moments(Structures(to, to_others, Structure.of(here, there)))
 
         return log_energy(l, self._draws[which].at(tuple(groups), l, normal[1:], moments))
 
