@@ -31,23 +31,12 @@ def asymmetry_lines(asymmetries: Sequence[Asymmetry], papers: Mapping[str, tuple
 
 def moduli_lines(moduli: Sequence[Moduli]) -> list[str]:
     """A line for each group and law; a modulus in brackets is that of a curve whose law is unstable."""
-    width = max(len(tissue.group) for tissue in moduli)
-    curves = "".join(f"{f'k = {k:+g}' if k else 'mean':>11}" for k in CURVES)
-    lines = [
-        f"{'shear modulus at rest [Pa]':<{width + 16}}{curves}   draws: median (95 % of them)        redrawn   "
-        "law of the mean curve"
+    middle = CURVES.index(0.0)
+    rows = [
+        (tissue, list(zip(tissue.fits, tissue.unstable, strict=True)), _law_text(tissue.fits[middle]))
+        for tissue in moduli
     ]
-    for tissue in moduli:
-        cells = "".join(
-            f"{f'({fitted.shear_modulus:.4g})' if reason else f'{fitted.shear_modulus:.4g}':>11}"
-            for fitted, reason in zip(tissue.fits, tissue.unstable, strict=True)
-        )
-        drawn = f"{tissue.median:.4g} ({tissue.low:.3g} to {tissue.high:.3g})"
-        lines.append(
-            f"{tissue.group:<{width + 2}}{tissue.law:<14}{cells}   {drawn:<34} {100 * tissue.rejection_rate:>5.1f} %   "
-            f"{_law_text(tissue.fits[CURVES.index(0.0)])}"
-        )
-    return lines
+    return lines("gp.txt", "moduli", rows, max(len(tissue.group) for tissue in moduli), CURVES)
 
 
 def _law_text(fitted: Fit) -> str:
@@ -135,15 +124,9 @@ def redrawn_lines(draws: Sequence[DrawnLaws]) -> list[str]:
     """How many attempts were unstable, and why most of them were."""
     reasons = [reason for drawn in draws for reason in drawn.rejected]
     # what is wrong stands last: after the group, and the law and its numbers
-    kinds = Counter(reason.rsplit(": ", 1)[-1] for reason in reasons)
-    return [
-        f"unstable and redrawn: {len(reasons)} of {len(reasons) + len(draws)} attempts "
-        f"({100 * rejection_rate(draws):.1f} %)",
-        *(
-            f"  {count} because {kind}, such as {next(reason for reason in reasons if reason.endswith(kind))}"
-            for kind, count in kinds.most_common(3)
-        ),
-    ]
+    kinds = Counter(reason.rsplit(": ", 1)[-1] for reason in reasons).most_common(3)
+    examples = [(count, kind, next(reason for reason in reasons if reason.endswith(kind))) for kind, count in kinds]
+    return lines("gp.txt", "redrawn", len(reasons), len(draws), rejection_rate(draws), examples)
 
 
 def score_lines(scores: Sequence[Score]) -> list[str]:

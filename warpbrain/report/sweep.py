@@ -20,10 +20,10 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.sweep import Steps, Sweep, SweepPoint
-from warpbrain.physics.words import tabled
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import write_csv
+from warpbrain.report.page import lines
 from warpbrain.report.views import BLACK, BLUE, VERMILLION
 
 #: Name of the file.
@@ -76,17 +76,10 @@ def _checksum(header: list[str], row: list[str]) -> str:
 
 def sweep_lines(sweep: Sweep) -> list[str]:
     """What is printed of a finished sweep."""
-    best = sweep.best
-    factor, unit = SHOWN[sweep.unit]
-    failed = sum(point.error is None for point in sweep.points)
+    best, (factor, unit) = sweep.best, SHOWN[sweep.unit]
     laws = zip(sweep.parameters.tissues, best.k, sweep.parameters.laws(best.theta), strict=True)
-    lines = [f"least error of {len(sweep.points)} equilibria: RMSE {tabled(factor * (best.error or 0.0))} {unit}"]
-    lines += [
-        f"  {tissue:<18} k = {k:+.2f}: shear modulus {law.shear_modulus:.5g} Pa  {law!r}" for tissue, k, law in laws
-    ]
-    if failed:
-        lines.append(f"  without an equilibrium: {failed}")
-    return lines
+    failed = sum(point.error is None for point in sweep.points)
+    return lines("estimate.txt", "sweep", len(sweep.points), factor * (best.error or 0.0), unit, list(laws), failed)
 
 
 #: Of a tissue: estimate of its shear modulus, lower and upper end of its interval [Pa].
