@@ -179,18 +179,7 @@ def cluster_kernel(precision: Precision, sizes: Sizes) -> Any:
 class ClusterSolve:
     """Solves systems of a list of slots; what it takes is as of `BatchedConjugateGradient`.
 
-    Parameters
-    ----------
-    parts : Parts
-        Of the pattern, for clusters that have room for it.
-    diagonal : wp.array of int, shape (n,)
-    values : wp.array, shape (pairs, 9, slots)
-        Of which the numbers of a slot are side by side in memory.
-    b, v, x : wp.array, shape (n, 3, slots)
-    free : wp.array of vec3, shape (n,)
-    precision : Precision
-    tolerance : float
-    max_iterations : int
+    `parts`: of the pattern, for clusters that have room for it. The numbers of a slot are side by side in `values`.
     """
 
     def __init__(

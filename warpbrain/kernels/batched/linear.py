@@ -35,16 +35,9 @@ class BatchedConjugateGradient:
     row and a column of the identity in `A`, and no `b`. `x` (n, 3, slots) is first guess and result. A system ends when
     ``|b - A v - A x| <= tolerance |b - A v|``. With `parts` of the pattern clusters solve.
 
-    Attributes
-    ----------
-    values : wp.array, shape (pairs, 9, slots)
-        The stored blocks of `pattern`, laid out in memory as the solver wants them.
-    right_hand_side : wp.array, shape (n, 3, slots)
-        `b`; the residual may take its place.
-    side_by_side : bool
-        Whether the numbers of a system are, in which case those of a block of all systems are not.
-    solving : wp.array of int, shape (slots,)
-        1 while the system of a slot has not ended.
+    `values` (pairs, 9, slots) are the stored blocks of `pattern`, laid out in memory as the solver wants them:
+    `side_by_side` if the numbers of a system are, in which case those of a block of all systems are not. The residual
+    may take the place of `right_hand_side` (n, 3, slots), `b`. `solving` (slots,) is 1 while a system has not ended.
     """
 
     def __init__(

@@ -24,25 +24,13 @@ ENDS = 1 << 15
 
 @dataclass(frozen=True)
 class Pattern:
-    """A symmetric matrix of 3 x 3 blocks, of which those on and above the diagonal are stored, and its nodes.
+    """A symmetric matrix of 3 x 3 blocks, of which those on and above the diagonal are stored, and its nodes."""
 
-    Attributes
-    ----------
-    offsets : array of int, shape (n + 1,)
-        Where rows begin in the others.
-    columns, pairs : array of int
-        Of each block, and which of the stored blocks it is, or is the transpose of.
-    points : array of float, shape (n, 3)
-        [m].
-    active : array of bool, shape (n,)
-        Nodes of which not all components are held.
-    """
-
-    offsets: Ints
-    columns: Ints
-    pairs: Ints
-    points: Floats
-    active: Bools
+    offsets: Ints  # (n + 1,), where rows begin in the others
+    columns: Ints  # of each block
+    pairs: Ints  # which of the stored blocks each is, or is the transpose of
+    points: Floats  # (n, 3) [m]
+    active: Bools  # (n,), nodes of which not all components are held
 
     @property
     def rows(self) -> Ints:
@@ -62,36 +50,23 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Parts:
-    """Tables of a pattern for `blocks` of `threads`, of which each has `places` of blocks of the matrix.
-
-    Attributes
-    ----------
-    starts, nodes : array of int
-        First row of each block, and the nodes of all, block after block.
-    outer_starts, outer_nodes, outer_places : array of int
-        Nodes of other blocks that a block's rows have a column of: node, and ``block << 16 | row there``.
-    pairs : array of int, shape (blocks, threads, places)
-        The stored block, ``-1 - pair`` where its transpose is meant. Behind the last it is any.
-    columns : array of int, shape (blocks, places, threads)
-        Row in the block, or behind those the place among its outer nodes; with `ENDS`.
-    segment_starts : array of int, shape (blocks, threads)
-        First segment of a thread.
-    row_segments : array of int
-        First segment of each row of a block and an end, block after block.
-    """
+    """Tables of a pattern for `blocks` of `threads`, of which each has `places` of blocks of the matrix."""
 
     blocks: int
     threads: int
     places: int
-    starts: Ints
-    nodes: Ints
+    starts: Ints  # first row of each block
+    nodes: Ints  # of all, block after block
+    #: Nodes of other blocks that a block's rows have a column of: node, and ``block << 16 | row there``.
     outer_starts: Ints
     outer_nodes: Ints
     outer_places: Ints
+    #: (blocks, threads, places), the stored block, ``-1 - pair`` where its transpose is meant; behind the last any.
     pairs: Ints
+    #: (blocks, places, threads), row in the block, or behind those the place among its outer nodes; with `ENDS`.
     columns: Ints
-    segment_starts: Ints
-    row_segments: Ints
+    segment_starts: Ints  # (blocks, threads), first segment of a thread
+    row_segments: Ints  # first segment of each row of a block and an end, block after block
 
     @property
     def rows(self) -> int:

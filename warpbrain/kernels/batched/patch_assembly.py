@@ -30,22 +30,10 @@ class PatchAssembly:
     """Matrices `k K + m M` of lists of slots, with the rows and columns of constrained components replaced by those of
     the identity, from the displacements.
 
-    Parameters
-    ----------
-    groups : sequence of (law, elements, tissue, parameters)
-        As those of `batched.elements`: elements (of NumPy) that share a law, the tissue of each, and a row of
-        parameters, of float64, for each tissue and slot, slots fastest.
-    points, tetrahedra, shape_gradients, volumes : array
-        Of the mesh; nodes of an element ascend.
-    pairs : array of int, shape (p, 2)
-    free : array of bool, shape (n, 3)
-    mass : wp.array, shape (n,)
-    u : wp.array of float64, shape (n, 3, slots)
-    values : wp.array, shape (p, 9, slots)
-        Of which the numbers of a slot are side by side in memory.
-    precision : Precision
-    shared_bytes : int
-        What a block may have of a multiprocessor's shared memory.
+    `groups`, as those of `batched.elements`: a law, elements (of NumPy) that share it, the tissue of each, and a row of
+    parameters, of float64, for each tissue and slot, slots fastest. Nodes of an element of the mesh ascend. `pairs`
+    (p, 2), `free` (n, 3), `mass` (n,), `u` (n, 3, slots) of float64, `values` (p, 9, slots), of which the numbers of a
+    slot are side by side in memory. `shared_bytes`: what a block may have of a multiprocessor's shared memory.
     """
 
     def __init__(

@@ -33,35 +33,21 @@ class Patches:
     """Tables of the patches of some elements.
 
     Rows of a patch are those of its edges and behind them those of its nodes.
-
-    Attributes
-    ----------
-    elements : array of int, shape (patches, rounds, width)
-        -1 where there is none.
-    corners : array of int, shape (patches, rounds, width, 4)
-        Places of their nodes in the patch.
-    edges : array of int, shape (patches, rounds, width, 6)
-        Places of their edges; where there is no element, one behind those of the patch.
-    round_counts, edge_counts : array of int, shape (patches,)
-        Rounds are a multiple of those together.
-    node_starts, nodes : array of int
-        Nodes of each patch.
-    spoke_starts, spokes : array of int
-        Edges of each node of a patch, ``-1 - edge`` where the node is the second of the two. They are a multiple of
-        `SPOKES`: there are some at the end that are one behind those of the patch.
-    row_starts, rows, kept : array of int
-        Row of the matrix of each row of a patch, and bits ``3 r + c`` of what is free in it; and `FIRST`.
     """
 
-    elements: Ints
-    corners: Ints
+    elements: Ints  # (patches, rounds, width), -1 where there is none
+    corners: Ints  # (patches, rounds, width, 4), places of their nodes in the patch
+    #: (patches, rounds, width, 6), places of their edges; where there is no element, one behind those of the patch.
     edges: Ints
-    round_counts: Ints
-    edge_counts: Ints
-    node_starts: Ints
+    round_counts: Ints  # (patches,), a multiple of those together
+    edge_counts: Ints  # (patches,)
+    node_starts: Ints  # of each patch
     nodes: Ints
+    #: Edges of each node of a patch, ``-1 - edge`` where the node is the second of the two. They are a multiple of
+    #: `SPOKES`: there are some at the end that are one behind those of the patch.
     spoke_starts: Ints
     spokes: Ints
+    #: Row of the matrix of each row of a patch, and bits ``3 r + c`` of what is free in it; and `FIRST`.
     row_starts: Ints
     rows: Ints
     kept: Ints

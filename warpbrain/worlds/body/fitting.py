@@ -515,30 +515,15 @@ class Fitter:
         nearby: SolvedState | None = None,
         subset: Refit | None = None,
     ) -> Refit:
-        """Fit one set.
+        """Fit one set; `SolveError` if there is no equilibrium near the start.
 
-        Parameters
-        ----------
-        effects : tuple of Effect
-        columns : (n, q + e + k) array
-            Of nuisances, of causes that act linearly (unknown fields, or no physics), and of effects, about the base or
-            about `subset`.
-        starts : sequence of (q + e + k,) arrays
-            Coordinates to begin at, of which the best are taken: the most probable ones about the base, and about the
-            fit without any cause. Where points of a surface may belong to one side or the other there are several best
-            points, and a fit with a mechanism must not miss the one that the fit without it has reached.
-        screened : Marginal
-            Scale of the noise and gross errors of the set in the linear model.
-        nearby : SolvedState, optional
-            Nearer to the start than the base.
-        subset : Refit, optional
-            A fit with the first of the effects, or with all of them, nearer still, whose share of the mesh's error is
-            kept.
-
-        Raises
-        ------
-        SolveError
-            If there is no equilibrium near the start.
+        `columns` (n, q + e + k): of nuisances, of causes that act linearly (unknown fields, or no physics), and of
+        effects, about the base or about `subset`. `starts`, each (q + e + k,): coordinates to begin at, of which the
+        best are taken: the most probable ones about the base, and about the fit without any cause. Where points of a
+        surface may belong to one side or the other there are several best points, and a fit with a mechanism must not
+        miss the one that the fit without it has reached. `screened`: scale of the noise and gross errors of the set in
+        the linear model. `nearby`: nearer to the start than the base. `subset`: a fit with the first of the effects, or
+        with all of them, nearer still, whose share of the mesh's error is kept.
         """
         search = FitSearch(self.base, self.mesh_errors, effects, columns, screened)
         if subset is not None:

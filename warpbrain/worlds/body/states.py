@@ -172,26 +172,10 @@ class States:
     ) -> SolvedState:
         """The equilibrium under a hypothesis.
 
-        Parameters
-        ----------
-        hypothesis : Hypothesis
-        start : (N, 3) array, optional
-            A displacement [m] that is near to it.
-        expected : Difference, optional
-            Expected error of the mesh, by which the sensors are corrected.
-        course : sequence of (N, 3) arrays, optional
-            Of a state that is near to it, if it is followed over time.
-        iterations : int
-            Of Newton's method in all, after which there is taken to be none.
-        nearby : Linearisation, optional
-            Of a state that is near to it.
-
-        Raises
-        ------
-        InputError
-            If a law is not stable.
-        SolveError
-            If there is none.
+        `start` (N, 3): a displacement [m] that is near to it. `expected`: error of the mesh, by which the sensors are
+        corrected. `course`: of a state that is near to it, if it is followed over time. `iterations`: of Newton's
+        method in all, after which there is taken to be none. `nearby`: of a state that is near to it. `InputError` if
+        a law is not stable, `SolveError` if there is none.
         """
         system = self._system(hypothesis)
         flowing = self._flowing(hypothesis, system)
