@@ -13,6 +13,7 @@ from warpbrain.bench.measure import BODIES, PREPROCESSING, RESTART, STEP, measur
 from warpbrain.bench.table3 import MAIN_LOOP, TABLE3
 from warpbrain.kernels.module import find_device
 from warpbrain.kernels.precision import find_precision
+from warpbrain.report.page import lines
 from warpbrain.simulation.dynamics import finest_tolerance
 from warpbrain.terminal.progress import Progress
 
@@ -52,39 +53,27 @@ def _columns(measured: dict[str, Any]) -> dict[str, tuple[list[float], tuple[flo
 
 
 def _lines(measured: dict[str, Any]) -> list[str]:
-    cg = statistics.median(measured["cg_iterations"])
-    lines = [
-        "",
-        "{row}: {nodes} nodes, {tetrahedra} tetrahedra, {blocks} blocks of 3 x 3, ".format(**measured)
-        + f"{cg:g} CG iterations (median)",
-        f"  {'':<28}{'warpbrain':>18}{'paper':>18}{'x faster':>10}",
-    ]
-    first, *others = _columns(measured).items()
+    """A row of the table with its phases, ours beside the paper's."""
+    columns = _columns(measured)
+    first, *others = columns.items()
     # a body's first step is replayed once it is captured: both stand between a mesh in memory and that step
     both = [sum(pair) for pair in zip(first[1][0], measured["milliseconds"]["capture"], strict=True)]
-    for label, (samples, paper) in (first, ("and capture of the step", (both, first[1][1])), *others):
-        mean, sd = statistics.fmean(samples), statistics.pstdev(samples)
-        theirs = f"{paper[0]:.2f}" + ("" if paper[1] is None else f" ({paper[1]:.1f})")
-        lines.append(f"  {label:<28}{f'{mean:.3f} ({sd:.3f})':>18}{theirs:>18}{paper[0] / mean:>10.1f}")
-    # of the last column, the step as users get it
-    median, moved, launches = statistics.median(samples), measured["bytes_per_step"], measured["launches_per_step"]
-    lines.append(
-        f"  its median {median:.3f} ms; {moved / 1e6:.1f} MB moved and {launches} launches a step: "
-        f"{moved / median / 1e6:.1f} GB/s, {1000.0 * median / launches:.1f} us a launch"
-    )
-    return lines
+    rows = [
+        (label, statistics.fmean(samples), statistics.pstdev(samples), paper)
+        for label, (samples, paper) in (first, ("and capture of the step", (both, first[1][1])), *others)
+    ]
+    medians = statistics.median(measured["cg_iterations"]), statistics.median(columns[STEP][0])
+    return lines("bench.txt", "row", measured, rows, *medians)
 
 
 def _table(results: list[dict[str, Any]]) -> list[str]:
     """The paper's table again: a line for each row, each cell our mean (sd) | the paper's mean = how often faster."""
-    heads = (f"{label.removeprefix('step '):<30}" for label in _columns(results[0]))
-    lines = [f"{'row':<10} {'nodes':>6} {'tets':>6} {'CG':>5}  " + "  ".join(heads).rstrip()]
+    heads = [label.removeprefix("step ") for label in _columns(results[0])]
+    rows = []
     for measured in results:
-        cells = []
-        for samples, (paper, _) in _columns(measured).values():
-            mean = statistics.fmean(samples)
-            cells.append(f"{mean:.3g} ({statistics.pstdev(samples):.2g}) | {paper:g} = {paper / mean:.3g}x".ljust(30))
-        cg = statistics.median(measured["cg_iterations"])
-        sizes = "{row:<10} {nodes:>6} {tetrahedra:>6} ".format(**measured) + f"{cg:>5g}  "
-        lines.append(sizes + "  ".join(cells).rstrip())
-    return lines
+        cells = [
+            (statistics.fmean(samples), statistics.pstdev(samples), paper)
+            for samples, (paper, _) in _columns(measured).values()
+        ]
+        rows.append((measured, statistics.median(measured["cg_iterations"]), cells))
+    return lines("bench.txt", "table", heads, rows)
