@@ -11,7 +11,7 @@ import math
 import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.noise import noise_covariance
-from warpbrain.mesh import TetMesh
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.quality import extent
 from warpbrain.mesh.surface import feature_normals
@@ -34,9 +33,6 @@ from warpbrain.recordings.location import locate
 from warpbrain.recordings.points import distinct_rows
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording, SurfaceRecording
 from warpbrain.recordings.times import compared_rows, rows_at, times_of
-
-#: Sets of points whose places in a mesh are kept, the latest ones.
-_KEPT = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,14 +295,17 @@ def _observations(case: Case, recording: Recording, moments: Moments) -> Iterato
 
 
 def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Made:
-    from scipy.sparse import csr_matrix
+    from scipy.sparse import csr_matrix, eye, kron
 
     rows, weights = distinct_rows(recording, rows)
     if not (np.isfinite(weights) & (weights >= 0.0)).all():
         raise InputError(f"recording '{recording.name}': a weight is negative or no number")
     rows, weights = rows[weights > 0.0], weights[weights > 0.0]
     points = recording.points[rows].astype(np.float64)
-    matrix, by_displacement, edges = _located(case.remaining[0], points.tobytes())
+    mesh = case.remaining[0]
+    location = locate(mesh.points, mesh.tetrahedra, points)
+    matrix = location.matrix(len(mesh.points))
+    by_displacement = kron(matrix, eye(3), format="csr")
     nothing = csr_matrix(by_displacement.shape)
     positions = points + recording.displacement[rows]
 
@@ -315,21 +314,7 @@ def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Made:
         rigid = -moved_back_columns(positions, motion, centre)
         return residual.ravel(), rigid.reshape(-1, 6), by_displacement, nothing
 
-    return rows, weights, 3, positions, edges, at
-
-
-@lru_cache(maxsize=_KEPT)
-def _located(mesh: TetMesh, points: bytes) -> tuple[Any, Any, Floats]:
-    """From values at nodes to those at points, given as bytes of (n, 3) [m]: SciPy CSR (n, N) and (3 n, 3 N).
-
-    With them the mean length of the edges of each point's element (n,) [m]. Kept, because recordings that are taken to
-    have been moved are of the same points of the body each time.
-    """
-    from scipy.sparse import eye, kron
-
-    location = locate(mesh.points, mesh.tetrahedra, np.frombuffer(points).reshape(-1, 3))
-    matrix = location.matrix(len(mesh.points))
-    return matrix, kron(matrix, eye(3), format="csr"), location.edge
+    return rows, weights, 3, positions, location.edge, at
 
 
 def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Made:
