@@ -1,6 +1,8 @@
 """Where there are several times: fluid that flows away beside stress that relaxes, and when something set in."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,9 +10,11 @@ from slow_block import CAUSES, PERMEABILITY, TIMES, write_slow
 
 from warpbrain.arrays import Floats
 from warpbrain.diagnosis.diagnose import Diagnosing
-from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, onset_of
+from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, always_there, onset_of
 from warpbrain.diagnosis.result import EXPLAINED, Diagnosis
 from warpbrain.estimation.parameters import declared
+from warpbrain.inference import Cause
+from warpbrain.inference.causes import Place
 from warpbrain.physics.mechanisms.drainage import Drainage
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.report.diagnosis.text import when_in_words
@@ -19,6 +23,7 @@ from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.dictionary import Candidates, candidates_at, dictionary_of
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -186,3 +191,15 @@ def test_every_recorded_time_is_a_step(times: tuple[float, ...]) -> None:
     steps = steps_to(times)
     assert set(times) <= set(steps)
     assert steps == sorted(steps) and steps[-1] == times[-1]
+
+
+def test_without_courses_the_other_places_share_all_of_the_prior():
+    """Half of it is throughout the tissue, with and without a course; the other half in two places."""
+    places = tuple(Place(np.full((2, 1), float(k))) for k in range(6))
+    shares = np.array([0.25, 0.25, 0.125, 0.125, 0.125, 0.125])
+    over_time = [None, (0,), None, (0,), None, (0,)]
+    effects: Any = tuple(SimpleNamespace(proposed=SimpleNamespace(over_time=each)) for each in over_time)
+    causes = BodyCauses((Cause("swelling", places, 0.0, shares=shares),), {"swelling": effects})
+    always = always_there(causes, "swelling")
+    assert always.places == places[::2]
+    np.testing.assert_allclose(np.exp(always.log_weights[:, 0]), [0.5, 0.25, 0.25])

@@ -76,7 +76,7 @@ def test_datum_is_the_lowest_point_against_gravity() -> None:
 @pytest.mark.parametrize("mesh", [MESH, distorted(MESH, 0.002)], ids=["flat below", "with one lowest point"])
 def test_a_tilt_is_linear_in_its_two_components(mesh: TetMesh) -> None:
     """Or what is concluded depends on which two axes across gravity it is counted along: 40662 of `same-diagnose`."""
-    situation: Any = SimpleNamespace(mesh=mesh, gravity_axis=DOWN, density=DENSITY)
+    situation: Any = SimpleNamespace(mesh=mesh, gravity_axis=DOWN, density=DENSITY, stiffness=1.0, assumed=())
     proposal = Gravity.proposals(situation)[8]
 
     def change(angle: float, step: float = 1e-6) -> np.ndarray:

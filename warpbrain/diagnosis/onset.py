@@ -85,8 +85,9 @@ def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianMode
 def always_there(causes: BodyCauses, name: str) -> Cause:
     """A mechanism without the places at which its size is a function of time."""
     cause = causes.named(name)
-    pairs = zip(cause.places, causes.effects[name], strict=True)
-    return replace(cause, places=tuple(place for place, effect in pairs if effect.proposed.over_time is None))
+    kept = [k for k, effect in enumerate(causes.effects[name]) if effect.proposed.over_time is None]
+    shares = None if cause.shares is None else cause.shares[kept] / cause.shares[kept].sum()
+    return replace(cause, places=tuple(cause.places[k] for k in kept), shares=shares)
 
 
 def _log_evidence(cause: Cause, factor: Floats, model: GaussianModel, residual: Floats) -> float:

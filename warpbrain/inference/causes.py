@@ -44,6 +44,10 @@ class Cause:
     kind: Kind = Kind.PHYSICS
     shares: Floats | None = None  # (p,), probability of each place; all are equally probable if not given
 
+    def __post_init__(self) -> None:
+        if self.shares is not None and len(self.shares) != len(self.places):
+            raise ValueError(f"{self.name}: {len(self.shares)} shares of {len(self.places)} places")
+
     @property
     def log_weights(self) -> Floats:
         """Logarithm of the probability of each place and size, (p, s)."""
