@@ -10,7 +10,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-MU, NU, STRETCH, CELLS = 1.0, 0.45, 0.2, 12
+MU, NU, STRETCH = 1.0, 0.45, 0.2
+#: Cells along an edge, six tetrahedra each; `growth.py` asks for others than those whose answer is known.
+KNOWN = 12
+CELLS = int(os.environ.get("CUBE_CELLS", KNOWN))
 BULK = 2.0 * MU * (1.0 + NU) / (3.0 * (1.0 - 2.0 * NU))
 #: Reaction of the top face and norm of the nodal displacements, as found by seven codes to 14 digits.
 REACTION, NORM = 0.5893281763701914, 5.852024036743839
@@ -98,10 +101,12 @@ def report(
     nodes, tetrahedra = mesh or cube()
     internal = internal_forces(nodes, tetrahedra, displacement)
     reaction = float(internal[faces(nodes)[1], 2].sum())
-    errors = {
-        "u_norm_error": abs(float(np.linalg.norm(displacement)) / NORM - 1.0),
-        "reaction_error": abs(reaction / REACTION - 1.0),
-    }
+    errors = {}
+    if CELLS == KNOWN:
+        errors = {
+            "u_norm_error": abs(float(np.linalg.norm(displacement)) / NORM - 1.0),
+            "reaction_error": abs(reaction / REACTION - 1.0),
+        }
     for name, error in errors.items():
         if not error <= 1e-6:
             sys.exit(f"{code}: wrong answer: {name} {error:.1e}")

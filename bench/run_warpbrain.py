@@ -10,6 +10,7 @@ from problem import ASSEMBLIES, MU, NU, STRETCH, TOLERANCE, cube, faces, report,
 from warpbrain import __version__
 from warpbrain.mesh import TetMesh, ordered
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
@@ -70,6 +71,12 @@ if ASSEMBLIES:
     figures["solve_again"] = min(solves[1:])
     # of meshes that no cache has seen
     figures["setup_again"] = min(set_up()[0] for _ in range(5))
+if "steps" in sys.argv:
+    # of 1 ms, from the stretch of the ends alone; the first captures it
+    system.u.assign(system.model.prescribed)
+    simulator = Simulator(system)
+    simulator.step()
+    figures["step"] = seconds(simulator.step)
 report(
     "warpbrain" if device == "cpu" else f"warpbrain on {system.device.name}",
     __version__,
@@ -79,5 +86,6 @@ report(
     setup=setup,
     solve=solves[0],
     newton=len(state.history),
+    cg=sum(step.cg_iterations for step in state.history),
     **figures,
 )
