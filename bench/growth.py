@@ -1,26 +1,21 @@
 """Cost against size, 3k to 1M tetrahedra: an equilibrium of the cube by every code that is installed, a step of ours.
 
 `python bench/growth.py` measures (one thread; some minutes), writes `results/growth_DATE.json` and draws
-`docs/figures/growth.png`. What takes longer than the limit is said to.
+`docs/figures/growth.png`. A code that takes longer than the limit is listed as such, and is not asked for larger sizes.
 """
 
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import json
-import os
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
-from process import whole_process
+from compare import HERE, Failed, is_there, one_thread, run
 
 from warpbrain.bench.command import host
 
-HERE = Path(__file__).parent
 FIGURES = HERE.parent / "docs" / "figures"
 #: Cells along an edge of the cube, six tetrahedra each.
 CELLS = (8, 12, 20, 32, 55)
@@ -36,11 +31,10 @@ def main() -> None:
     options = parser.parse_args()
     where, rows = host(), []
     for command, needed in CODES.items():
-        if not (needed is None or shutil.which(needed) or importlib.util.find_spec(needed)):
-            print(f"{' '.join(command)}: {needed} is not installed", file=sys.stderr)
+        if not is_there(command, needed):
             continue
         for cells in CELLS:
-            rows.append(run([*command], cells, options.limit))
+            rows.append(row_of([*command], cells, options.limit))
             print(json.dumps(rows[-1]), flush=True)
             if "failed" in rows[-1]:
                 break
@@ -52,23 +46,14 @@ def main() -> None:
     print(f"written to {path}")
 
 
-def run(command: list[str], cells: int, limit: float) -> dict[str, Any]:
-    """What a code reports of a size, with time and memory of its whole process; why it failed, if it did."""
-    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+def row_of(command: list[str], cells: int, limit: float) -> dict[str, Any]:
+    """What a code reports of a size, and `failed`, why it has none, if it took longer than a limit [s] or ended."""
     size = {"script": command[0], "cells": cells, "tetrahedra": 6 * cells**3}
-    environment = {**os.environ, **threads, "CUBE_CELLS": str(cells)}
-    begun = ["timeout", f"{limit:g}", sys.executable, str(HERE / command[0]), *command[1:]]
     try:
-        printed, failed, used = whole_process(begun, env=environment)
-    except subprocess.SubprocessError as error:
-        return {**size, "failed": str(error)}
-    if used["status"] == 124:
-        return {**size, "failed": f"over {limit:g} s"}
-    if used["status"] != 0:
-        return {**size, "failed": (failed or printed).strip().splitlines()[-1][:200]}
-    row = json.loads(printed.splitlines()[-1])
-    whole = {"process": used["seconds"], "wall": used["wall"], "peak_rss_mb": used["peak_rss_mb"]}
-    return {**size, **row, **{name: value for name, value in whole.items() if name not in row}}
+        return size | run(command, {**one_thread(), "CUBE_CELLS": str(cells)}, ("timeout", f"{limit:g}"))
+    except Failed as error:
+        # the status with which `timeout` ends what it stops
+        return {**size, "failed": f"over {limit:g} s" if error.status == 124 else str(error)}
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
@@ -80,7 +65,7 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
     for code in dict.fromkeys(row["code"] for row in solved):
         own = [row for row in solved if row["code"] == code]
         sizes = [row["tetrahedra"] for row in own]
-        [line] = times.loglog(sizes, [row["setup"] + row["solve"] for row in own], "o-", label=f"{code}, equilibrium")
+        [line] = times.loglog(sizes, [row["together"] for row in own], "o-", label=f"{code}, equilibrium")
         memory.loglog(sizes, [row["peak_rss_mb"] for row in own], "o-", color=line.get_color(), label=code)
         if "step" in own[0]:
             times.loglog(

@@ -14,7 +14,7 @@ _START = [sys.executable, "-S", "-E", os.path.abspath(__file__)]
 
 
 def whole_process(command, **options):
-    """Run a command: what it printed, and its processor time and time [s], exit status and peak memory [MB]."""
+    """Run a command: what it printed, and its processor and wall time [s], exit status and peak memory [MB]."""
     run = subprocess.run([*_START, *command], capture_output=True, text=True, check=False, **options)
     *printed, told = run.stdout.splitlines()
     return "\n".join(printed), run.stderr, json.loads(told)

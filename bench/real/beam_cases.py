@@ -105,9 +105,13 @@ def beam_mesh(surface: Path) -> TetMesh:
     if not (np.allclose(size, SIZE, atol=1e-6) and np.isclose(volume, SIZE.prod(), rtol=1e-4)):
         raise ValueError(f"{surface}: expected a box of {1e3 * SIZE} mm")
     points, tetrahedra = box(CELLS)
-    tip_edge = (points[:, 0] > SIZE[0] - 1e-9) & (points[:, 2] > SIZE[2] - 1e-9)
-    sets = {"clamp": points[:, 0] < 1e-9, "upper edge of the tip": tip_edge}
+    sets = {"clamp": points[:, 0] < 1e-9, "upper edge of the tip": tip_edge(points)}
     return TetMesh(points, tetrahedra, node_sets=sets)
+
+
+def tip_edge(points: Floats) -> NDArray[np.bool_]:
+    """Which nodes (n,) of the box are on the upper edge of its tip, where weights hang."""
+    return np.asarray((points[:, 0] > SIZE[0] - 1e-9) & (points[:, 2] > SIZE[2] - 1e-9))
 
 
 def box(cells_along: tuple[int, int, int]) -> tuple[Floats, NDArray[np.int64]]:

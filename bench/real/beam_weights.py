@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from bench.real.beam_cases import HELD_WITH_WEIGHT, MU_ACCURACY, box
-from bench.real.beam_motion import GRAVITY, SIZE
+from bench.real.beam_cases import HELD_WITH_WEIGHT, MU_ACCURACY, box, tip_edge
+from bench.real.beam_motion import GRAVITY
 from warpbrain.cases.boundary import Fixed, Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
@@ -66,7 +66,7 @@ HUNG = (
 def loaded_nodes(points: Floats, hung: Hung) -> NDArray[np.bool_]:
     """Nodes (n,) that share the force."""
     if hung.place is None:
-        return (points[:, 0] > SIZE[0] - 1e-9) & (points[:, 2] > SIZE[2] - 1e-9)
+        return tip_edge(points)
     near = np.linalg.norm(points - np.array(hung.place), axis=1) < _WITHIN
     return near & (np.abs(points[:, hung.normal] - hung.place[hung.normal]) < 1e-9)
 

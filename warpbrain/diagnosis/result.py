@@ -177,7 +177,7 @@ def _sized(ranked: Ranked, gravity_axis: tuple[float, float, float] | None) -> s
 
 
 def _member(diagnosis: Diagnosis, kind: str) -> str:
-    """What a member of a group is, and how large it would be if it was fitted."""
+    """What a member of a group is and, if it was fitted, how large."""
     ranked = next((ranked for ranked in diagnosis.ranking if ranked.kind == kind), None)
     if ranked is None or ranked.rejected_because:
         return sentence_of_kind(kind)

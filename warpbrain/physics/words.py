@@ -149,7 +149,7 @@ def _nearest(vector: Floats) -> list[str]:
 
 
 def name_of_set(name: str) -> str:
-    """What people call a set of a mesh, by the name that it has there."""
+    """The name of a set of a mesh in words, with spaces for hyphens and underscores."""
     return name.replace("-", " ").replace("_", " ")
 
 

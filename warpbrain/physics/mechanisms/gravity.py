@@ -158,7 +158,7 @@ class Gravity(BodyForce, Mechanism):
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Levels of the fluid, with the head's pose known to some degrees; any direction if it is not known at all.
 
-        What is stiffer than brain is none: it is in air, and all of it has its weight.
+        A body that is stiffer than brain is no head: it is in air, and has its whole weight.
         """
         points = situation.mesh.points
         if situation.gravity_axis is None:
