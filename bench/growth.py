@@ -1,7 +1,8 @@
 """Cost against size, 3k to 1M tetrahedra: an equilibrium of the cube by every code that is installed, a step of ours.
 
-`python bench/growth.py` measures (one thread; some minutes), writes `results/growth_DATE.json` and draws
-`docs/figures/growth.png`. A code that takes longer than the limit is listed as such, and is not asked for larger sizes.
+`python bench/growth.py` measures (one thread, and a GPU if there is one), writes `results/growth_DATE.json`
+and draws `docs/figures/growth.png`. A code that takes longer than the limit is listed as such, and is not asked for
+larger sizes. `--draw` draws what several machines measured: a code is taken from the first file that has it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,12 @@ FIGURES = HERE.parent / "docs" / "figures"
 #: Cells along an edge of the cube, six tetrahedra each.
 CELLS = (8, 12, 20, 32, 55)
 #: Scripts with their arguments, and what has to be there.
-CODES = {("run_warpbrain.py", "steps"): None, ("run_calculix.py",): "ccx", ("run_felupe.py",): "felupe"}
+CODES = {
+    ("run_warpbrain.py", "steps"): None,
+    ("run_warpbrain.py", "steps", "gpu"): "nvidia-smi",
+    ("run_calculix.py",): "ccx",
+    ("run_felupe.py",): "felupe",
+}
 
 
 def main() -> None:
@@ -28,7 +34,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--limit", type=float, default=300.0, help="seconds of one process (default: 300)")
     parser.add_argument("--out", type=Path, default=HERE / "results", help="folder for growth_DATE.json")
+    parser.add_argument("--draw", type=Path, nargs="+", metavar="FILE", help="measure nothing, draw these files")
     options = parser.parse_args()
+    if options.draw:
+        draw([json.loads(path.read_text(encoding="utf-8"))["rows"] for path in options.draw], FIGURES / "growth.png")
+        return
     where, rows = host(), []
     for command, needed in CODES.items():
         if not is_there(command, needed):
@@ -42,7 +52,7 @@ def main() -> None:
     path.write_text(
         json.dumps({"host": where, "limit": options.limit, "rows": rows}, indent=1) + "\n", encoding="utf-8"
     )
-    draw(rows, FIGURES / "growth.png")
+    draw([rows], FIGURES / "growth.png")
     print(f"written to {path}")
 
 
@@ -56,25 +66,30 @@ def row_of(command: list[str], cells: int, limit: float) -> dict[str, Any]:
         return {**size, "failed": f"over {limit:g} s" if error.status == 124 else str(error)}
 
 
-def draw(rows: list[dict[str, Any]], path: Path) -> None:
-    """Processor time of an equilibrium and of a step, and peak memory, over the number of tetrahedra."""
+def draw(measured: list[list[dict[str, Any]]], path: Path) -> None:
+    """Time of an equilibrium and of a step, and peak memory, over the number of tetrahedra; `measured` by machines."""
     import matplotlib.pyplot as plt
 
-    figure, (times, memory) = plt.subplots(1, 2, figsize=(10.0, 4.0), layout="constrained")
-    solved = [row for row in rows if "failed" not in row]
-    for code in dict.fromkeys(row["code"] for row in solved):
-        own = [row for row in solved if row["code"] == code]
+    figure, (times, memory) = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
+    by_code: dict[str, list[dict[str, Any]]] = {}
+    for rows in measured:
+        solved = [row for row in rows if "failed" not in row]
+        for code in dict.fromkeys(row["code"] for row in solved):
+            by_code.setdefault(code, [row for row in solved if row["code"] == code])
+    for code, own in by_code.items():
         sizes = [row["tetrahedra"] for row in own]
         [line] = times.loglog(sizes, [row["together"] for row in own], "o-", label=f"{code}, equilibrium")
-        memory.loglog(sizes, [row["peak_rss_mb"] for row in own], "o-", color=line.get_color(), label=code)
+        device = "device_mb" in own[0]
+        held = [row["device_mb" if device else "peak_rss_mb"] for row in own]
+        memory.loglog(sizes, held, "o-", color=line.get_color(), label=f"{code}, of the device" if device else code)
         if "step" in own[0]:
             times.loglog(
                 sizes, [row["step"] for row in own], "s--", color=line.get_color(), label=f"{code}, step of 1 ms"
             )
-    for axes, what in ((times, "processor time [s], one thread"), (memory, "peak memory of the process [MB]")):
+    for axes, what in ((times, "processor time of one thread, wall time of a GPU [s]"), (memory, "peak memory [MB]")):
         axes.set(xlabel="tetrahedra", ylabel=what)
         axes.grid(alpha=0.3)
-        axes.legend()
+        axes.legend(fontsize="small")
     figure.savefig(path, dpi=120)
     sys.path.insert(0, str(FIGURES.parent))
     from figure_records import record

@@ -78,6 +78,8 @@ if "steps" in sys.argv:
     # of 1 ms, from the stretch of the ends alone; the first captures it
     system.u.assign(system.model.prescribed)
     figures["step"] = best(Simulator(system).step)
+if device != "cpu":
+    figures["device_mb"] = wp.get_mempool_used_mem_high(device) / 2**20
 cg = sum(step.cg_iterations for step in state.history)
 report(
     "warpbrain" if device == "cpu" else f"warpbrain on {system.device.name}",
