@@ -18,6 +18,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from referee.principal import Stretches, derivatives, stretches_of
+
 Floats = NDArray[np.float64]
 
 #: Logarithms of stretches that differ by less are taken as equal.
@@ -112,39 +114,26 @@ class Response:
         """Isochoric second Piola-Kirchhoff stress (m, q, 3, 3) [Pa]."""
         return (self.v * (self.shape[0] / self.stretch**2)[..., None, :]) @ np.swapaxes(self.v, -1, -2)
 
-    def tangent(self, factor: float = 1.0, precision: type[np.floating] = np.float64) -> Floats:
-        """Derivative (m, q, 9, 9) [Pa] of the stress by the deformation gradient, rows and columns ``3 i + J``."""
+    def tangent(self, factor: float = 1.0) -> Floats:
+        """Derivative (m, q, 3, 3, 3, 3) [Pa] of the stress ``P_iJ`` by the gradient ``F_kL``, as [J, L, i, k].
+
+        So lie the numbers that gradients of nodes, along J and L, make the blocks of a matrix of.
+        """
         l = self.stretch
         t, H = (factor * shape + volume for shape, volume in zip(self.shape, self.volume, strict=True))
-        axes = np.zeros((*l.shape[:-1], 9, 9))
-        own = H.copy()
-        own[..., range(3), range(3)] -= t
-        axes[..., ::4, ::4] = own / (l[..., :, None] * l[..., None, :])
+        both = H.copy()
+        both[..., range(3), range(3)] -= t
+        both /= l[..., :, None] * l[..., None, :]
+        same, other = np.zeros_like(both), np.zeros_like(both)
         i, j = np.array([0, 0, 1]), np.array([1, 2, 2])
         e, product = np.log(l), l[..., i] * l[..., j]
         near = np.abs(e[..., i] - e[..., j]) < _EQUAL
         apart = np.where(near, 1.0, l[..., i] ** 2 - l[..., j] ** 2)
         limit = (0.5 * (H[..., i, i] + H[..., j, j]) - H[..., i, j]) / (2.0 * product)
         a = np.where(near, limit, (t[..., i] - t[..., j]) / apart)
-        across = (l[..., j] ** 2 * a - t[..., j]) / product
-        ij, ji = 3 * i + j, 3 * j + i
-        axes[..., ij, ij] = axes[..., ji, ji] = a
-        axes[..., ij, ji] = axes[..., ji, ij] = across
-        u, v = self.u.astype(precision), self.v.astype(precision)
-        turn = (u[..., :, None, :, None] * v[..., None, :, None, :]).reshape(axes.shape)
-        return turn @ axes.astype(precision) @ np.swapaxes(turn, -1, -2)
-
-
-#: Singular vectors `u` and `v` (m, q, 3, 3) and values (m, q, 3) of deformation gradients `u diag(stretch) v^T`.
-Stretches = tuple[Floats, Floats, Floats]
-
-
-def stretches_of(F: Floats) -> Stretches:
-    """Principal stretches and their axes of deformation gradients (m, q, 3, 3)."""
-    # the axes of F^T F: two and a half times faster than singular values, and stretches are far from zero
-    squares, v = np.linalg.eigh(np.swapaxes(F, -1, -2) @ F)
-    stretch = np.sqrt(squares)
-    return F @ v / stretch[..., None, :], v, stretch
+        same[..., i, j] = same[..., j, i] = a
+        other[..., i, j] = other[..., j, i] = (l[..., j] ** 2 * a - t[..., j]) / product
+        return derivatives(self.u, self.v, both, same, other)
 
 
 def respond(

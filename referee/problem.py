@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 from scipy.sparse import bsr_matrix
 
 from referee.body import Body
-from referee.law import Law, Response, Stretches, respond
+from referee.law import Law, Response, respond
+from referee.principal import Stretches
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 #: Forces (n, 3) [N] at a displacement (n, 3) [m].
 Load = Callable[[Floats], Floats]
 #: Tetrahedra whose matrices are made together: what they need stays in the processor's cache.
-_TOGETHER = 64
+_TOGETHER = 512
 
 
 class Inverted(Exception):
@@ -112,14 +113,11 @@ class Problem:
             # with stretches along reference axes, so that gradients of nodes are the same in all tetrahedra
             axes = inverse[some, None]
             part = response.of(some)
-            A = replace(part, v=axes @ part.v).tangent(self.factor, precision)
+            A = replace(part, v=axes @ part.v).tangent(self.factor)
             if self.stress is not None:
                 # delta_ik S_JL
                 S = axes @ self.stress[some] @ np.swapaxes(axes, -1, -2)
-                for i in range(3):
-                    A[..., 3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += S
-            A *= volumes[some, :, None, None].astype(precision)
-            # (q, i J, k L) -> (q J L, i k)
-            A = A.reshape(-1, q, 3, 3, 3, 3).transpose(0, 1, 3, 5, 2, 4).reshape(-1, 9 * q, 9)
-            np.matmul(products, A, out=local[some])
+                A += S[..., None, None] * np.eye(3)
+            A *= volumes[some, :, None, None, None, None]
+            np.matmul(products, A.reshape(-1, 9 * q, 9).astype(precision), out=local[some])
         return self.body.pattern.matrix(local, None if self.springs is None else self.springs(u)[0])

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from referee.equilibrium import Balance
-from referee.law import Law, Stretches, respond, stretches_of
+from referee.law import Law, respond
+from referee.principal import Stretches, stretches_of
 from referee.problem import Problem
 from referee.setting import BOTH_LAWS, EACH, FIELD, LENGTHS, OVERALL, POISSON, mean_square
 from referee.sight import Change
