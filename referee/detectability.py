@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +71,20 @@ class Spread:
         """How much a change (rows,) would stand out without gross errors."""
         return float(np.sqrt(delta @ self.precision @ delta))
 
+    @property
+    def _both(self) -> Iterator[tuple[Floats, Bools]]:
+        """Each draw and its opposite: what is linear in it is no matter of chance then; which points are mistaken."""
+        return ((sign * e, wrong) for e, wrong in zip(self._drawn, self._wrong, strict=True) for sign in (1.0, -1.0))
+
+    def _mixture(self, precision: Floats) -> tuple[Mixture, list[float]]:
+        """Densities by a precision, and the logarithms of those of all draws."""
+        mixture = Mixture(precision, self._sight.numbers, self._sight.setting.gross)
+        return mixture, [mixture.log_density(e, wrong)[0] for e, wrong in self._both]
+
+    @cached_property
+    def _alone(self) -> tuple[Mixture, list[float]]:
+        return self._mixture(self.precision)
+
     def d(self, delta: Floats, others: Floats | None = None) -> float:
         """How much a change (rows,) stands out, where amounts of others (k, rows) are not known.
 
@@ -77,14 +92,13 @@ class Spread:
         logarithms and in the mean. Without gross errors that is ``D^T S^-1 D / 2``; with them it is no more, since they
         are the same with and without the change.
         """
-        precision = self.precision if others is None else without(others, self.precision)
-        mixture = Mixture(precision, self._sight.numbers, self._sight.setting.gross)
-        # of each draw its opposite, too: what is linear in it is no matter of chance then
-        ratios = [
-            mixture.log_density(sign * e, wrong)[0] - mixture.log_density(sign * e + delta, wrong)[0]
-            for e, wrong in zip(self._drawn, self._wrong, strict=True)
-            for sign in (1.0, -1.0)
-        ]
+        if others is None:
+            precision, (mixture, before) = self.precision, self._alone
+        else:
+            precision = without(others, self.precision)
+            mixture, before = self._mixture(precision)
+        after = [mixture.log_density(e + delta, wrong)[0] for e, wrong in self._both]
+        ratios = np.subtract(before, after)
         square = min(2.0 * float(np.mean(ratios)), float(delta @ precision @ delta))
         return float(np.sqrt(max(square, 0.0)))
 

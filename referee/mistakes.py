@@ -17,7 +17,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -51,16 +50,21 @@ def log_density(x: Floats, covariance: Floats) -> Floats:
     covariance : (k, 3, 3) array
         Of the noise [m^2].
     """
-    square = np.trace(covariance, axis1=1, axis2=2) / 3.0
+    variance = np.trace(covariance, axis1=1, axis2=2)
+    square = variance[:, None] / 3.0
     low, high = LENGTHS
     rho = 0.5 * (low + high) + 0.5 * (high - low) * _ABSCISSAE
     r = np.linalg.norm(x, axis=1)[:, None]
-    t = np.maximum(2.0 * r * rho / square[:, None], 1e-12)
+    t = np.maximum(2.0 * r * rho / square, 1e-12)
+    far = -0.5 * (r - rho) ** 2 / square
+    nearest = far.max(axis=1)
     # over directions of a mistake: (1 - exp(-t)) / t, with t = 2 r rho / c^2
-    logs = -0.5 * (r - rho) ** 2 / square[:, None] + np.log(-np.expm1(-t) / t)
-    shell = logsumexp(logs, b=0.5 * _WEIGHTS, axis=1) - 1.5 * (_LOG_2_PI + np.log(square))
-    wide = np.linalg.eigvalsh(covariance)[:, -1] > _BLURRED**2
-    if wide.any():
+    parts = np.exp(far - nearest[:, None]) * (-np.expm1(-t) / t)
+    shell = nearest + np.log(parts @ (0.5 * _WEIGHTS)) - 1.5 * (_LOG_2_PI + np.log(square[:, 0]))
+    # no axis of a covariance is longer than its trace
+    wide = np.flatnonzero(variance > _BLURRED**2)
+    wide = wide[np.linalg.eigvalsh(covariance[wide])[:, -1] > _BLURRED**2]
+    if len(wide):
         shell[wide] = _normal(x[wide], np.asarray(np.linalg.inv(covariance[wide] + _VARIANCE * np.eye(3))))
     return np.asarray(shell)
 
@@ -122,8 +126,8 @@ class Mixture:
         rows = self.points[wrong].ravel()
         log_share, log_odds = self._prior
         sound = len(self.points) * float(np.log1p(-self.share))
-        v, blocks = weighted[self.points], self._blocks
-        x, covariance = np.empty(v.shape), np.empty(blocks.shape)
+        v, precision = weighted[self.points], self._blocks
+        x, covariance = np.empty(v.shape), np.empty(precision.shape)
         log = sound
         if len(rows):
             inner = self.precision[np.ix_(rows, rows)]
@@ -131,15 +135,16 @@ class Mixture:
             mean = known @ weighted[rows]
             across = self.precision[:, rows][self.points]
             v = v - across @ mean
-            blocks = blocks - across @ known @ across.transpose(0, 2, 1)
+            precision = precision - across @ known @ across.transpose(0, 2, 1)
             x[wrong] = mean.reshape(-1, 3)
             covariance[wrong] = np.einsum("iaib->iab", known.reshape(len(rows) // 3, 3, -1, 3))
+            precision[wrong] = np.linalg.inv(covariance[wrong])
             # less the density of their rows given the sound ones
             log += 0.5 * (float(mean @ inner @ mean) + len(rows) * _LOG_2_PI - float(np.linalg.slogdet(inner)[1]))
-        covariance[~wrong] = np.linalg.inv(blocks[~wrong])
+        covariance[~wrong] = np.linalg.inv(precision[~wrong])
         x[~wrong] = np.einsum("kij,kj->ki", covariance[~wrong], v[~wrong])
         mistaken = log_density(x, covariance)
-        odds: Floats = log_odds + mistaken - _normal(x, np.asarray(np.linalg.inv(covariance)))
+        odds: Floats = log_odds + mistaken - _normal(x, precision)
         if wrong.any():
             log += float((log_share - sound / len(wrong) + mistaken[wrong]).sum())
         return log, odds
