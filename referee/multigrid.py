@@ -21,7 +21,7 @@ Bools = NDArray[np.bool_]
 _STEPS, _PART = 3, 8.0
 _MOST = 200
 #: Vectors that a matrix is multiplied with together.
-_WIDE = 8
+_WIDE = 16
 _Row = wp.types.vector(_WIDE, wp.float32)
 
 
