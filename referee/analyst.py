@@ -27,10 +27,11 @@ from referee.detectability import Spread, covariance
 from referee.diagnoses import NOT_PHYSICS
 from referee.draw import NOISY, OUTSIDE, RIGID_SHIFT, RIGID_TURN, UNEVEN
 from referee.effects.effect import unit
-from referee.equilibrium import Balance, balance
+from referee.equilibrium import Balance, balance_in_steps
 from referee.labels import effects_of, setting_of
 from referee.library import Draws, Forces, draws_of, library
 from referee.linear_response import LinearResponse
+from referee.make import steps_of
 from referee.mistakes import draw
 from referee.posterior import Analyst
 from referee.problem import Problem
@@ -114,7 +115,7 @@ def analysed(label: Mapping[str, Any]) -> dict[str, Any]:
     setting = setting_of(label)
     random = np.random.default_rng([setting.seed, 11])
     problem = setting.problem()
-    base = balance(problem)
+    base = balance_in_steps(problem, steps_of(len(label["attempts"])))
     sight = Sight(setting, place_sensors(setting), base.u, cap_force_of(problem, base.u))
     known, true, given = _known(label, random, problem, base, sight)
     residuals = _residuals(label, random, known, true)

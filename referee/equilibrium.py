@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from referee.law import Response
 from referee.multigrid import Coarse, Linear, NotSolved
-from referee.problem import Inverted, Problem
+from referee.problem import Inverted, Load, Problem
 
 Floats = NDArray[np.float64]
 
@@ -82,6 +83,20 @@ def balance(
         return _newton(problem, u, F, near, until)
     except (Inverted, NotSolved, np.linalg.LinAlgError) as error:
         raise NoTruth(str(error) or type(error).__name__) from error
+
+
+def balance_in_steps(problem: Problem, steps: int, until: float = np.inf) -> Balance:
+    """The same from rest, with what is prescribed and what loads put on in so many equal parts."""
+    start, near = None, None
+    for k in range(1, steps + 1):
+        loads = tuple(partial(_part, load, k / steps) for load in problem.loads)
+        now = balance(replace(problem, value=k / steps * problem.value, loads=loads), start, near, until)
+        start, near = now.u, now.linear
+    return now
+
+
+def _part(load: Load, part: float, u: Floats) -> Floats:
+    return part * load(u)
 
 
 def linearised(problem: Problem, u: Floats, response: Response, near: Linear | None = None) -> Linear:

@@ -28,8 +28,9 @@ from warpbrain.terminal.quiet import start_warp_quietly
 
 #: Rooms of a set.
 CASES, LABELS = "cases", "labels"
-#: Draws of a case at most.
-ATTEMPTS = 12
+#: Draws of a case whose load is put on at once, draws after them whose load is put on in steps, and these steps. What
+#: has a truth among the first stays as it is.
+ATTEMPTS, IN_STEPS, _STEPS = 12, 12, 4
 #: Draws of which each effect must stand out by as much as is wanted at least.
 STRICT = 4
 #: Processor time for one draw at most [s], after which it is given up.
@@ -110,14 +111,14 @@ def make_case(out: Path, name: str, plan: Planned, seed: Sequence[int], body: Se
     start_warp_quietly()
     started = time.perf_counter()
     given_up: list[str] = []
-    for attempt in range(ATTEMPTS):
+    for attempt in range(ATTEMPTS + IN_STEPS):
         try:
             truth = _draw(plan, [*seed, attempt], body)
             break
         except NoTruth as reason:
             given_up.append(str(reason))
     else:
-        raise NoTruth(f"{name}: no truth in {ATTEMPTS} draws: {'; '.join(given_up)}")
+        raise NoTruth(f"{name}: no truth in {len(given_up)} draws: {'; '.join(given_up)}")
     folder = out / CASES / name
     # half a folder of an interrupted making
     shutil.rmtree(folder, ignore_errors=True)
@@ -125,6 +126,11 @@ def make_case(out: Path, name: str, plan: Planned, seed: Sequence[int], body: Se
     write_folder(folder, name, truth)
     seal(out / LABELS, label_of(name, plan, truth, given_up))
     return f"{name} in {time.perf_counter() - started:.0f} s, {len(given_up)} draws given up"
+
+
+def steps_of(attempt: int) -> int:
+    """In how many steps the declared load of a draw is put on, of which so many were given up before."""
+    return 1 if attempt < ATTEMPTS else _STEPS
 
 
 def _draw(plan: Planned, seed: Sequence[int], body: Setting | None = None) -> Truth:
@@ -135,11 +141,12 @@ def _draw(plan: Planned, seed: Sequence[int], body: Setting | None = None) -> Tr
     if plan.kind == "trap":
         setting = trapped(random, plan.names[0], setting)
     until = time.process_time() + LIMIT
+    steps = steps_of(seed[-1])
     if plan.kind in ("none", "trap"):
-        return solve_truth(setting, (), until)
+        return solve_truth(setting, (), until, steps)
     # where a mechanism hardly shows in any body that was drawn, the largest sensible size of it must do
     least = LEAST if seed[-1] >= STRICT else BOTH if plan.kind == "two" else WANTED[0]
     wishes = [
         Wish(partial(draw_effect, random, name, setting), partial(wanted, random, least=least)) for name in plan.names
     ]
-    return solve_truth(setting, wishes, until)
+    return solve_truth(setting, wishes, until, steps)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from referee.creep import creep
 from referee.detectability import Detectability
 from referee.effects import Effect, Viscoelasticity
-from referee.equilibrium import Balance, NoTruth, balance
+from referee.equilibrium import Balance, NoTruth, balance, balance_in_steps
 from referee.problem import Problem
 from referee.sensing import Sensors, place_sensors
 from referee.setting import Setting
@@ -88,7 +88,7 @@ class Truth:
         return self.sensors.on_wall(self.u[-1] - self.declared)
 
 
-def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf) -> Truth:
+def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf, steps: int = 1) -> Truth:
     """Make effects so large that they stand out as much as is wanted, and solve.
 
     Parameters
@@ -97,6 +97,8 @@ def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf)
     wishes : sequence of Wish
     until : float
         See `referee.equilibrium.balance`.
+    steps : int
+        In which the declared load is put on.
 
     Raises
     ------
@@ -105,7 +107,7 @@ def solve_truth(setting: Setting, wishes: Sequence[Wish], until: float = np.inf)
     """
     problem = setting.problem()
     sensors = place_sensors(setting)
-    base = balance(problem, until=until)
+    base = balance_in_steps(problem, steps, until)
     held = cap_force_of(problem, base.u)
     if not wishes:
         u = np.repeat(base.u[None], max(1, len(setting.times)), axis=0)

@@ -9,6 +9,7 @@ from scipy.spatial.distance import pdist
 from concealed.sealing import open_sealed, read_sealed
 from referee import make
 from referee.draw import MECHANISMS, OUTSIDE, TRAPS, draw_effect, trapped
+from referee.equilibrium import NoTruth
 from referee.labels import label_of
 from referee.plan import SETS, Planned, planned
 from referee.setting import draw_setting
@@ -49,6 +50,22 @@ def test_a_case_of_every_class(plan, small, tmp_path):
         assert len(np.unique(case.recordings[0].time)) == 3
         # tissue that creeps is stiffer at first
         assert np.linalg.norm(label["clean_effect_m"][0]) > np.linalg.norm(label["clean_effect_m"][-1])
+
+
+def test_where_no_draw_has_a_truth_loads_are_put_on_in_steps(small, tmp_path, monkeypatch):
+    solved = make.solve_truth
+    asked = []
+
+    def hard(setting, wishes, until, steps):
+        asked.append(steps)
+        if steps == 1:
+            raise NoTruth("too much at once")
+        return solved(setting, wishes, until, steps)
+
+    monkeypatch.setattr(make, "solve_truth", hard)
+    make.make_case(tmp_path, "case-001", CLASSES[0], [7, 3])
+    assert asked == make.ATTEMPTS * [1] + [4]
+    assert len(open_sealed(read_sealed(tmp_path / "labels" / "case-001.json.gz"))["attempts"]) == make.ATTEMPTS
 
 
 def test_recordings_are_the_truth_within_noise(small, tmp_path):
@@ -149,6 +166,6 @@ def test_a_case_that_never_converges_is_reported(small, tmp_path, monkeypatch):
         raise make.NoTruth("no balance")
 
     monkeypatch.setattr(make, "solve_truth", fails)
-    with pytest.raises(make.NoTruth, match="12 draws"):
+    with pytest.raises(make.NoTruth, match="24 draws"):
         make.make_case(tmp_path, "case-001", CLASSES[0], [7, 1])
     assert not (tmp_path / "cases").exists()

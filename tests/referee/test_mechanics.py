@@ -8,9 +8,10 @@ from shapes import box, cube
 from referee.body import Body
 from referee.creep import creep
 from referee.effects.contact import Contact, Skull
-from referee.equilibrium import balance, linearised
+from referee.equilibrium import BALANCED, balance, balance_in_steps, linearised
 from referee.law import Demiray, Ogden, respond
 from referee.problem import Problem
+from referee.setting import draw_setting
 from warpbrain.mesh import TetMesh
 
 LAWS = [Ogden((0.6, 0.4), (3.0, -8.0)), Ogden((1.0,), (-20.0,)), Demiray(1.5)]
@@ -156,3 +157,11 @@ def test_creep_goes_from_the_stiff_answer_to_the_soft_one():
     assert found[0] > found[3] > found[-1]
     assert found[-1] == pytest.approx(end, rel=1e-3)
     assert found[3] / end == pytest.approx(1.0 - 0.5 * np.exp(-1.0), abs=0.025)
+
+
+def test_a_load_that_is_put_on_in_steps_ends_where_it_does_at_once(small):
+    problem = draw_setting(np.random.default_rng(4), "phantom", timed=False).problem()
+    at_once, in_steps = balance(problem), balance_in_steps(problem, 3)
+    # forces balance to 1e-5
+    np.testing.assert_allclose(in_steps.u, at_once.u, atol=1e-4 * np.abs(at_once.u).max())
+    assert in_steps.left < BALANCED
