@@ -23,7 +23,7 @@ CELLS = (8, 12, 20, 32, 55)
 #: Scripts with their arguments, and what has to be there.
 CODES = {
     ("run_warpbrain.py", "steps"): None,
-    ("run_warpbrain.py", "steps", "gpu"): "nvidia-smi",
+    ("run_warpbrain.py", "steps", "gpu", "assembly"): "nvidia-smi",
     ("run_calculix.py",): "ccx",
     ("run_felupe.py",): "felupe",
 }
@@ -70,7 +70,7 @@ def draw(measured: list[list[dict[str, Any]]], path: Path) -> None:
     """Time of an equilibrium and of a step, and peak memory, over the number of tetrahedra; `measured` by machines."""
     import matplotlib.pyplot as plt
 
-    figure, (times, memory) = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
+    figure, (times, memory) = plt.subplots(1, 2, figsize=(11.0, 5.6), layout="constrained")
     by_code: dict[str, list[dict[str, Any]]] = {}
     for rows in measured:
         solved = [row for row in rows if "failed" not in row]
@@ -78,7 +78,9 @@ def draw(measured: list[list[dict[str, Any]]], path: Path) -> None:
             by_code.setdefault(code, [row for row in solved if row["code"] == code])
     for code, own in by_code.items():
         sizes = [row["tetrahedra"] for row in own]
-        [line] = times.loglog(sizes, [row["together"] for row in own], "o-", label=f"{code}, equilibrium")
+        # of a GPU with its kernels loaded, which a process that solves once waits for
+        equilibria = [row.get("setup_again", row["setup"]) + row.get("solve_again", row["solve"]) for row in own]
+        [line] = times.loglog(sizes, equilibria, "o-", label=f"{code}, equilibrium")
         device = "device_mb" in own[0]
         held = [row["device_mb" if device else "peak_rss_mb"] for row in own]
         memory.loglog(sizes, held, "o-", color=line.get_color(), label=f"{code}, of the device" if device else code)
@@ -89,7 +91,7 @@ def draw(measured: list[list[dict[str, Any]]], path: Path) -> None:
     for axes, what in ((times, "processor time of one thread, wall time of a GPU [s]"), (memory, "peak memory [MB]")):
         axes.set(xlabel="tetrahedra", ylabel=what)
         axes.grid(alpha=0.3)
-        axes.legend(fontsize="small")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), fontsize="small")
     figure.savefig(path, dpi=120)
     sys.path.insert(0, str(FIGURES.parent))
     from figure_records import record
