@@ -172,6 +172,17 @@ def test_it_is_said_when_an_unknown_force_set_in(number: int, shape: str, diagno
     assert found.course in (("", shape) if number < 2 else ("",))
 
 
+@pytest.mark.slow
+def test_what_relaxes_by_no_law_that_is_looked_for_has_no_name(tmp_path) -> None:
+    """Where nothing that is looked for relaxes, a force that sets in fits what was recorded nearly as well."""
+    case = write_slow(tmp_path / "case", CAUSES["viscoelasticity"])
+    options = replace(_OPTIONS, candidates=("swelling", "traction", "gravity", "pressure"))
+    found = Diagnosing(case, options, "cpu").run()
+    assert found.verdict == "unknown" and found.unknown is not None and found.unknown.resistance
+    assert "tissue whose resistance changes in time fits better" in found.sentence
+    assert found.when is None
+
+
 def test_with_one_time_nothing_is_said(small_diagnosis: Diagnosis) -> None:
     assert small_diagnosis.when is None
     assert (

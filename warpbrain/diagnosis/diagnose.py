@@ -9,7 +9,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
 from warpbrain.diagnosis.checking import Confirming, check_errors, distance
-from warpbrain.diagnosis.locating import map_of_search, traits_of
+from warpbrain.diagnosis.locating import Traits, map_of_search, traits_of
 from warpbrain.diagnosis.measuring import imitations, next_measurements, smallest
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time
 from warpbrain.diagnosis.ranking import Ranking, about_base
@@ -35,6 +35,7 @@ from warpbrain.inference.predict import Prediction
 from warpbrain.physics.words import Measurement
 from warpbrain.seconds import Seconds
 from warpbrain.threads import one_thread_of_blas
+from warpbrain.worlds.body.causes import RESISTANCE
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, require_observable, screened
 from warpbrain.worlds.body.surfaces import with_sets_that_act
 from warpbrain.worlds.body.weighted_set import WeightedSet
@@ -132,7 +133,10 @@ class Diagnosing:
             where = map_of_search(search, options.draws, random, options.alpha)
             unknown, base, model = None, search.base, best.marginal.model
             if checked.decision.verdict in (UNKNOWN, NAMED_AND_REST):
-                unknown = traits_of(base.at, model, best.residual, base.typical_noise, search.spacing, where.centre)
+                unknown = replace(
+                    traits_of(base.at, model, best.residual, base.typical_noise, search.spacing, where.centre),
+                    resistance=search.likely_unknown(best) == RESISTANCE,
+                )
         with self.seconds.of("what would be seen"):
             confusion = imitations(search.causes, nothing.marginal.model)
             seen = smallest(search.causes, nothing.marginal.model, confusion)
@@ -152,7 +156,7 @@ class Diagnosing:
             rejected=dict(search.candidates.rejected) | dict.fromkeys(search.invisible, _INVISIBLE),
             combinations=_combinations(search),
             map=where,
-            when=_onset(search, checked.decision, best),
+            when=_onset(search, checked.decision, best, unknown),
             search=search,
             weighted_sets=weighted_sets,
             held_out=predictions,
@@ -286,9 +290,9 @@ def _combinations(search: HypothesisSearch) -> tuple[Combination, ...]:
     )
 
 
-def _onset(search: HypothesisSearch, decision: Decision, best: WeightedSet) -> Onset | None:
-    """Of the first cause that is named, or of an unknown force."""
-    if decision.verdict in (NOTHING, NOT_PHYSICS):
+def _onset(search: HypothesisSearch, decision: Decision, best: WeightedSet, unknown: Traits | None) -> Onset | None:
+    """Of the first cause that is named, or of an unknown force; None if nothing sets in."""
+    if decision.verdict in (NOTHING, NOT_PHYSICS) or (not best.mechanisms and unknown and unknown.resistance):
         return None
     if not best.mechanisms:
         return onset_of(search.base, None, False, best.marginal.model, best.residual)

@@ -172,6 +172,7 @@ class Traits:
     hidden: bool  # whether there seems to be a net force, which what holds the body may carry: it cannot be told
     surface_nats: float  # log Bayes factor of a force on the surface alone over one within the body alone
     centre: Floats  # (3,), where it is [m]
+    resistance: bool = False  # whether it is more like tissue whose resistance changes in time than a force or a strain
 
     @property
     def size(self) -> tuple[float, float]:

@@ -149,10 +149,11 @@ def sentence_of(diagnosis: Diagnosis) -> str:
     likely = [ranked for ranked in ranking if ranked.kind != UNKNOWN and ranked.probability > least][:2]
     errors = None if fit.explained is None else (length(fit.explained[1]), length(fit.refitted[1]))
     extent = 0.0 if diagnosis.unknown is None else float(np.ptp(diagnosis.case.mesh.points, axis=0).max())
+    resists = diagnosis.unknown is not None and diagnosis.unknown.resistance
     words = Words(
         data="these data",
         nothing="nothing was looked for",
-        unnamed="a force without a name",
+        unnamed="tissue whose resistance changes in time" if resists else "a force without a name",
         named=[effect_sentence(ranked, diagnosis.case.gravity_axis) for ranked in named],
         grounds=grounds([ranked.probability for ranked in named], "points", errors),
         members=[(_member(diagnosis, kind), chances.get(kind, 0.0)) for kind in diagnosis.group if kind != UNKNOWN],
@@ -216,6 +217,11 @@ def _where(ranked: Ranked) -> str:
 
 def traits_in_words(unknown: Traits, extent: float) -> str:
     """What is known of an unknown force in a body of an extent [m], to follow a sentence."""
+    if unknown.resistance:
+        return (
+            " The same loads move tissue further at one time than at another, as where it has a memory, wears or "
+            "heals: no force need act."
+        )
     size, sd = unknown.size
     where = f"about {place(unknown.centre, extent)}"
     if unknown.outside:

@@ -26,6 +26,7 @@ class Place:
     #: (n,): expected change of each row, whatever the size, such as the weight at a level of the fluid; zero if not
     #: given.
     mean: Floats | None = None
+    label: str = ""  # which of several things a cause is here
 
 
 @dataclass(frozen=True, eq=False)

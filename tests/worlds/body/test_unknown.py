@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
+from slow_block import CAUSES, TIMES, write_slow
 
+from warpbrain.estimation.parameters import declared
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.unknown import Strains, _unit_stresses, body_forces, fields, pressures
+from warpbrain.worlds.body.nuisances import other_volume
+from warpbrain.worlds.body.states import Hypothesis, States
+from warpbrain.worlds.body.unknown import Strains, _unit_stresses, body_forces, fields, pressures, resistances
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +96,21 @@ def test_a_strain_elsewhere_is_in_the_same_unit(at):
     strains = Strains(at, 0.18 * at.system.model.mesh.radius, 0.3 * at.system.model.mesh.radius)
     again = strains.at_centres(strains.centres[2:4])
     np.testing.assert_allclose(again, strains.columns[2:4], atol=1e-9 * np.abs(strains.columns[2]).max())
+
+
+def test_tissue_that_is_softer_at_one_time_moves_as_equilibria_of_softer_tissue(tmp_path):
+    """At each time the body is in equilibrium with the moduli of that time (central differences)."""
+    states = States(write_slow(tmp_path / "case", CAUSES["viscoelasticity"]), "cpu")
+    theta, field = declared(states.case, states.parameters), np.zeros(states.modes.shape[1])
+    assert len(theta) == 1, "the logarithm of the modulus"
+    step = 1e-4
+    softer, stiffer = (states.solve(Hypothesis(theta + sign * step, field)).sensors.computed for sign in (-1.0, 1.0))
+    at = states.solve(Hypothesis(theta, field)).linearised()
+    columns = resistances(at, TIMES, other_volume(states))
+    rows = at.sensors.is_displacement
+    assert np.mean(np.sum(columns[rows] ** 2, axis=1)) == pytest.approx(1.0)
+    # more and more, less and less, and in between alone
+    for course in ((0.0, 0.5, 1.0), (1.0, 0.3, 0.1), (0.0, 1.0, 0.0)):
+        expected = np.interp(at.sensors.times, TIMES, course) * (softer - stiffer) / (2.0 * step)
+        left = expected - columns @ np.linalg.lstsq(columns, expected, rcond=None)[0]
+        assert np.linalg.norm(left) < 0.03 * np.linalg.norm(expected), "what `unknown.cut` leaves out"

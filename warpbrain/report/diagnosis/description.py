@@ -123,7 +123,7 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
         "unknown": _picked(
             diagnosis.unknown, "turning", net_force_n="force", net_force_sd_n="force_sd", net_moment_nm="moment",
             net_moment_sd_nm="moment_sd", from_outside="outside", net_force_hidden="hidden",
-            surface_over_depth_nats="surface_nats", centre_m="centre",
+            surface_over_depth_nats="surface_nats", centre_m="centre", resistance_in_time="resistance",
         ),
         "when": onset and {
             "seconds": [onset.first, onset.last],

@@ -30,7 +30,7 @@ from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
 from warpbrain.worlds.body.sensors import Sensors, noise_of, tracked_points
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
-from warpbrain.worlds.body.unknown import Strains, body_forces, fields
+from warpbrain.worlds.body.unknown import Strains, body_forces, fields, resistances
 
 #: Gauss-Newton steps at most; the last one moves tissue and field by less than this [standard deviations].
 _STEPS, _CONVERGED = 6, 0.5
@@ -53,6 +53,7 @@ class Base:
     nuisances: Nuisances
     unknown: dict[str, Floats]  # (n, k), columns of unknown fields, of 1 m
     strains: Strains  # unknown, in one place
+    resistance: Floats  # (n, k), unknown, of tissue; see `resistances`
     #: Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
     model: GaussianModel
     #: The same noise without columns, and with what the mesh does not resolve, of each size of `mesh.unresolved`; of
@@ -159,6 +160,7 @@ class BaseFinder:
             nuisances,
             unknown,
             strains,
+            resistances(linear.at, self.states.times, other_volume(self.states)),
             GaussianModel(factor, nuisances.columns),
             _noises(linear, resolved=errors is None or self._without_nuisances),
             linear.noise,

@@ -168,6 +168,13 @@ class HypothesisSearch:
             self._sets[fitted.names] = fitted
         return fitted
 
+    def likely_unknown(self, beside: WeightedSet) -> str:
+        """Label of what is unknown, were it that alone which acts beside a weighted set."""
+        cause = self.causes.named(UNKNOWN)
+        screened = posterior(beside.marginal.model, beside.residual, (cause,), _search(most=1))
+        [member] = next(hypothesis.best.members for hypothesis in screened if hypothesis.causes)
+        return cause.places[member.place].label
+
     def failure_with(self, mechanisms: frozenset[str]) -> str:
         """Why the most probable set with exactly these mechanisms could not be fitted."""
         return next((candidate.failure for candidate in self._with_mechanisms(mechanisms) if candidate.failure), "")

@@ -1,5 +1,5 @@
-"""Unknown causes as columns over sensors: smooth random fields of body force, eigenstress, traction and pressure, or a
-strain in one place.
+"""Unknown causes as columns over sensors: smooth random fields of body force, eigenstress, traction and pressure, a
+strain in one place, or tissue whose resistance changes in time.
 
 Each field is a sum of Gaussian patches with independent coefficients, a Gaussian process of that length. An eigenstress
 `s` acts within the body: its nodal forces `-V s grad N` have no net force and no moment. Fluids, and what slides along
@@ -16,10 +16,13 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import node_areas, node_vectors, nodes_of
+from warpbrain.physics.proposal import Proposal, modes_between
 from warpbrain.physics.words import number
 from warpbrain.threads import in_threads
+from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
+from warpbrain.worlds.body.time_courses import finite_times, modes_of
 
 #: Components of a symmetric tensor.
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
@@ -136,6 +139,37 @@ def _gaussians(points: Floats, sites: Floats, length: float) -> Floats:
     from scipy.spatial.distance import cdist
 
     return np.asarray(np.exp(-0.5 * (cdist(points, sites) / length) ** 2))
+
+
+def resistances(at: Linearisation, times: Sequence[float], volume: Proposal) -> Floats:
+    """Columns (n, k) of tissues that resist more or less at one of several times [s] than at another; none of one time.
+
+    That is what a law with memory, wear or healing does, whatever its form: under the same loads the body moves further
+    or creeps back. The logarithm of each tissue's moduli has the modes of a course, and beside it that of how much all
+    of them resist a change of volume more than one of shape.
+
+    `volume`: of another Poisson ratio; its coefficient is a logarithm, too.
+    """
+    sensors = at.sensors
+    if len(times) < 2:
+        return np.zeros((len(sensors), 0))
+    mesh = at.system.model.mesh
+    tissues = (mesh.tissue[:, None] == np.array(mesh.labels)).astype(np.float64)
+    ends, modes = finite_times(np.array(times)), modes_of(len(times))
+
+    def about(state: Linearisation, seconds: Floats) -> Floats:
+        """`seconds` (m,): of the rows (m) of that state."""
+        courses = modes_between(ends, modes, finite_times(np.concatenate([times, seconds]))[len(times) :])
+        [bulk] = Effects(state).of([volume])
+        columns = np.column_stack([state.answers_of_elements(state.element_forces, tissues), bulk.columns / volume.sd])
+        return np.asarray((columns[:, :, None] * courses[:, None]).reshape(len(seconds), -1))
+
+    if not at.moments:
+        return _visible_modes(about(at, sensors.times), sensors.is_displacement)
+    columns = np.zeros((len(sensors), (tissues.shape[1] + 1) * modes.shape[1]))
+    for moment in at.moments:
+        columns[moment.rows] += moment.sign * about(moment.at, np.full(len(moment.rows), moment.time))
+    return _visible_modes(columns, sensors.is_displacement)
 
 
 def stress_beside_held(at: Linearisation, length: float) -> Floats:
