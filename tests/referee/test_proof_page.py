@@ -32,7 +32,7 @@ def test_rows_are_what_was_scored(row):
     scores = [json.loads(file.read_text(encoding="utf-8")) for file in files]
 
     def told(name: str, of: list) -> str:
-        return " of ".join(str(sum(one["shares"][name][part] for one in of)) for part in ("hits", "of"))
+        return "/".join(str(sum(one["shares"][name][part] for one in of)) for part in ("hits", "of"))
 
     assert row[4] == " + ".join(str(one["cases"]) for one in scores)
     assert row[5:] == [
