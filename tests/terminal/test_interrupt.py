@@ -121,6 +121,20 @@ def test_while_benching(tmp_path):
     assert files(tmp_path) == []
 
 
+def test_while_text_is_executed(tmp_path):
+    """As dataclasses and Warp do when they make functions: `python -m` would end by the signal, without a status."""
+    (tmp_path / "program.py").write_text("""
+from warpbrain.terminal.command import exit_status
+
+raise SystemExit(exit_status("program", lambda: exec("raise KeyboardInterrupt")))
+""")
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    with started("-m", "program", PYTHONPATH=path) as process:
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.strip() == "program: interrupted; nothing half-written was left"
+
+
 def test_nothing_is_changed_by_a_run_that_is_not_interrupted():
     from warpbrain.terminal.interrupt import stop_promptly
 

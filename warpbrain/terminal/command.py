@@ -77,6 +77,9 @@ def exit_status(program: str, call: Callable[[], None], record: Record | None = 
         clear_up()
         print(f"\n{program}: interrupted; nothing half-written was left", file=sys.stderr)
         leave_compiler()
+        # `python -m` ends by the signal itself, whatever status is returned, if the interrupt fell into text that was
+        # executed, as dataclasses and Warp do, and no other text has been executed since
+        exec("")
         return 130
     except Exception as error:
         arguments, doing = ((), "") if record is None else (record.arguments, record.doing)
