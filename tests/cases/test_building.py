@@ -1,6 +1,8 @@
 """The build: its parts on shapes with known answers, and the whole against the shipped files."""
 
 import json
+import subprocess
+import sys
 from importlib.resources import files
 
 import numpy as np
@@ -22,6 +24,12 @@ ZERO, TWO = np.zeros(3), np.full(3, 2.0)
 
 def sphere(radius: float):
     return lambda points: radius - np.linalg.norm(points - 1.0, axis=1)
+
+
+def test_what_runs_mmg_loads_nothing_else():
+    """It is a process for each of dozens of tries at a mesh."""
+    code = "import sys, warpbrain.cases.building.mmg; print({'scipy', 'meshio', 'warp'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
 
 
 def test_lattice_is_regular():
