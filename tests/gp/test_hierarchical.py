@@ -9,7 +9,6 @@ from warpbrain.gp.hierarchy import (
     Hierarchical,
     Hierarchy,
     Places,
-    Structure,
     fit_hierarchy,
     negative_log_likelihood,
     observations,
@@ -35,12 +34,10 @@ def modulus(model, groups, stretches, number, seed=0):
 def test_gradient(kernel):
     seen = observations(read_studies("corrected")[20:60:3])
     vector = prior()[0] + 0.2 * np.random.default_rng(0).normal(size=len(EFFECTS) + 1)
-    structure = Structure.of(seen.places, seen.places)
-    _, gradient = negative_log_likelihood(Hierarchy.from_vector(vector, kernel), seen, structure)
+    _, gradient = negative_log_likelihood(Hierarchy.from_vector(vector, kernel), seen)
     for k, step in enumerate(1e-4 * np.eye(len(vector))):
         ahead, behind = (
-            negative_log_likelihood(Hierarchy.from_vector(v, kernel), seen, structure)[0]
-            for v in (vector + step, vector - step)
+            negative_log_likelihood(Hierarchy.from_vector(v, kernel), seen)[0] for v in (vector + step, vector - step)
         )
         assert gradient[k] == pytest.approx((ahead - behind) / 2e-4, rel=1e-4, abs=1e-5), k
 

@@ -115,6 +115,11 @@ class Observations:
     places: Places
     log_modulus: Floats
 
+    @cached_property
+    def among(self) -> Structure:
+        """Of their places with themselves, which every hierarchy shares."""
+        return Structure.of(self.places, self.places)
+
 
 def observations(studies: Sequence[Study]) -> Observations:
     """Secant moduli: `STRETCHES` for a hyperelastic study, one for another."""
@@ -322,14 +327,13 @@ def fit_hierarchy(
     from scipy.optimize import minimize
 
     mean, spread = prior()
-    structure = Structure.of(seen.places, seen.places)
     start = mean if first is None else first.to_vector()
     fixed = np.array([name in without for name in EFFECTS] + [False])
     start = np.where(fixed, np.log(_NONE), start)
 
     def objective(vector: Floats) -> tuple[float, Floats]:
         hierarchy = Hierarchy.from_vector(vector, kernel, mean_asymmetry)
-        value, gradient = negative_log_likelihood(hierarchy, seen, structure)
+        value, gradient = negative_log_likelihood(hierarchy, seen)
         away = np.where(fixed, 0.0, (vector - mean) / spread)
         gradient = np.where(fixed, 0.0, gradient)
         return value + 0.5 * float(away @ away), gradient + away / spread
@@ -338,7 +342,7 @@ def fit_hierarchy(
     if not np.isfinite(end.fun):
         raise SolveError("the covariance of the studies is not positive definite in double precision")
     hierarchy = Hierarchy.from_vector(end.x, kernel, mean_asymmetry)
-    condition = float(np.linalg.cond(hierarchy.covariance_of(structure) + REST**2 * np.eye(len(seen.log_modulus))))
+    condition = float(np.linalg.cond(hierarchy.covariance_of(seen.among) + REST**2 * np.eye(len(seen.log_modulus))))
     return hierarchy, Fitted(float(end.fun), bool(end.success), str(end.message), int(end.nit), condition)
 
 
@@ -354,11 +358,10 @@ def sample_hierarchies(best: Hierarchy, seen: Observations, count: int) -> tuple
     _, spread = prior()
     free = centre > np.log(2.0 * _NONE)
     curvature = np.diag(spread**-2.0)
-    structure = Structure.of(seen.places, seen.places)
-    _, here = negative_log_likelihood(best, seen, structure)
+    _, here = negative_log_likelihood(best, seen)
     for k in np.flatnonzero(free):
         ahead = Hierarchy.from_vector(centre + _STEP * np.eye(len(centre))[k], best.kernel, best.mean_asymmetry)
-        curvature[:, k] += (negative_log_likelihood(ahead, seen, structure)[1] - here) / _STEP
+        curvature[:, k] += (negative_log_likelihood(ahead, seen)[1] - here) / _STEP
     values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T)[np.ix_(free, free)])
     # the posterior is no wider than the prior along any direction
     root = vectors / np.sqrt(np.maximum(values, 1.0 / spread.max() ** 2))
@@ -368,23 +371,20 @@ def sample_hierarchies(best: Hierarchy, seen: Observations, count: int) -> tuple
     return tuple(Hierarchy.from_vector(vector, best.kernel, best.mean_asymmetry) for vector in vectors)
 
 
-def negative_log_likelihood(hierarchy: Hierarchy, seen: Observations, structure: Structure) -> tuple[float, Floats]:
-    """Of observations, with its derivative by `Hierarchy.to_vector`; infinite if the covariance cannot be factored.
-
-    The structure is that of their places with themselves, which many hierarchies share.
-    """
+def negative_log_likelihood(hierarchy: Hierarchy, seen: Observations) -> tuple[float, Floats]:
+    """Of observations, with its derivative by `Hierarchy.to_vector`; infinite if the covariance cannot be factored."""
     from scipy.linalg import cho_solve, cholesky
 
     identity = np.eye(len(seen.log_modulus))
     away = seen.log_modulus - CENTRE
     try:
-        L = cholesky(hierarchy.covariance_of(structure) + REST**2 * identity, lower=True)
+        L = cholesky(hierarchy.covariance_of(seen.among) + REST**2 * identity, lower=True)
     except np.linalg.LinAlgError:
         return np.inf, np.zeros(len(EFFECTS) + 1)
     weights = cho_solve((L, True), away)
     G = 0.5 * (cho_solve((L, True), identity) - np.outer(weights, weights))
     value = 0.5 * float(away @ weights) + float(np.log(np.diag(L)).sum()) + 0.5 * len(away) * np.log(2.0 * np.pi)
-    return value, hierarchy.slopes(structure, G)
+    return value, hierarchy.slopes(seen.among, G)
 
 
 #: Stretches at which draws are drawn; between them they are the mean given these values.
@@ -429,7 +429,7 @@ class Conditional:
         """The factor of the covariance of the observations, and what it makes of them."""
         from scipy.linalg import cholesky, solve_triangular
 
-        among = self.hierarchy.covariance(self.seen.places, self.seen.places)
+        among = self.hierarchy.covariance_of(self.seen.among)
         L = cholesky(among + REST**2 * np.eye(len(among)), lower=True)
         return L, solve_triangular(L, self.seen.log_modulus - CENTRE, lower=True)
 
