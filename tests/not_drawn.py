@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any, BinaryIO
-from unittest.mock import patch
+from unittest.mock import MagicMock, patch
 
 import numpy as np
 
@@ -48,11 +48,15 @@ def _no_outline(*_args: object) -> np.ndarray:
     return np.zeros((0, 2, 2))
 
 
+#: What begins the process that renders.
+RENDERER = "warpbrain.report.rendering._begin"
 _STAND_INS: tuple[tuple[str, Callable[..., object]], ...] = (
     # before what imports them by name
     ("warpbrain.report.slices.cut", _no_cut),
     ("warpbrain.report.slices.outline", _no_outline),
     ("warpbrain.report.picture.render", white),
+    # which would load its libraries for nothing
+    (RENDERER, MagicMock),
     ("warpbrain.report.views.write_png", not_drawn),
     ("warpbrain.report.page.scene._cut", _empty),
 )

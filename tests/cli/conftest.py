@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from unittest.mock import MagicMock
+
 import pytest
-from not_drawn import not_drawn, white
+from not_drawn import RENDERER, not_drawn, white
 
 from warpbrain.report import picture, views
 
 
 @pytest.fixture(autouse=True, scope="module")
 def blank():
-    """White bodies: the renderer takes seconds, and `tests/report/test_picture.py` looks at what it makes."""
+    """White bodies: the renderer takes seconds, and `tests/report/test_picture.py` looks at what it makes.
+
+    Nor is its process begun, which takes one more until it has loaded what it draws with.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(picture, "render", white)
+        patch.setattr(RENDERER, MagicMock)
         yield
 
 
