@@ -125,15 +125,25 @@ class Noise:
         """The same with the most probable gross errors; arguments as of `log_evidence`."""
         if self.outliers is None or not self.rows.points:
             return self
-        sound = replace(self, inflation=np.ones_like(self.inflation))
+        sound = self._but(self.scale, np.ones_like(self.inflation))
         model = sound._model.with_columns(columns)
-        return replace(self, inflation=with_gross_errors(model, expected, self.rows.points, self.outliers).inflation)
+        inflation = with_gross_errors(model, expected, self.rows.points, self.outliers).inflation
+        return self if np.array_equal(inflation, self.inflation) else sound._but(self.scale, inflation)
 
     def with_likely_scale(self, expected: Floats, columns: Floats) -> Noise:
         """The same with the most probable factor on it."""
         low, *_, high = sorted(scales()[0].tolist())
         model = self._model.of_noise(columns)
-        return replace(self, scale=_likely_scale(model, expected, low, high, log_scale_density))
+        return self._but(_likely_scale(model, expected, low, high, log_scale_density), self.inflation)
+
+    def _but(self, scale: float, inflation: Floats) -> Noise:
+        """The same of another scale, or with other gross errors: what neither changes is not made again."""
+        other = replace(self, scale=scale, inflation=inflation)
+        other.__dict__["_covariance"] = self._covariance
+        if np.array_equal(other.inflation, self.inflation):
+            other.__dict__["factor"] = self.factor
+            other.__dict__["_model"] = self._model.of_noise(self._model.columns, other.scale)
+        return other
 
     def with_likely_sigma(self, members: Bools, expected: Floats, columns: Floats) -> Noise:
         """The same with another size of a recording (n,) that declares none: the likeliest of its own rows."""

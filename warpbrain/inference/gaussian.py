@@ -97,6 +97,8 @@ class GaussianModel:
 
     def rows(self, rows: Bools) -> GaussianModel:
         """The marginal distribution of some rows, (n,) bool."""
+        if rows.all():
+            return self
         noise = self.noise_factor[rows]
         factor: Floats = np.asarray(np.linalg.cholesky(noise @ noise.T), dtype=np.float64)
         return GaussianModel(factor, self.columns[rows], self.scale)
@@ -117,7 +119,8 @@ class GaussianModel:
 
     def noise_blocks(self, rows: Ints) -> Floats:
         """Covariance (g, d, d) of the noise of points with the rows (g, d)."""
-        return np.asarray(self.scale**2 * self._noise.covariance[rows[:, :, None], rows[:, None, :]])
+        factor = self.scale * self.noise_factor[rows]
+        return factor @ factor.transpose(0, 2, 1)
 
     def precision_columns(self, rows: Ints) -> Floats:
         """Columns (n, d) of `S^-1` by their numbers (d,)."""
