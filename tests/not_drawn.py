@@ -6,13 +6,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from subprocess import Popen
 from typing import Any, BinaryIO
-from unittest.mock import MagicMock, patch
+from unittest.mock import patch
 
 import numpy as np
 
 from warpbrain.cli import main
-from warpbrain.report.rendering import NAMES
+from warpbrain.report.rendering import NAMES, _begin
 from warpbrain.report.slices import Cut
 
 
@@ -29,10 +30,35 @@ def white(_scene: object, _cameras: object, size: tuple[int, int]) -> dict[str, 
     return {name: np.full((size[1], size[0], 3), 255, np.uint8) for name in NAMES}
 
 
+class BegunLate:
+    """The process that renders, begun when something is rendered: it loads its libraries for nothing in most tests."""
+
+    def __init__(self) -> None:
+        self._process: Popen[str] | None = None
+        self._killed = False
+
+    def kill(self) -> None:
+        self._killed = True
+
+    def __enter__(self) -> Popen[str] | None:
+        if not self._killed:
+            self._process = _begin()
+        return self._process
+
+    def __exit__(self, *error: Any) -> None:
+        if self._process is not None:
+            self._process.__exit__(*error)
+
+
 def not_drawn(figure: object, stream: BinaryIO, _dpi: float) -> None:
     """A file of curves, of a page or by itself, without any: how they are drawn is tested by `tests/report`."""
     assert figure is not None
     stream.write(b"\x89PNG" + bytes(5000) + b"IEND\xaeB`\x82")
+
+
+def not_laid_out(figure: object, _dpi: float = 0.0) -> None:
+    """Nothing of a figure is measured, which takes as long as all else of a run of a small case."""
+    assert figure is not None
 
 
 def _empty(view: Any, name: str, _axis: int, _place: float) -> dict[str, object]:
@@ -55,8 +81,8 @@ _STAND_INS: tuple[tuple[str, Callable[..., object]], ...] = (
     ("warpbrain.report.slices.cut", _no_cut),
     ("warpbrain.report.slices.outline", _no_outline),
     ("warpbrain.report.picture.render", white),
-    # which would load its libraries for nothing
-    (RENDERER, MagicMock),
+    (RENDERER, BegunLate),
+    ("warpbrain.report.views.lay_out", not_laid_out),
     ("warpbrain.report.views.write_png", not_drawn),
     ("warpbrain.report.page.scene._cut", _empty),
 )

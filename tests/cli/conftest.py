@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from unittest.mock import MagicMock
-
 import pytest
-from not_drawn import RENDERER, not_drawn, white
+from not_drawn import RENDERER, BegunLate, not_drawn, not_laid_out, white
 
 from warpbrain.report import picture, views
 
@@ -14,20 +12,21 @@ from warpbrain.report import picture, views
 def blank():
     """White bodies: the renderer takes seconds, and `tests/report/test_picture.py` looks at what it makes.
 
-    Nor is its process begun, which takes one more until it has loaded what it draws with.
+    Nor is its process begun ahead, which takes one more until it has loaded what it draws with.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(picture, "render", white)
-        patch.setattr(RENDERER, MagicMock)
+        patch.setattr(RENDERER, BegunLate)
         yield
 
 
 @pytest.fixture
 def drawn() -> None:
-    """Curves are drawn. Of most runs nobody looks at them: how they are drawn is tested by `tests/report`."""
+    """Figures are laid out and drawn. At those of most runs nobody looks: `tests/report` tests how that is done."""
 
 
 @pytest.fixture(autouse=True)
 def _pictures(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     if "drawn" not in request.fixturenames:
+        monkeypatch.setattr(views, "lay_out", not_laid_out)
         monkeypatch.setattr(views, "write_png", not_drawn)
