@@ -11,13 +11,13 @@ import hashlib
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
-from multiprocessing import get_context
-from multiprocessing.synchronize import Event
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -202,8 +202,7 @@ class Processes:
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
         """See `Workers`; `SolveError` if a process is ended from outside."""
         context = get_context("spawn")
-        stop = context.Event()
-        pool = ProcessPoolExecutor(self._count, context, _live_with, (os.getpid(), stop))
+        pool = ProcessPoolExecutor(self._count, context, _live_with, (os.getpid(),))
         try:
             parts = parts_of(job, self._count, self._batch or ENOUGH["cpu"])
             pending = [pool.submit(compute_part, part, "cpu", self._batch, self._prepare) for part in parts]
@@ -212,9 +211,11 @@ class Processes:
         except BrokenProcessPool:
             raise SolveError("a worker process was ended; the same command goes on with what is missing") from None
         finally:
-            # what they are at is wanted no more; the interpreter would wait for it before it ends
-            stop.set()
             pool.shutdown(wait=False, cancel_futures=True)
+            # what they are at is wanted no more, and the interpreter would wait for it; one that still begins would
+            # find this process gone, and say so
+            for process in active_children():
+                process.kill()
 
 
 def kind_of(device: str | None) -> str:
@@ -235,13 +236,13 @@ def parts_of(job: Job, workers: int, least: int) -> list[Job]:
     return [job.part({s.number for s in samples[k : k + size]}) for k in range(0, len(samples), size)]
 
 
-def _live_with(parent: int, stop: Event) -> None:
-    """Prepare a worker process: it ends when told to or with its parent, however that ends; Ctrl-C is left to that."""
+def _live_with(parent: int) -> None:
+    """Prepare a worker process: it ends with its parent, however that ends; Ctrl-C is left to that."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
-        while os.getppid() == parent and not stop.wait(0.5):
-            pass
+        while os.getppid() == parent:
+            time.sleep(0.5)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
