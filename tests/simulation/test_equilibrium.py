@@ -342,8 +342,7 @@ def test_limit_load_is_told(device: str, verify: Row) -> None:
     start = EquilibriumSolver(above).solve(external=half).u
     with pytest.raises(SolveError) as failure:
         EquilibriumSolver(above, EquilibriumOptions(min_load_step=0.005, pass_unstable=False)).solve(start=start)
-    error = abs(failed_fraction(failure) - (1.0 - 0.5) / (1.25 - 0.5))
-    verify("limit load of a softening law, from a state under half of it", "Considere's condition", error, 0.01)
+    assert abs(failed_fraction(failure) - (1.0 - 0.5) / (1.25 - 0.5)) < 0.01
 
 
 RUBBER = Material(NeoHookean(1000.0), 0.499, "uncoupled")
