@@ -124,6 +124,19 @@ def test_solver_starts_where_it_is_told(device: str) -> None:
     assert np.abs(other.u - expected.u).max() <= 1e-8 * np.abs(expected.u).max()
 
 
+def test_from_a_start_its_branch_is_gone_along(device: str) -> None:
+    """What cannot be reached at once: in steps from the load that holds the start, not from a part of the whole one."""
+    system = System(pushed(BRAIN, -2.0), device)
+    full = system.model.external_forces()
+    start = EquilibriumSolver(system, EquilibriumOptions(tolerance=1e-10)).solve(external=-0.5 * full).u
+    impatient = EquilibriumOptions(tolerance=1e-10, max_newton=8)
+    found = EquilibriumSolver(system, impatient).solve(start=start)
+    loads = [step.load for step in found.history]
+    assert min(loads) < 1.0
+    expected = EquilibriumSolver(system, EquilibriumOptions(tolerance=1e-10)).solve()
+    assert np.abs(found.u - expected.u).max() <= 1e-8 * np.abs(expected.u).max()
+
+
 def test_same_bits_every_time(device: str, precision) -> None:
     one, other = (
         solve_equilibrium(System(stretched(MATERIALS["ogden -4.7, coupled"], 0.2), device, precision.name))
@@ -324,6 +337,12 @@ def test_limit_load_is_told(device: str, verify: Row) -> None:
     # to the smallest load step, 1 %, at which the solver gives up
     error = abs(failed_fraction(failure) - 1.0 / 1.25)
     verify("limit load of a softening law, of the load", "Considere's condition", error, 0.01)
+    # from a state under half of the limit: as much of what is added
+    half = 0.5 / 1.25 * above.model.external_forces()
+    start = EquilibriumSolver(above).solve(external=half).u
+    with pytest.raises(SolveError) as failure:
+        EquilibriumSolver(above, EquilibriumOptions(min_load_step=0.005, pass_unstable=False)).solve(start=start)
+    assert abs(failed_fraction(failure) - (1.0 - 0.5) / (1.25 - 0.5)) < 0.01
 
 
 RUBBER = Material(NeoHookean(1000.0), 0.499, "uncoupled")

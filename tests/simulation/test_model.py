@@ -119,8 +119,14 @@ def test_simulator_refuses(device: str) -> None:
         Simulator(system).set_time_step(0.0)
 
 
-@pytest.mark.parametrize("name", ["tolerance", "min_load_step", "cg_tolerance"])
+@pytest.mark.parametrize("name", ["tolerance", "cg_tolerance"])
 @pytest.mark.parametrize("value", [0.0, 1.0, -1.0, math.nan])
 def test_equilibrium_options_refuse(name: str, value: float) -> None:
     with pytest.raises(InputError, match=f"equilibrium: {name} = .*: expected a number between 0 and 1"):
         EquilibriumOptions(**{name: value})
+
+
+@pytest.mark.parametrize(("least", "most"), [(0.0, 1.0), (-0.1, 1.0), (math.nan, 1.0), (0.1, 1.1), (0.5, 0.4)])
+def test_load_steps_refuse(least: float, most: float) -> None:
+    with pytest.raises(InputError, match=f"equilibrium: min_load_step = {least}, max_load_step = {most}: expected"):
+        EquilibriumOptions(min_load_step=least, max_load_step=most)

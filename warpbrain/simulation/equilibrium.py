@@ -4,6 +4,10 @@ The potential is `Pi(u) = stored energy - t f . u` at load fraction `t`. An iter
 every element and a sufficient decrease of `Pi` (Armijo). Prescribed displacements enter the first linear solve of a
 load step through `K d`: writing them into the state first would distort the elements along the boundary before the
 interior can follow. Linear systems are solved inexactly while far from the solution (Eisenstat and Walker 1996).
+
+From a start `u0` that is not rest, and does not lead to equilibrium at once, the way is `r(u) = (1 - t) r(u0)`, with
+what is out of balance under the full load as `r`: a path of equilibria from the start to that under the load (Newton's
+homotopy: Keller 1978, Global homotopies and Newton methods).
 """
 
 from __future__ import annotations
@@ -86,12 +90,15 @@ class EquilibriumOptions:
     max_augmentations: int = 20
 
     def __post_init__(self) -> None:
-        for name in ("tolerance", "min_load_step", "cg_tolerance"):
+        for name in ("tolerance", "cg_tolerance"):
             value = getattr(self, name)
             if not 0.0 < value < 1.0:
                 raise InputError(f"equilibrium: {name} = {value}: expected a number between 0 and 1")
-        if not self.min_load_step <= self.max_load_step <= 1.0:
-            raise InputError(f"equilibrium: max_load_step = {self.max_load_step}: expected min_load_step to 1")
+        if not 0.0 < self.min_load_step <= self.max_load_step <= 1.0:
+            raise InputError(
+                f"equilibrium: min_load_step = {self.min_load_step}, max_load_step = {self.max_load_step}: expected "
+                "numbers above 0 and at most 1, the first the smaller"
+            )
 
 
 @dataclass(frozen=True)
@@ -194,7 +201,8 @@ class EquilibriumSolver:
         external : (n, 3) array, optional
             Nodal forces at full load [N]; those of the model by default.
         start : (n, 3) array, optional
-            Displacement to start from [m], taken as in equilibrium at no load.
+            Displacement to start from [m], near to the equilibrium. Where that is not found at once, what the start has
+            out of balance is taken off in the place of load steps.
         prescribed : (n, 3) array, optional
             Displacement of the constrained components at full load [m]; that of the model by default.
 
@@ -216,7 +224,8 @@ class EquilibriumSolver:
         self.system.set_time_step(math.inf)
         self.system.forget()
         with one_thread_of_blas():
-            return self._follow(u, full, model.prescribed if prescribed is None else prescribed)
+            prescribed = model.prescribed if prescribed is None else prescribed
+            return self._follow(u, full, prescribed, from_rest=start is None)
 
     def linear_estimate(self) -> Floats:
         """Displacement (n, 3) [m] at full load if the body kept the stiffness that it has at rest.
@@ -283,24 +292,32 @@ class EquilibriumSolver:
         with one_thread_of_blas():
             return self._follow(np.array(start, dtype=np.float64), model.external_forces(time), prescribed, time)
 
-    def _follow(self, u: Floats, full: Floats, prescribed: Floats, time: float | None = None) -> Equilibrium:
-        """Go from a state to full load; at a time, what acts is all there and only what is prescribed moves.
+    def _follow(
+        self, start: Floats, full: Floats, prescribed: Floats, time: float | None = None, from_rest: bool = False
+    ) -> Equilibrium:
+        """Go from a state to full load, from rest in load steps; see the module. At a time, what acts is that of it.
 
         With one thread of BLAS: a sum over nodes takes less than to wake others, and bits would depend on their number.
         """
         model = self.system.model
-        origin = np.where(model.constrained, u, 0.0)
+        origin = np.where(model.constrained, start, 0.0)
         self._history = []
-        done, step = 0.0, self.options.max_load_step
+        u, done, step = start, 0.0, self.options.max_load_step
+        out_of_balance: Floats | None = None
         while done < 1.0:
             load = min(1.0, done + step)
             target = origin + load * (prescribed - origin * model.constrained)
             if time is None:
-                self.system.set_load(load)
+                self.system.set_load(load if from_rest else 1.0)
             else:
                 self.system.set_load(time=time)
+            external = load * full if from_rest else full
             try:
-                reached, energy, residual = self._newton(u, load, full if time is not None else load * full, target)
+                if load < 1.0 and not from_rest:
+                    if out_of_balance is None:
+                        out_of_balance = self._out_of_balance(start, full)
+                    external = full - (1.0 - load) * out_of_balance
+                reached, energy, residual = self._newton(u, load, external, target)
             except _StepFailed as failure:
                 tried, step = step, 0.5 * step
                 exhausted = len(self._history) >= self.options.max_total_newton
@@ -320,6 +337,16 @@ class EquilibriumSolver:
             if done == 1.0:
                 u, energy, residual = self._augmented(u, full, target, energy, residual)
         return Equilibrium(u, self.system.internal.numpy().astype(np.float64), energy, residual, tuple(self._history))
+
+    def _out_of_balance(self, u: Floats, external: Floats) -> Floats:
+        """What a displacement (n, 3) [m] leaves out of balance on free components (n, 3) [N]."""
+        self.system.u.assign(u)
+        self.system.evaluate_forces()
+        self.system.gather_forces()
+        r = self._free * (external - self.system.internal.numpy().astype(np.float64))
+        if not np.isfinite(r).all():
+            raise _StepFailed("the out-of-balance force of the start is not finite")
+        return r
 
     def _augmented(
         self, u: Floats, full: Floats, target: Floats, energy: float, residual: float

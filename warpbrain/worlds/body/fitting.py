@@ -460,8 +460,9 @@ class FitSearch:
         # where states of this fit are known a step that leads to none nearby is shortened: from rest, in load steps, a
         # law that stiffens exponentially takes minutes to fail
         most = EquilibriumOptions.max_newton if self._solved else EquilibriumOptions.max_total_newton
+        known = nearby.u if self._solved else None
         try:
-            state = states.solve(hypothesis, start, error, course, most, self._nearby)
+            state = states.solve(hypothesis, start, error, course, most, self._nearby, known)
         except SolveError:
             if self._solved:
                 raise

@@ -45,6 +45,8 @@ from warpbrain.worlds.body.surfaces import with_free_surfaces
 TOLERANCE = 1e-6
 #: Short steps after a load has come, as parts of the first time that counts.
 _SHORT = (1e-3, 0.1, 0.4)
+#: Newton iterations of a state beside a known one: at once, and along the path from that; shortest step of the path.
+_AT_ONCE, _ALONG, _SHORTEST = 15, 60, 1.0 / 64.0
 #: Most places at which modes are computed.
 _SITES = 400
 
@@ -169,18 +171,20 @@ class States:
         course: Sequence[Floats] = (),
         iterations: int = EquilibriumOptions.max_total_newton,
         nearby: Linearisation | None = None,
+        known: Floats | None = None,
     ) -> SolvedState:
         """The equilibrium under a hypothesis.
 
         `start` (N, 3): a displacement [m] that is near to it. `expected`: error of the mesh, by which the sensors are
         corrected. `course`: of a state that is near to it, if it is followed over time. `iterations`: of Newton's
-        method in all, after which there is taken to be none. `nearby`: of a state that is near to it. `InputError` if
-        a law is not stable, `SolveError` if there is none.
+        method in all, after which there is taken to be none. `nearby`: of a state that is near to it. `known` (N, 3): a
+        state [m] on whose branch it is to be, see `_equilibrium`. `InputError` if a law is not stable, `SolveError` if
+        there is none.
         """
         system = self._system(hypothesis)
         flowing = self._flowing(hypothesis, system)
         if flowing is not None:
-            return self._drained(hypothesis, flowing, start, expected, iterations, nearby)
+            return self._drained(hypothesis, flowing, start, expected, iterations, nearby, known)
         self.solves += 1
         # relaxing stress or a fluid of the case's own: no other memory of a term changes a state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
@@ -195,7 +199,7 @@ class States:
                 self._instant(time, system, by_time[time], system.model.external_forces(time)) for time in self.times
             ]
         else:
-            instants = self._at_rest(hypothesis, system, start, options, nearby)
+            instants = self._at_rest(hypothesis, system, start, options, nearby, known)
         sensors = self._sensors(instants, expected)
         last = instants[-1]
         return SolvedState(hypothesis, last.system, last.u, last.reactions, sensors, taken, tuple(instants))
@@ -207,6 +211,7 @@ class States:
         start: Floats | None,
         options: EquilibriumOptions,
         nearby: Linearisation | None,
+        known: Floats | None,
     ) -> list[Instant]:
         """The equilibrium at each time, under what acts then."""
         case = self.case_of(hypothesis)
@@ -219,21 +224,46 @@ class States:
             system_then = system if moments.cases[number] is case else self._system(hypothesis, moments.cases[number])
             near = start if not instants else self._near.get(time, start)
             external = system_then.model.external_forces()
-            solver = EquilibriumSolver(system_then, options, factors=self._factors_of(system_then))
-            if nearby is not None and near is not None and not instants:
+            first = not instants
+            if nearby is not None and near is not None and first:
                 near = nearby.toward_equilibrium(system_then, external, near, TOLERANCE)
             try:
-                state = solver.solve(external, near)
+                state = self._equilibrium(system_then, external, near, options, known if first else None)
             except SolveError:
-                if not instants or near is None:
+                if first or near is None:
                     raise
-                state = solver.solve(external)
+                state = self._equilibrium(system_then, external, None, options, None)
             instants[number] = self._instant(time, system_then, state, external)
             if len(moments.cases) > 1:
                 self._near[time] = state.u
         return [
             replace(instants[number], time=time) for time, number in zip(moments.times, moments.numbers, strict=True)
         ]
+
+    def _equilibrium(
+        self,
+        system: System,
+        external: Floats,
+        start: Floats | None,
+        options: EquilibriumOptions,
+        known: Floats | None,
+    ) -> Equilibrium:
+        """The equilibrium under nodal forces (N, 3) [N]; beside a known state (N, 3) [m] the stable one on its branch.
+
+        Where several are stable, or none is, iterations that go downhill end in one of them, or nowhere, as they are
+        rounded. So they are given up where a tangent is not positive definite, for the path from the known state; where
+        that turns or branches there is no such state.
+        """
+        factors = self._factors_of(system)
+        if known is None:
+            return EquilibriumSolver(system, options, factors=factors).solve(external, start)
+        stable = replace(options, pass_unstable=False)
+        try:
+            at_once = replace(stable, min_load_step=1.0, max_newton=_AT_ONCE)
+            return EquilibriumSolver(system, at_once, factors=factors).solve(external, start)
+        except SolveError:
+            along = replace(stable, min_load_step=_SHORTEST, max_total_newton=_ALONG)
+            return EquilibriumSolver(system, along, factors=factors).solve(external, known)
 
     def _flowing(self, hypothesis: Hypothesis, system: System) -> Mechanism | None:
         """The mechanism of a hypothesis whose fluid flows while recordings are made.
@@ -258,13 +288,14 @@ class States:
         expected: Difference | None,
         iterations: int,
         nearby: Linearisation | None,
+        known: Floats | None,
     ) -> SolvedState:
         """The state in the end, and sensors on the way to it, linear about it.
 
         Step by step it takes minutes, and a fit has a hundred states. What is recorded on the way is 4 to 8 % off.
         """
         others = tuple(mechanism for mechanism in hypothesis.mechanisms if mechanism is not flowing)
-        end = self.solve(replace(hypothesis, mechanisms=others), start, expected, (), iterations, nearby)
+        end = self.solve(replace(hypothesis, mechanisms=others), start, expected, (), iterations, nearby, known)
         at = end.linearised()
         change = consolidation(at, bound_term(end.system, cast(Following, flowing))).at(1.0)
         sensors = replace(end.sensors, residual=end.sensors.residual - change, computed=end.sensors.computed + change)
