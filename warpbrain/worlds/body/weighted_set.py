@@ -178,10 +178,10 @@ def evidence_of(
     fractions = fractions if moving else np.ones(1)
     others = np.delete(columns, np.r_[part], axis=1) if moving else columns
     models, relative = [noise.of_noise(others) for noise in base.noises], None
-    inflation: list[Floats | None] = [None] * len(models)
+    inflation: Floats | None = None
     if moving:
         as_given = RowsAtScales(models[0], residual, base.points, columns[:, part]).with_gross_errors(scale)
-        inflation[0] = as_given.inflation
+        inflation = as_given.inflation
         moved = _displacement(base, residual - others @ (others.T @ as_given.weighted))
         relative = moved[:, None] * nuisances.relative
 
@@ -193,9 +193,9 @@ def evidence_of(
 
     def log_evidence(fraction: int, noise: int) -> float:
         if (fraction, noise) not in summed:
-            # gross errors are nearly the same whatever the smooth part; what is not resolved may look like some
-            known = next((result for (_, other), result in summed.items() if other == noise), None)
-            near = (scale, inflation[noise]) if known is None else (known.scale, known.inflation)
+            # gross errors are nearly the same whatever the sizes, first of all whatever the smooth part
+            known = min(summed, key=lambda other: other[1] != noise, default=None)
+            near = (scale, inflation) if known is None else (summed[known].scale, summed[known].inflation)
             summed[fraction, noise] = rows(noise).summed(float(fractions[fraction]), *near)
         return summed[fraction, noise].log_evidence
 
