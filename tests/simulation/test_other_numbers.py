@@ -130,8 +130,8 @@ def test_every_mechanism_that_acts_in_a_system_is_here() -> None:
 
 @pytest.mark.parametrize("mechanism", [m for m in FIRST if isinstance(m, Following)], ids=lambda m: m.kind)
 def test_a_term_that_remembers_says_what(mechanism: Following) -> None:
-    model = model_of(())
-    term = mechanism.bind(System(model, "cpu"))
+    system = System(model_of(()), "cpu")
+    term = mechanism.bind(system)
     changes = any(getattr(type(term), name) is not getattr(Term, name) for name in ("advance", "forget", "augment"))
     assert bool(term.memory) == changes
 

@@ -167,8 +167,8 @@ class _Search:
     """The inflation of each point, and the inverse of the covariance with them, as updates of that with none.
 
     With the rows R of all gross errors, `P = P_0 - P_0[:, R] (Delta_R^-1 + P_0[R, R])^-1 P_0[R, :]` (Woodbury) is
-    `P_0 - Z^T Z`, to which points are added as by Cholesky's method. `P_0` is the inverse of the covariance of the noise
-    less `Y^T Y`, to which further columns belong, too.
+    `P_0 - Z^T Z`, to which points are added as by Cholesky's method. `P_0` is the inverse of the covariance of the
+    noise less `Y^T Y`, to which further columns belong, too.
     """
 
     def __init__(self, rows: PointRows, prior: Outliers, further: FurtherColumns | None, length: float) -> None:

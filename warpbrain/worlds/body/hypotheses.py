@@ -316,17 +316,16 @@ class HypothesisSearch:
         causes = visible(causes, marginal.model)
         best: dict[frozenset[str], WeightedSet] = {}
         for factor in noise_factors:
-            for superset in self._supersets(fitted, causes, candidates.source, GaussianModel(factor, fitted.columns)):
+            for superset in self._supersets(fitted, causes, GaussianModel(factor, fitted.columns)):
                 _keep_better(best, superset)
-        for names, superset in best.items():
-            known = self._sets.get(names)
-            if known is None or known.refit is None:
-                self._sets[names] = superset
+        fits = {names for names, known in self._sets.items() if known.refit is not None}
+        placed = len(fitted.effects)
+        refine = partial(with_refined_places, self.base, spacing=self.spacing, source=candidates.source, placed=placed)
+        for superset in in_threads(refine, [superset for names, superset in best.items() if names not in fits]):
+            self._sets[superset.names] = superset
 
-    def _supersets(
-        self, fitted: WeightedSet, causes: BodyCauses, source: Effects, unscaled: GaussianModel
-    ) -> Iterator[WeightedSet]:
-        """The most probable sets of one cause more than a fitted one, with that at the best place under a noise.
+    def _supersets(self, fitted: WeightedSet, causes: BodyCauses, unscaled: GaussianModel) -> Iterator[WeightedSet]:
+        """The most probable sets of one cause more than a fitted one, with that at the best place of a scan.
 
         `unscaled`: model of the rows with the fitted causes, at a scale of one.
         """
@@ -334,8 +333,7 @@ class HypothesisSearch:
         hypotheses = [hypothesis for hypothesis in _most_probable(screened, singles=False) if hypothesis.causes]
 
         def work(hypothesis: Hypothesis) -> WeightedSet:
-            candidate = weigh(self.base, hypothesis, causes, unscaled, fitted.marginal.sizes, fitted)
-            return with_refined_places(self.base, candidate, self.spacing, source, len(fitted.effects))
+            return weigh(self.base, hypothesis, causes, unscaled, fitted.marginal.sizes, fitted)
 
         for hypothesis, candidate in zip(hypotheses, in_threads(work, hypotheses), strict=True):
             # both with gross errors of their own
