@@ -106,7 +106,12 @@ class GaussianModel:
     @cached_property
     def covariance(self) -> Floats:
         """`S` (n, n)."""
-        return self.scale**2 * self._noise.covariance + self.columns @ self.columns.T
+        return self.noise_covariance + self.columns @ self.columns.T
+
+    @property
+    def noise_covariance(self) -> Floats:
+        """`kappa^2 L L^T` (n, n)."""
+        return self.scale**2 * self._noise.covariance
 
     @cached_property
     def _noise(self) -> _Noise:

@@ -296,8 +296,7 @@ class Marginal(Summed):
     @cached_property
     def noise(self) -> GaussianModel:
         """Of the noise alone, with the excess noise of gross errors."""
-        scaled = self.scale * self.model.noise_factor
-        covariance = scaled @ scaled.T + self.excess @ self.excess.T
+        covariance = self.model.noise_covariance + self.excess @ self.excess.T
         factor: Floats = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         return GaussianModel(factor, np.zeros((len(factor), 0)))
 

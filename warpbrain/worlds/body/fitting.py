@@ -514,6 +514,7 @@ class Fitter:
         screened: SetMarginal,
         nearby: SolvedState | None = None,
         subset: Refit | None = None,
+        wanted: float = -np.inf,
     ) -> Refit:
         """Fit one set; `SolveError` if there is no equilibrium near the start.
 
@@ -523,7 +524,8 @@ class Fitter:
         surface may belong to one side or the other there are several best points, and a fit with a mechanism must not
         miss the one that the fit without it has reached. `screened`: scale of the noise and gross errors of the set in
         the linear model. `nearby`: nearer to the start than the base. `subset`: a fit with the first of the effects, or
-        with all of them, nearer still, whose share of the mesh's error is kept.
+        with all of them, nearer still, whose share of the mesh's error is kept. `wanted`: a log evidence; a search that
+        expects to reach less ends before it has converged.
         """
         search = FitSearch(self.base, self.mesh_errors, effects, columns, screened)
         if subset is not None:
@@ -546,7 +548,7 @@ class Fitter:
             better = best is None or fit.log_evidence > best.log_evidence
             worse = 0 if better or gain < least else worse + 1
             best, least = fit if better else best, min(gain, least)
-            if worse == _WORSE:
+            if worse == _WORSE or fit.marginal.log_evidence + gain < wanted:
                 break
             enough = min(max(_ENOUGH, _PART * expected), _ROUGHLY)
         assert best is not None

@@ -237,7 +237,7 @@ class HypothesisSearch:
             reduced = superset.without(mechanism, self.base)
             if reduced.marginal.log_evidence < subset.marginal.log_evidence + _BETTER:
                 continue
-            refitted = self._fitted_less(superset, [mechanism])
+            refitted = self._fitted_less(superset, [mechanism], subset.refit.log_evidence + _BETTER)
             if refitted is None or refitted.refit is None:
                 continue
             gain = refitted.refit.log_evidence - subset.refit.log_evidence
@@ -246,8 +246,13 @@ class HypothesisSearch:
                 self._sets[subset.names] = better.with_evidence(subset.hypothesis.log_evidence + gain)
                 self._forget_supersets(subset.names)
 
-    def _fitted_less(self, superset: WeightedSet, mechanisms: Sequence[str]) -> WeightedSet | None:
-        """A set with some mechanisms less than a fitted one, fitted from its optimum; None if it cannot be."""
+    def _fitted_less(
+        self, superset: WeightedSet, mechanisms: Sequence[str], wanted: float = -np.inf
+    ) -> WeightedSet | None:
+        """A set with some mechanisms less than a fitted one, fitted from its optimum; None if it cannot be.
+
+        `wanted`: see `Fitter.fit`.
+        """
         begun, reduced = superset.refit, superset
         assert begun is not None
         for mechanism in mechanisms:
@@ -255,7 +260,9 @@ class HypothesisSearch:
             reduced = reduced.without(mechanism, self.base)
         screened = reduced.marginal
         try:
-            refit = self._fitter.fit(reduced.effects, reduced.columns, [reduced.coordinates], screened, subset=begun)
+            refit = self._fitter.fit(
+                reduced.effects, reduced.columns, [reduced.coordinates], screened, subset=begun, wanted=wanted
+            )
         except CANNOT_BE_FITTED:
             return None
         gain = refit.log_evidence - screened.log_evidence
