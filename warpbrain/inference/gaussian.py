@@ -8,7 +8,7 @@ products of n by q, the number of columns, which is smaller than the number n of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -181,20 +181,23 @@ class GaussianModel:
 
         `(kappa^2 I + W W^T)^(-1/2) L^-1 r`, whose products are those with `S^-1`.
         """
-        return next(self.standardised_at([self.scale], rows))
+        return self.standardised_at(rows)(self.scale)
 
-    def standardised_at(self, scales: Sequence[float], rows: Floats) -> Iterator[Floats]:
-        """`standardised` rows with each of some factors on the noise: what they have in common is computed once."""
+    def standardised_at(self, rows: Floats) -> Callable[[float], Floats]:
+        """`standardised` rows as a function of the scale: what no scale changes is computed once."""
         values, directions = self._spectrum.values, self._spectrum.directions
         # one row after the other in memory, as the solution has them
         white = self._by_noise(rows).T
         projected = white @ directions
-        for scale in scales:
+
+        def standardised(scale: float) -> Floats:
             root = np.sqrt(scale**2 + values)
-            standardised = (projected / (root * (root + scale))) @ directions.T
-            np.subtract(white, standardised, out=standardised)
-            standardised /= scale
-            yield standardised.T
+            result = (projected / (root * (root + scale))) @ directions.T
+            np.subtract(white, result, out=result)
+            result /= scale
+            return np.asarray(result.T)
+
+        return standardised
 
     @cached_property
     def log_determinant(self) -> float:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,6 +23,7 @@ import numpy as np
 from warpbrain.arrays import Floats, Ints
 from warpbrain.inference.causes import Cause, Configuration, Hypothesis, Member
 from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.threads import in_threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,16 +48,17 @@ class Blocks:
         self._set_standardised(model.standardised(self._stacked(residual, causes)))
 
     @classmethod
-    def at_scales(
-        cls, model: GaussianModel, scales: Sequence[float], residual: Floats, causes: Sequence[Cause]
-    ) -> Iterator[Blocks]:
-        """Blocks with each of some factors on the noise."""
+    def at(cls, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> Callable[[float], Blocks]:
+        """Blocks as a function of the factor on the noise."""
         unscaled: Blocks = object.__new__(cls)
-        rows = unscaled._stacked(residual, causes)
-        for standardised in model.standardised_at(scales, rows):
+        standardised = model.standardised_at(unscaled._stacked(residual, causes))
+
+        def blocks_at(scale: float) -> Blocks:
             blocks = copy.copy(unscaled)
-            blocks._set_standardised(standardised)
-            yield blocks
+            blocks._set_standardised(standardised(scale))
+            return blocks
+
+        return blocks_at
 
     def _set_standardised(self, rows: Floats) -> None:
         """Set standardised rows (n, 1 + m + q): residual, means and columns; each is one row of what is kept."""
@@ -255,14 +257,22 @@ def posterior(
     `model`: of rows (n,) on which no cause acts. `residual` (n,).
     """
     sums = _Sums(1 + search.elsewhere)
+    blocks_at = Blocks.at(model, residual, causes) if causes else None
+
+    def weighed_at(scale: float) -> tuple[float, Blocks | None, Floats]:
+        """Log density without any cause, blocks and their log Bayes factors."""
+        none = float(model.with_scale(scale).log_density(residual))
+        blocks = None if blocks_at is None else blocks_at(scale)
+        return none, blocks, np.zeros((0, 0)) if blocks is None else blocks.log_factors()
+
     by_scale: list[tuple[float, float, Blocks, Floats]] = []
     scales = search.scales.tolist()
-    at_scales = Blocks.at_scales(model, scales, residual, causes) if causes else iter([None] * len(scales))
-    for scale, log_prior, blocks in zip(scales, search.log_scale_prior.tolist(), at_scales, strict=True):
-        none = float(model.with_scale(scale).log_density(residual)) + log_prior
+    of_scales = zip(scales, search.log_scale_prior.tolist(), in_threads(weighed_at, scales), strict=True)
+    for scale, log_prior, (density, blocks, factors) in of_scales:
+        none = density + log_prior
         sums.add(frozenset(), none, Configuration((), scale, none))
         if blocks is not None:
-            logs = blocks.log_factors() + blocks.log_weights + none
+            logs = factors + blocks.log_weights + none
             sums.add_blocks(blocks, 0, logs, (), scale)
             by_scale.append((scale, none, blocks, logs))
     greatest = max((float(logs.max()) for *_, logs in by_scale), default=0.0)

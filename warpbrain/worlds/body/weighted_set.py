@@ -28,6 +28,7 @@ from warpbrain.inference import Kind
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, marginal_of, outward
+from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
@@ -194,7 +195,7 @@ def evidence_of(
     def log_evidence(fraction: int, noise: int) -> float:
         if (fraction, noise) not in summed:
             # gross errors are nearly the same whatever the sizes, first of all whatever the smooth part
-            known = min(summed, key=lambda other: other[1] != noise, default=None)
+            known = min(list(summed), key=lambda other: other[1] != noise, default=None)
             near = (scale, inflation) if known is None else (summed[known].scale, summed[known].inflation)
             summed[fraction, noise] = rows(noise).summed(float(fractions[fraction]), *near)
         return summed[fraction, noise].log_evidence
@@ -202,6 +203,11 @@ def evidence_of(
     if sizes is None:
         sizes = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction)))), 0
     best, noise = sizes if moving else (0, sizes[1])
+    log_evidence(best, noise)
+    # what is needed whatever that is, beside each other
+    around = [(best - 1, noise), (best + 1, noise), (best, noise - 1), (best, noise + 1)]
+    in_range = [(f, k) for f, k in around if 0 <= f < len(fractions) and 0 <= k < len(models)]
+    in_threads(lambda each: log_evidence(*each), in_range)
     by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
     best, first = int(np.argmax(by_fraction)), noise
     by_noise = outward(lambda number: log_evidence(best, number), first, len(base.noises), _NEGLIGIBLE)
