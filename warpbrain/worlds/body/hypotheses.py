@@ -35,7 +35,7 @@ from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit, c
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
-from warpbrain.worlds.body.placing import moved_about_fit, weigh, with_refined_places, with_refined_strain
+from warpbrain.worlds.body.placing import Weighing, moved_about_fit, with_refined_places, with_refined_strain
 from warpbrain.worlds.body.states import States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
@@ -114,10 +114,10 @@ class HypothesisSearch:
         if nothing.gross.any():
             noise_factor = nothing.noise.noise_factor / nothing.scale
             models.append(GaussianModel(noise_factor, base.nuisances.columns))
+        weighing = Weighing(base, self._visible, nothing.sizes)
         for model in models:
             screened = posterior(model, base.residual, self._visible.causes, _search(most=2))
-            work = partial(weigh, base, causes=self._visible, screened=model, sizes=nothing.sizes)
-            for candidate in in_threads(work, _most_probable(screened)):
+            for candidate in in_threads(partial(weighing.weigh, screened=model), _most_probable(screened)):
                 _keep_better(self._sets, candidate)
         # a local cause that has been missed by half a cell seems to do nothing
         singles = [
@@ -322,8 +322,9 @@ class HypothesisSearch:
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
         causes = visible(causes, marginal.model)
         best: dict[frozenset[str], WeightedSet] = {}
+        weighing = Weighing(self.base, causes, marginal.sizes, fitted)
         for factor in noise_factors:
-            for superset in self._supersets(fitted, causes, GaussianModel(factor, fitted.columns)):
+            for superset in self._supersets(fitted, causes, weighing, GaussianModel(factor, fitted.columns)):
                 _keep_better(best, superset)
         fits = {names for names, known in self._sets.items() if known.refit is not None}
         placed = len(fitted.effects)
@@ -331,18 +332,17 @@ class HypothesisSearch:
         for superset in in_threads(refine, [superset for names, superset in best.items() if names not in fits]):
             self._sets[superset.names] = superset
 
-    def _supersets(self, fitted: WeightedSet, causes: BodyCauses, unscaled: GaussianModel) -> Iterator[WeightedSet]:
+    def _supersets(
+        self, fitted: WeightedSet, causes: BodyCauses, weighing: Weighing, unscaled: GaussianModel
+    ) -> Iterator[WeightedSet]:
         """The most probable sets of one cause more than a fitted one, with that at the best place of a scan.
 
         `unscaled`: model of the rows with the fitted causes, at a scale of one.
         """
         screened = posterior(unscaled, fitted.residual, causes.causes, _search(most=1))
         hypotheses = [hypothesis for hypothesis in _most_probable(screened, singles=False) if hypothesis.causes]
-
-        def work(hypothesis: Hypothesis) -> WeightedSet:
-            return weigh(self.base, hypothesis, causes, unscaled, fitted.marginal.sizes, fitted)
-
-        for hypothesis, candidate in zip(hypotheses, in_threads(work, hypotheses), strict=True):
+        weighed = in_threads(partial(weighing.weigh, screened=unscaled), hypotheses)
+        for hypothesis, candidate in zip(hypotheses, weighed, strict=True):
             # both with gross errors of their own
             gain = candidate.hypothesis.log_evidence - fitted.marginal.log_evidence
             # causes in the order of their effects
