@@ -194,22 +194,26 @@ def evidence_of(
 
     def log_evidence(fraction: int, noise: int) -> float:
         if (fraction, noise) not in summed:
-            # gross errors are nearly the same whatever the sizes, first of all whatever the smooth part
-            known = min(list(summed), key=lambda other: other[1] != noise, default=None)
-            near = (scale, inflation) if known is None else (summed[known].scale, summed[known].inflation)
+            # gross errors are nearly the same whatever the smooth part; what is not resolved may look like some
+            known = next((result for (_, other), result in list(summed.items()) if other == noise), None)
+            near = (scale, None if noise else inflation) if known is None else (known.scale, known.inflation)
             summed[fraction, noise] = rows(noise).summed(float(fractions[fraction]), *near)
         return summed[fraction, noise].log_evidence
 
     if sizes is None:
         sizes = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction)))), 0
     best, noise = sizes if moving else (0, sizes[1])
+
+    def beside(*pairs: tuple[int, int]) -> None:
+        """What is asked for in any case, in threads."""
+        there = [(f, k) for f, k in pairs if 0 <= f < len(fractions) and 0 <= k < len(models)]
+        in_threads(lambda pair: log_evidence(*pair), there)
+
     log_evidence(best, noise)
-    # what is needed whatever that is, beside each other
-    around = [(best - 1, noise), (best + 1, noise), (best, noise - 1), (best, noise + 1)]
-    in_range = [(f, k) for f, k in around if 0 <= f < len(fractions) and 0 <= k < len(models)]
-    in_threads(lambda each: log_evidence(*each), in_range)
+    beside((best - 1, noise), (best + 1, noise))
     by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
     best, first = int(np.argmax(by_fraction)), noise
+    beside((best, noise - 1), (best, noise + 1))
     by_noise = outward(lambda number: log_evidence(best, number), first, len(base.noises), _NEGLIGIBLE)
     noise = int(np.argmax(by_noise))
     if noise != first:
