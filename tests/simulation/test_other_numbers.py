@@ -1,5 +1,6 @@
 """Other numbers of mechanisms in a system that is already there."""
 
+import weakref
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -130,10 +131,19 @@ def test_every_mechanism_that_acts_in_a_system_is_here() -> None:
 
 @pytest.mark.parametrize("mechanism", [m for m in FIRST if isinstance(m, Following)], ids=lambda m: m.kind)
 def test_a_term_that_remembers_says_what(mechanism: Following) -> None:
-    model = model_of(())
-    term = mechanism.bind(System(model, "cpu"))
+    system = System(model_of(()), "cpu")
+    term = mechanism.bind(system)
     changes = any(getattr(type(term), name) is not getattr(Term, name) for name in ("advance", "forget", "augment"))
     assert bool(term.memory) == changes
+
+
+@pytest.mark.parametrize("mechanism", [m for m in FIRST if isinstance(m, Following)], ids=lambda m: m.kind)
+def test_a_system_that_nothing_uses_is_gone_at_once(mechanism: Following) -> None:
+    system = System(model_of((mechanism,)), "cpu")
+    system.evaluate_forces()
+    gone = weakref.ref(system)
+    del system
+    assert gone() is None
 
 
 def test_a_captured_step_follows(device: str) -> None:

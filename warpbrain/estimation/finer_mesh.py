@@ -237,7 +237,8 @@ class FinerMesh:
                 self._system.set_model(model)
                 return self._system
             except InputError:
-                pass
+                # there need not be room for both
+                self._system = None
         self._system = System(model, self._device)
         return self._system
 

@@ -8,7 +8,7 @@ products of n by q, the number of columns, which is smaller than the number n of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -106,32 +106,42 @@ class GaussianModel:
     @cached_property
     def covariance(self) -> Floats:
         """`S` (n, n)."""
-        return self.scale**2 * self._noise.covariance + self.columns @ self.columns.T
+        return self.noise_covariance + self.columns @ self.columns.T
+
+    @property
+    def noise_covariance(self) -> Floats:
+        """`kappa^2 L L^T` (n, n)."""
+        return self.scale**2 * self._noise.covariance
 
     @cached_property
     def _noise(self) -> _Noise:
         return _Noise(self.noise_factor)
 
     @cached_property
-    def _low_rank(self) -> tuple[Floats, Floats]:
-        """`B` (n, q) and weights (q,) with which `S^-1 = ((L L^T)^-1 - B diag(weights) B^T) / kappa^2`."""
-        return self._spectrum.dual, 1.0 / (self.scale**2 + self._spectrum.values)
+    def low_rank(self) -> Floats:
+        """`Y` (q, n), with which `S^-1 = (L L^T)^-1 / kappa^2 - Y^T Y`."""
+        weights = 1.0 / (self.scale * np.sqrt(self.scale**2 + self._spectrum.values))
+        return np.asarray(self._spectrum.dual.T * weights[:, None])
 
     def noise_blocks(self, rows: Ints) -> Floats:
         """Covariance (g, d, d) of the noise of points with the rows (g, d)."""
         factor = self.scale * self.noise_factor[rows]
         return factor @ factor.transpose(0, 2, 1)
 
+    def noise_precision(self, rows: Ints) -> Floats:
+        """Rows (d, n) of `(L L^T)^-1 / kappa^2` by their numbers (d,)."""
+        return np.asarray(self._noise.precision[rows] / self.scale**2)
+
     def precision_columns(self, rows: Ints) -> Floats:
         """Columns (n, d) of `S^-1` by their numbers (d,)."""
-        B, weights = self._low_rank
-        return np.asarray((self._noise.precision[rows].T - B @ (weights * B[rows]).T) / self.scale**2)
+        Y = self.low_rank
+        return np.asarray((self.noise_precision(rows) - Y[:, rows].T @ Y).T)
 
     def precision_blocks(self, rows: Ints) -> Floats:
         """Diagonal blocks (g, d, d) of `S^-1` of points with the rows (g, d)."""
-        B, weights = self._low_rank
-        of_noise = self._noise.precision[rows[:, :, None], rows[:, None, :]]
-        return np.asarray((of_noise - np.einsum("gik,gjk->gij", B[rows] * weights, B[rows])) / self.scale**2)
+        of_points = self.low_rank.T[rows]
+        of_noise = self._noise.precision[rows[:, :, None], rows[:, None, :]] / self.scale**2
+        return np.asarray(of_noise - of_points @ of_points.transpose(0, 2, 1))
 
     def precision_times(self, rows: Floats) -> Floats:
         """`S^-1` times rows (n,) or (n, b)."""
@@ -140,10 +150,10 @@ class GaussianModel:
     def precision_at(self, rows: Floats) -> Callable[[float], Floats]:
         """`S^-1` times rows (n,) or (n, b), as a function of the scale: what no scale changes is computed once."""
         values, B = self._spectrum.values, self._spectrum.dual
-        of_noise, projected = self._noise.precision @ rows, B.T @ rows
+        of_noise, projected = rows.T @ self._noise.precision, rows.T @ B
 
         def times(scale: float) -> Floats:
-            return np.asarray((of_noise - B @ (projected.T / (scale**2 + values)).T) / scale**2)
+            return np.asarray((of_noise - (projected / (scale**2 + values)) @ B.T) / scale**2).T
 
         return times
 
@@ -171,17 +181,23 @@ class GaussianModel:
 
         `(kappa^2 I + W W^T)^(-1/2) L^-1 r`, whose products are those with `S^-1`.
         """
-        return next(self.standardised_at([self.scale], rows))
+        return self.standardised_at(rows)(self.scale)
 
-    def standardised_at(self, scales: Sequence[float], rows: Floats) -> Iterator[Floats]:
-        """`standardised` rows with each of some factors on the noise: what they have in common is computed once."""
+    def standardised_at(self, rows: Floats) -> Callable[[float], Floats]:
+        """`standardised` rows as a function of the scale: what no scale changes is computed once."""
         values, directions = self._spectrum.values, self._spectrum.directions
-        white = self._by_noise(rows)
-        projected = directions.T @ white
-        for scale in scales:
+        # one row after the other in memory, as the solution has them
+        white = self._by_noise(rows).T
+        projected = white @ directions
+
+        def standardised(scale: float) -> Floats:
             root = np.sqrt(scale**2 + values)
-            weights = 1.0 / (root * (root + scale))
-            yield np.asarray((white - directions @ (weights * projected.T).T) / scale)
+            result = (projected / (root * (root + scale))) @ directions.T
+            np.subtract(white, result, out=result)
+            result /= scale
+            return np.asarray(result.T)
+
+        return standardised
 
     @cached_property
     def log_determinant(self) -> float:
@@ -195,6 +211,10 @@ class GaussianModel:
         """`ln N(r; 0, S)` of rows (n,) or (n, b): () or (b,)."""
         squares = np.sum(self.standardised(rows) ** 2, axis=0)
         return np.asarray(-0.5 * (squares + self.log_determinant + len(self) * np.log(2.0 * np.pi)))
+
+    def log_density_of(self, rows: Floats, weighted: Floats) -> float:
+        """`ln N(r; 0, S)` of rows (n,) of which `S^-1 r` (n,) is known."""
+        return -0.5 * float(rows @ weighted + self.log_determinant + len(self) * np.log(2.0 * np.pi))
 
     def coefficients(self, rows: Floats) -> tuple[Floats, Floats]:
         """Mean (q,) and covariance (q, q) of the coefficients `xi` after rows (n,)."""

@@ -20,6 +20,7 @@ The marginal likelihood of a hypothesis is that density, summed over the scale o
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -70,13 +71,18 @@ class PointRows:
     ) -> None:
         self.model, self.points, self.residual = model, points, residual
         self.weighted = model.precision_times(residual) if weighted is None else weighted
-        self.log_density = float(model.log_density(residual))
+        self.log_density = model.log_density_of(residual, self.weighted)
         sizes = np.array([len(rows) for rows in points], dtype=np.int64)
         self.groups = []
         for size in np.unique(sizes).tolist():
             numbers = np.flatnonzero(sizes == size)
             rows = np.array([points[number] for number in numbers.tolist()])
             self.groups.append(_Group(numbers, rows, model.noise_blocks(rows), model.precision_blocks(rows)))
+        #: Of each point the inverse (d, d) of its noise, and the logarithm of its determinant.
+        self.noise: dict[int, tuple[Floats, float]] = {}
+        for group in self.groups:
+            logs = np.linalg.slogdet(group.noise)[1].tolist()
+            self.noise |= zip(group.numbers.tolist(), zip(np.linalg.inv(group.noise), logs, strict=True), strict=True)
 
     def less(self, mean: Floats) -> PointRows:
         """The same less a change (n,) of the rows."""
@@ -85,7 +91,7 @@ class PointRows:
         other = copy.copy(self)
         other.residual = self.residual - mean
         other.weighted = self.model.precision_times(other.residual)
-        other.log_density = float(self.model.log_density(other.residual))
+        other.log_density = self.model.log_density_of(other.residual, other.weighted)
         return other
 
     def with_gross_errors(
@@ -131,14 +137,14 @@ class FurtherColumns:
     def __init__(self, rows: PointRows, columns: Floats, weighted: Floats | None = None) -> None:
         weighted = rows.model.precision_times(columns) if weighted is None else weighted
         values, vectors = np.linalg.eigh(columns.T @ weighted)
-        #: `l` (k,) and `D` (n, k).
-        self.values, self.dual = np.maximum(values, 0.0), weighted @ vectors
-        #: Of each group of points with the rows (g, d), products of each two rows of `D`: (g d^2, k).
+        #: `l` (k,) and `D^T` (k, n).
+        self.values, self.dual = np.maximum(values, 0.0), vectors.T @ weighted.T
+        #: Of each group of points with the rows (g, d), products of each two rows of `D`: (k, g d^2).
         self.products = []
         for group in rows.groups:
-            of_points = self.dual[group.rows]
-            pairs = of_points[:, :, None] * of_points[:, None]
-            self.products.append(pairs.reshape(group.rows.size * group.rows.shape[1], -1))
+            of_points = self.dual[:, group.rows]
+            pairs = of_points[..., :, None] * of_points[..., None, :]
+            self.products.append(pairs.reshape(len(self.dual), group.rows.size * group.rows.shape[1]))
 
 
 def with_gross_errors(model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> GrossErrors:
@@ -161,7 +167,8 @@ class _Search:
     """The inflation of each point, and the inverse of the covariance with them, as updates of that with none.
 
     With the rows R of all gross errors, `P = P_0 - P_0[:, R] (Delta_R^-1 + P_0[R, R])^-1 P_0[R, :]` (Woodbury) is
-    `P_0 - Z Z^T`, to which points are added as by Cholesky's method. Further columns are in `Z`, too.
+    `P_0 - Z^T Z`, to which points are added as by Cholesky's method. `P_0` is the inverse of the covariance of the
+    noise less `Y^T Y`, to which further columns belong, too.
     """
 
     def __init__(self, rows: PointRows, prior: Outliers, further: FurtherColumns | None, length: float) -> None:
@@ -169,22 +176,22 @@ class _Search:
         self._rows = rows
         # variance with each inflation, in units of that of a sound point
         self._variances = prior.inflations**2
-        self._Z = np.zeros((len(rows.residual), 0))
+        self._Y = rows.model.low_rank
         self.weighted, self.log_density = rows.weighted, rows.log_density
         self._precisions = [group.precision for group in rows.groups]
         if further is not None:
             self._add_columns(further, length)
-        self._sound = self._Z, self.weighted, self.log_density, self._precisions
+        self._sound = self.weighted, self.log_density, self._precisions
         self.begin_with(self.kinds)
 
     def _add_columns(self, further: FurtherColumns, length: float) -> None:
         lengthened = 1.0 + length**2 * further.values
-        weights, projected = length**2 / lengthened, further.dual.T @ self._rows.residual
-        self._Z = further.dual * np.sqrt(weights)
-        self.weighted = self.weighted - further.dual @ (weights * projected)
+        weights, projected = length**2 / lengthened, further.dual @ self._rows.residual
+        self._Y = np.concatenate([self._Y, further.dual * np.sqrt(weights)[:, None]])
+        self.weighted = self.weighted - (weights * projected) @ further.dual
         self.log_density += 0.5 * float(weights @ projected**2) - 0.5 * float(np.log(lengthened).sum())
         pairs = zip(self._precisions, further.products, strict=True)
-        self._precisions = [P - (products @ weights).reshape(P.shape) for P, products in pairs]
+        self._precisions = [P - (weights @ products).reshape(P.shape) for P, products in pairs]
 
     def change(self, number: int, kind: int) -> None:
         """Give a point another inflation."""
@@ -197,34 +204,35 @@ class _Search:
     def begin_with(self, kinds: Ints) -> None:
         """Give all points their inflations at once."""
         self.kinds = kinds.copy()
-        self._Z, weighted, self.log_density, precisions = self._sound
+        weighted, self.log_density, precisions = self._sound
         self.weighted, self._precisions = weighted.copy(), [precision.copy() for precision in precisions]
+        self._Z = np.zeros((0, len(weighted)))
         self._inflate(np.flatnonzero(kinds).tolist())
 
     def _inflate(self, numbers: Sequence[int], before: int = 0) -> None:
         """Add the rows of points, of a lesser inflation before, to `Z`, and what follows to inverse and log density."""
         if not numbers:
             return
-        points, model = self._rows.points, self._rows.model
+        points, noise = self._rows.points, self._rows.noise
         R = np.concatenate([points[number] for number in numbers])
-        P_0 = model.precision_columns(R)
-        columns = P_0 - self._Z @ self._Z[R].T
-        inner, at, log_determinant = columns[R], 0, 0.0
+        columns = self._rows.model.noise_precision(R)
+        for low_rank in (self._Y, self._Z):
+            columns -= low_rank[:, R].T @ low_rank
+        inner, at, log_determinant = columns[:, R], 0, 0.0
         for number in numbers:
-            rows = points[number]
-            part = slice(at, at := at + len(rows))
-            [noise] = model.noise_blocks(rows[None])
-            increase = (self._variances[self.kinds[number]] - self._variances[before]) * noise
-            inner[part, part] += np.linalg.inv(increase)
-            log_determinant += float(np.linalg.slogdet(increase)[1])
+            part = slice(at, at := at + len(points[number]))
+            increase = float(self._variances[self.kinds[number]] - self._variances[before])
+            inverse, log_of_noise = noise[number]
+            inner[part, part] += inverse / increase
+            log_determinant += log_of_noise + len(inverse) * math.log(increase)
         factor = np.linalg.cholesky(inner)
-        inverse = np.linalg.inv(factor)
-        added, residual = columns @ inverse.T, inverse @ self.weighted[R]
-        self._Z = np.concatenate([self._Z, added], axis=1)
-        self.weighted -= added @ residual
+        whiten = np.linalg.inv(factor)
+        added, residual = whiten @ columns, whiten @ self.weighted[R]
+        self._Z = np.concatenate([self._Z, added])
+        self.weighted -= residual @ added
         for group, precision in zip(self._rows.groups, self._precisions, strict=True):
-            of_points = added[group.rows]
-            precision -= np.einsum("gik,gjk->gij", of_points, of_points)
+            of_points = added[:, group.rows]
+            precision -= np.einsum("kgi,kgj->gij", of_points, of_points)
         log_determinant += 2.0 * float(np.log(np.diag(factor)).sum())
         self.log_density += 0.5 * float(residual @ residual) - 0.5 * log_determinant
 
@@ -288,8 +296,7 @@ class Marginal(Summed):
     @cached_property
     def noise(self) -> GaussianModel:
         """Of the noise alone, with the excess noise of gross errors."""
-        scaled = self.scale * self.model.noise_factor
-        covariance = scaled @ scaled.T + self.excess @ self.excess.T
+        covariance = self.model.noise_covariance + self.excess @ self.excess.T
         factor: Floats = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         return GaussianModel(factor, np.zeros((len(factor), 0)))
 

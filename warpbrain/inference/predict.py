@@ -16,6 +16,8 @@ from warpbrain.inference.gaussian import GaussianModel
 
 #: Standard errors between a p-value and a level it is compared with, and by how much draws may be multiplied for that.
 _DEVIATIONS, _MOST_DRAWS = 3.0, 16
+#: Rows that are compared with all fields at a time.
+_TOGETHER = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +96,18 @@ class FieldFactors:
     ) -> None:
         self._model, self._sizes = model, sizes
         self._weights = np.full(len(fields), -np.log(len(fields))) if weights is None else weights
+        widths = np.array([field.shape[1] for field in fields])
+        self._ends = np.cumsum(widths)
         # all fields at once: one by one, thousands of small products take several times as long
-        ends = np.cumsum([field.shape[1] for field in fields])[:-1]
-        standardised = np.split(model.standardised(np.concatenate(fields, axis=1)), ends, axis=1)
-        #: Of each field the eigenvalues (k,) of its Gram matrix, and its principal directions (n, k).
-        self._principal = []
-        for Z in standardised:
-            values, vectors = np.linalg.eigh(Z.T @ Z)
-            self._principal.append((np.maximum(values, 0.0), Z @ vectors))
+        Z = model.standardised(np.concatenate(fields, axis=1))
+        #: Of all fields the eigenvalues (k,) of their Gram matrices, and their principal directions (n, k).
+        self._values, self._directions = np.empty(Z.shape[1]), Z
+        for width in np.unique(widths).tolist():
+            columns = self._ends[widths == width, None] + np.arange(-width, 0)
+            of_width = Z[:, columns].transpose(1, 0, 2)
+            values, vectors = np.linalg.eigh(of_width.transpose(0, 2, 1) @ of_width)
+            self._values[columns] = np.maximum(values, 0.0)
+            self._directions[:, columns] = (of_width @ vectors).transpose(1, 0, 2)
 
     def of(self, residuals: Floats) -> Floats:
         """Log Bayes factor (d,) of residuals (n, d)."""
@@ -114,11 +120,9 @@ class FieldFactors:
         direction in which the residual (n,) lies: rows that are turned, mixed or split have these turned alike, and
         what they lack of these moves no factor.
         """
-        form = np.zeros((len(residual), len(residual)))
-        for (values, directions), weight in zip(self._principal, self._weights.tolist(), strict=True):
-            ratio = np.mean(self._sizes[:, None] ** 2 / (1.0 + self._sizes[:, None] ** 2 * values), axis=0)
-            half = directions * np.sqrt(np.exp(weight) * ratio)
-            form += half @ half.T
+        widths = np.diff(self._ends, prepend=0)
+        half = self._directions * np.sqrt(np.exp(np.repeat(self._weights, widths)) * self._ratios.mean(axis=0))
+        form = half @ half.T
         vectors = own_axes(form, self._model.standardised(residual))
 
         def draw(count: int, random: np.random.Generator) -> Floats:
@@ -126,14 +130,25 @@ class FieldFactors:
 
         return draw
 
+    @property
+    def _ratios(self) -> Floats:
+        """`s^2 / (1 + s^2 l)` of each size and direction (s, k)."""
+        squares = self._sizes[:, None] ** 2
+        return np.asarray(squares / (1.0 + squares * self._values))
+
     def _of_standardised(self, white: Floats) -> Floats:
-        logs = []
-        for (values, directions), weight in zip(self._principal, self._weights.tolist(), strict=True):
-            squares = (directions.T @ white) ** 2
-            for size in self._sizes.tolist():
-                ratio = size**2 / (1.0 + size**2 * values)
-                logs.append(weight + 0.5 * (ratio @ squares) - 0.5 * float(np.log1p(size**2 * values).sum()))
-        return np.asarray(np.logaddexp.reduce(logs, axis=0) - np.log(len(self._sizes)))
+        starts = np.concatenate([[0], self._ends[:-1]])
+        volumes = np.add.reduceat(np.log1p(self._sizes[:, None] ** 2 * self._values), starts, axis=1)
+        result = np.empty(white.shape[1])
+        for first in range(0, white.shape[1], _TOGETHER):
+            rows = white[:, first : first + _TOGETHER]
+            squares = (self._directions.T @ rows) ** 2
+            logs = [
+                (self._weights - 0.5 * volume)[:, None] + 0.5 * np.add.reduceat(ratio[:, None] * squares, starts)
+                for ratio, volume in zip(self._ratios, volumes, strict=True)
+            ]
+            result[first : first + _TOGETHER] = np.logaddexp.reduce(np.concatenate(logs))
+        return result - np.log(len(self._sizes))
 
 
 def own_axes(form: Floats, along: Floats) -> Floats:

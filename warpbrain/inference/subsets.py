@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,6 +23,7 @@ import numpy as np
 from warpbrain.arrays import Floats, Ints
 from warpbrain.inference.causes import Cause, Configuration, Hypothesis, Member
 from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.threads import in_threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,24 +48,27 @@ class Blocks:
         self._set_standardised(model.standardised(self._stacked(residual, causes)))
 
     @classmethod
-    def at_scales(
-        cls, model: GaussianModel, scales: Sequence[float], residual: Floats, causes: Sequence[Cause]
-    ) -> Iterator[Blocks]:
-        """Blocks with each of some factors on the noise."""
+    def at(cls, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> Callable[[float], Blocks]:
+        """Blocks as a function of the factor on the noise."""
         unscaled: Blocks = object.__new__(cls)
-        rows = unscaled._stacked(residual, causes)
-        for standardised in model.standardised_at(scales, rows):
+        standardised = model.standardised_at(unscaled._stacked(residual, causes))
+
+        def blocks_at(scale: float) -> Blocks:
             blocks = copy.copy(unscaled)
-            blocks._set_standardised(standardised)
-            yield blocks
+            blocks._set_standardised(standardised(scale))
+            return blocks
+
+        return blocks_at
 
     def _set_standardised(self, rows: Floats) -> None:
-        """Set standardised rows (n, 1 + p + q): residual, means and columns."""
-        first = 1 + len(self.cause)
-        self._r, self._m, self._Z = rows[:, 0], rows[:, 1:first], rows[:, first:]
+        """Set standardised rows (n, 1 + m + q): residual, means and columns; each is one row of what is kept."""
+        last = rows.shape[1] - self._first[-1]
+        self._r, self._Z = rows[:, 0], rows[:, last:].T
+        # the first stands for those that are zero
+        self._means = np.concatenate([np.zeros((1, len(rows))), rows[:, 1:last].T])
 
     def _stacked(self, residual: Floats, causes: Sequence[Cause]) -> Floats:
-        """Rows (n, 1 + p + q) of the residual, means and columns, not yet standardised; sets the order of blocks."""
+        """Rows (n, 1 + m + q) of the residual, means that are given and columns; sets the order of blocks."""
         widths = [np.array([place.columns.shape[1] for place in cause.places]) for cause in causes]
         order = np.argsort([-each.max() for each in widths], kind="stable").tolist()
         self.cause = np.concatenate([np.full(len(causes[c].places), c) for c in order]).astype(np.int64)
@@ -73,16 +77,11 @@ class Blocks:
         self._first = np.concatenate([[0], np.cumsum(self._width)])
         self._sizes = np.array([cause.sizes for cause in causes])[self.cause]
         self.log_weights = np.concatenate([causes[c].log_weights for c in order])
-        first = 1 + len(self.cause)
-        rows = np.zeros((len(residual), first + self._first[-1]))
-        rows[:, 0] = residual
-        for block, (c, p) in enumerate(zip(self.cause.tolist(), self.place.tolist(), strict=True)):
-            place = causes[c].places[p]
-            at = first + self._first[block]
-            rows[:, at : at + place.columns.shape[1]] = place.columns
-            if place.mean is not None:
-                rows[:, 1 + block] = place.mean
-        return rows
+        places = [causes[c].places[p] for c, p in zip(self.cause.tolist(), self.place.tolist(), strict=True)]
+        given = np.array([place.mean is not None for place in places])
+        self._mean = np.where(given, np.cumsum(given), 0)
+        means = [place.mean for place in places if place.mean is not None]
+        return np.column_stack([residual, *means, *(place.columns for place in places)])
 
     def __len__(self) -> int:
         return len(self.cause)
@@ -95,7 +94,7 @@ class Blocks:
     @cached_property
     def _gram(self) -> Floats:
         """`Z^T Z` of all blocks: of few places, since each pair of these is weighed with every size."""
-        return self._Z.T @ self._Z
+        return self._Z @ self._Z.T
 
     def subset(self, chosen: Ints) -> Blocks:
         """Some of the blocks by their numbers, in the same order."""
@@ -105,14 +104,14 @@ class Blocks:
         other._width, other._sizes = self._width[keep], self._sizes[keep]
         other._first = np.concatenate([[0], np.cumsum(other._width)])
         columns = np.concatenate([np.arange(self._first[k], self._first[k + 1]) for k in keep.tolist()])
-        other._r, other._Z, other._m = self._r, self._Z[:, columns], self._m[:, keep]
+        other._r, other._Z, other._means, other._mean = self._r, self._Z[columns], self._means, self._mean[keep]
         return other
 
     def acting(self, members: Sequence[tuple[int, int]]) -> ActingColumns:
         """Blocks by number, with the numbers of their sizes, as columns that act together with others."""
         columns = [np.arange(self._first[k], self._first[k + 1]) for k, _ in members]
         deviations = [np.full(self._width[k], self._sizes[k, size]) for k, size in members]
-        mean = self._m[:, [k for k, _ in members]].sum(axis=1)
+        mean = self._means[self._mean[[k for k, _ in members]]].sum(axis=0)
         return ActingColumns(np.concatenate(columns), np.concatenate(deviations), mean)
 
     def log_factors(self, acting: ActingColumns | None = None, start: int = 0) -> Floats:
@@ -133,27 +132,21 @@ class Blocks:
         """Log Bayes factors (b, s) of blocks that are all as wide as each other."""
         count, width = len(blocks), int(self._width[blocks[0]])
         at = slice(self._first[blocks[0]], self._first[blocks[-1] + 1])
-        Z, means, sizes = self._Z[:, at], self._m[:, blocks], self._sizes[blocks]
-        of_block = Z.reshape(len(Z), count, width)
+        of_block, means, sizes = self._Z[at].reshape(count, width, -1), self._mean[blocks], self._sizes[blocks]
         if acting is None:
-            M = np.einsum("nbi,nbj->bij", of_block, of_block, optimize=True)
+            M = of_block @ of_block.transpose(0, 2, 1)
         else:
             numbers = np.arange(at.start, at.stop).reshape(count, width)
             M = self._gram[numbers[:, :, None], numbers[:, None, :]]
-        with_means = bool(means.any())
         r = self._r if acting is None else self._r - acting.mean
-        residual = r[:, None] - means if with_means else r[:, None]
-        b = (
-            np.einsum("nbi,nb->bi", of_block, np.broadcast_to(residual, (len(Z), count)), optimize=True)
-            if with_means
-            else (residual[:, 0] @ Z).reshape(count, width)
-        )
-        log = 0.5 * (self._r @ self._r - np.sum(residual**2, axis=0)) * np.ones(count)
+        # one for all blocks without means
+        residual = r - self._means[means] if means.any() else r[None]
+        b = (of_block @ residual[:, :, None])[:, :, 0]
+        log = 0.5 * (self._r @ self._r - np.sum(residual**2, axis=1)) * np.ones(count)
         if acting is not None:
-            W = self._Z[:, acting.numbers]
             of_acting = self._gram[acting.numbers]
             A = np.linalg.inv(of_acting[:, acting.numbers] + np.diag(acting.deviations**-2.0))
-            projection = W.T @ residual
+            projection = self._Z[acting.numbers] @ residual.T
             C = of_acting[:, at].reshape(len(A), count, width)
             AC = np.tensordot(A, C, 1)
             M = M - np.einsum("kbi,kbj->bij", C, AC)
@@ -264,14 +257,22 @@ def posterior(
     `model`: of rows (n,) on which no cause acts. `residual` (n,).
     """
     sums = _Sums(1 + search.elsewhere)
+    blocks_at = Blocks.at(model, residual, causes) if causes else None
+
+    def weighed_at(scale: float) -> tuple[float, Blocks | None, Floats]:
+        """Log density without any cause, blocks and their log Bayes factors."""
+        none = float(model.with_scale(scale).log_density(residual))
+        blocks = None if blocks_at is None else blocks_at(scale)
+        return none, blocks, np.zeros((0, 0)) if blocks is None else blocks.log_factors()
+
     by_scale: list[tuple[float, float, Blocks, Floats]] = []
     scales = search.scales.tolist()
-    at_scales = Blocks.at_scales(model, scales, residual, causes) if causes else iter([None] * len(scales))
-    for scale, log_prior, blocks in zip(scales, search.log_scale_prior.tolist(), at_scales, strict=True):
-        none = float(model.with_scale(scale).log_density(residual)) + log_prior
+    of_scales = zip(scales, search.log_scale_prior.tolist(), in_threads(weighed_at, scales), strict=True)
+    for scale, log_prior, (density, blocks, factors) in of_scales:
+        none = density + log_prior
         sums.add(frozenset(), none, Configuration((), scale, none))
         if blocks is not None:
-            logs = blocks.log_factors() + blocks.log_weights + none
+            logs = factors + blocks.log_weights + none
             sums.add_blocks(blocks, 0, logs, (), scale)
             by_scale.append((scale, none, blocks, logs))
     greatest = max((float(logs.max()) for *_, logs in by_scale), default=0.0)

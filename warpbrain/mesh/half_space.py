@@ -11,6 +11,7 @@ speed `r` along its normal changes the integral over what is above it by
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,9 +41,15 @@ def integrals_above(mesh: TetMesh | QuadraticMesh, up: ArrayLike, level: float) 
     """`int N_a dV` over the part of each tetrahedron where `x . up > level`.
 
     `up` (3,): unit normal of the plane. `level`: its distance from the origin along `up` [m]. Returns (m, 4) or
-    (m, 10) [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`.
+    (m, 10) [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`; not to be written to.
     """
-    cut = _Cut(mesh, np.asarray(up, dtype=np.float64), level)
+    return _integrals_above(mesh, tuple(np.asarray(up, dtype=np.float64).tolist()), float(level))
+
+
+@lru_cache(maxsize=4)
+def _integrals_above(mesh: TetMesh | QuadraticMesh, up: tuple[float, ...], level: float) -> Floats:
+    """The same, kept: states of a body under other hypotheses are asked for one level again and again."""
+    cut = _Cut(mesh, np.array(up), level)
     whole = integrals_of_shapes(mesh)
     integrals = np.where((cut.count == 4)[:, None], whole, 0.0)
     for elements, corners, sign in cut.solids():
@@ -53,6 +60,7 @@ def integrals_above(mesh: TetMesh | QuadraticMesh, up: ArrayLike, level: float) 
         np.add.at(integrals, elements, sign * part)
     below = cut.count == 3
     integrals[below] += whole[below]
+    integrals.flags.writeable = False
     return integrals
 
 

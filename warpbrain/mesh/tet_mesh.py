@@ -265,6 +265,8 @@ class TetMesh:
         sets, mesh, node_ids, element_ids = self.shared["left"]
         if self.node_sets is not sets:
             mesh = mesh.with_node_sets({name: members[node_ids] for name, members in self.node_sets.items()})
+            # the next one has the same sets: what is known of what is left by being that mesh stays known
+            self.shared["left"] = self.node_sets, mesh, node_ids, element_ids
         return mesh, node_ids, element_ids
 
     def _named(self, nodes: Any, elements: Any) -> tuple[dict[str, Bools], dict[str, Bools], dict[str, Floats]]:

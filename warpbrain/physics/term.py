@@ -9,6 +9,7 @@ The system knows no term by name.
 from __future__ import annotations
 
 import abc
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
@@ -109,7 +110,9 @@ class Term(abc.ABC):
     lasting: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, body: Body, stencils: NDArray[np.integer], ramp: Callable[[float], float] | None = None) -> None:
-        self.body = body
+        # of a system that knows its terms: what refers to each other stays until the collector looks for it, and there
+        # are tens of megabytes of each
+        self._body = weakref.ref(body)
         self._ramp = ramp
         self.stencils = np.ascontiguousarray(stencils, dtype=np.int32)
         assert bool(np.all(np.diff(self.stencils, axis=1) > 0)), "nodes of a stencil ascend"
@@ -129,6 +132,13 @@ class Term(abc.ABC):
     def set_scale(self, scale: float) -> None:
         """Set the factor on what it does."""
         self.scale.fill_(1.0 if self.in_full else scale)
+
+    @property
+    def body(self) -> Body:
+        """What it is part of, which has to live as long as it is used."""
+        body = self._body()
+        assert body is not None, "the body of the term is gone"
+        return body
 
     def set_time_step(self, h: float) -> None:  # noqa: B027  (most terms have no memory)
         """Tell a term with a memory how long the coming steps are [s]; infinite in an equilibrium."""
@@ -191,7 +201,7 @@ class Term(abc.ABC):
         """
         for name, array in other._arrays().items():
             wp.copy(getattr(self, name), array)
-        kept = (*self.memory, *self.lasting, "body", "scale", "forces", "blocks")
+        kept = (*self.memory, *self.lasting, "_body", "scale", "forces", "blocks")
         for name, value in vars(other).items():
             if name not in kept and not isinstance(value, wp.array):
                 setattr(self, name, value)

@@ -108,9 +108,8 @@ def test_states_have_a_set_for_every_place(block: Case) -> None:
 
 def _at_one_point() -> Linearisation:
     """Of a body whose extent is 1.6 m, where one point is recorded."""
-    model = SimpleNamespace(mesh=SimpleNamespace(points=np.eye(3)))
     sensors = SimpleNamespace(is_displacement=np.ones(3, dtype=bool), groups=np.zeros(3, dtype=int))
-    return cast(Linearisation, SimpleNamespace(system=SimpleNamespace(model=model), sensors=sensors))
+    return cast(Linearisation, SimpleNamespace(extent=np.sqrt(8.0 / 3.0), sensors=sensors))
 
 
 @pytest.mark.parametrize("mechanism", [Fibres(stiffness=1.0, direction=(1.0, 0.0, 0.0)), Swelling(amount=0.1)])

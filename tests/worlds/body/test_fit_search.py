@@ -119,3 +119,15 @@ def test_what_a_fit_has_not_reached_is_no_evidence(sets, base, monkeypatch):
     assert not fit.converged
     assert fit.unreached > 1.0
     assert fit.log_evidence == fit.marginal.log_evidence - fit.unreached
+
+
+def test_a_search_that_expects_to_reach_too_little_ends(sets):
+    """A fit that is not wanted is worse than what it would have to be, and not what a whole search comes to."""
+    weighed = sets.get(("gravity",))
+    start = [np.zeros(weighed.columns.shape[1])]
+    whole = Fitter(sets.base).fit(weighed.effects, weighed.columns, start, weighed.marginal)
+    wanted = whole.log_evidence + 1e3
+    fit = Fitter(sets.base).fit(weighed.effects, weighed.columns, start, weighed.marginal, wanted=wanted)
+    assert whole.converged
+    assert not fit.converged
+    assert fit.log_evidence < wanted

@@ -34,6 +34,9 @@ SENTENCES = {
     "forces": "A recorded force is not the one that acted, or has another direction.",
 }
 
+#: Places of a cause that are looked at together.
+_AT_A_TIME = 64
+
 
 @dataclass(frozen=True, eq=False)
 class BodyCauses:
@@ -72,17 +75,19 @@ def visible(causes: BodyCauses, model: GaussianModel) -> BodyCauses:
 
     `model`: of the rows without them.
     """
-    least = belief("checks.invisible")
-    return replace(causes, causes=tuple(cause for cause in causes.causes if _length(cause, model) > least))
+    return replace(causes, causes=tuple(cause for cause in causes.causes if _is_visible(cause, model)))
 
 
-def _length(cause: Cause, model: GaussianModel) -> float:
-    """Of the largest change by one standard deviation of the largest size, in standard deviations of the model."""
-    blocks = [float(np.max(cause.sizes)) * place.columns for place in cause.places]
-    blocks += [place.mean[:, None] for place in cause.places if place.mean is not None]
-    if not blocks:
-        return 0.0
-    return float(np.linalg.norm(model.standardised(np.concatenate(blocks, axis=1)), axis=0).max(initial=0.0))
+def _is_visible(cause: Cause, model: GaussianModel) -> bool:
+    """Whether one standard deviation of its largest size is seen beside the model, of some places at a time."""
+    largest, least = float(np.max(cause.sizes)), belief("checks.invisible")
+    for first in range(0, len(cause.places), _AT_A_TIME):
+        places = cause.places[first : first + _AT_A_TIME]
+        columns = [largest * place.columns for place in places]
+        columns += [place.mean[:, None] for place in places if place.mean is not None]
+        if (np.linalg.norm(model.standardised(np.concatenate(columns, axis=1)), axis=0) > least).any():
+            return True
+    return False
 
 
 def scaled(effect: Effect, size: float) -> Effect:

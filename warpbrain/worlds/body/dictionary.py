@@ -198,9 +198,9 @@ def is_linear(effect: Effect, at: Linearisation) -> bool:
     """
     if effect.proposal is None or isinstance(effect.proposed.make(effect.proposed.mean), Load):
         return bool(np.isfinite(effect.columns).all())
-    rows, largest = at.sensors.is_displacement, extent(at.system.model.mesh.points)
+    rows = at.sensors.is_displacement
     # components of a point, and of a vector of coefficients, together: in other axes each is another
-    parts = np.minimum(np.abs(effect.columns[rows]) / largest, 1.0)
+    parts = np.minimum(np.abs(effect.columns[rows]) / at.extent, 1.0)
     squares = np.bincount(at.sensors.groups[rows], np.sum(parts**2, axis=1))
     return bool(np.isfinite(effect.columns).all() and squares.max(initial=0.0) < 1.0)
 

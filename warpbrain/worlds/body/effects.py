@@ -56,17 +56,19 @@ class SolvedSwitches:
 
     def __init__(self, states: States, state: SolvedState) -> None:
         self._states, self._state = states, state
-        self._solved_states: dict[str, SolvedState] = {}
+        # displacement and reactions with each mechanism at the time of each number
+        self._solved: dict[str, list[tuple[Floats, Floats]]] = {}
 
     def effect_of(self, mechanism: Mechanism, sensors: Sensors, instant: int) -> Floats:
         """What sensors (n,) record in the state with a mechanism, less that without it, at the time of a number."""
         key, state = repr(mechanism), self._state
-        if key not in self._solved_states:
+        if key not in self._solved:
             hypothesis = replace(state.hypothesis, mechanisms=(mechanism,))
             # the loads act already: one load step, or the state is taken not to exist
-            self._solved_states[key] = self._states.solve(hypothesis, state.u, iterations=EquilibriumOptions.max_newton)
-        solved, without = self._solved_states[key].instants[instant], state.instants[instant]
-        return sensors.answer(solved.u - without.u, solved.reactions - without.reactions)
+            solved = self._states.solve(hypothesis, state.u, iterations=EquilibriumOptions.max_newton)
+            self._solved[key] = [(each.u, each.reactions) for each in solved.instants]
+        (u, reactions), without = self._solved[key][instant], state.instants[instant]
+        return sensors.answer(u - without.u, reactions - without.reactions)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +124,8 @@ class Effects:
     ) -> None:
         self.at, self.mesh_errors, self._switches, self._instant = at, mesh_errors, switches, instant
         self._internal: Floats | None = None
+        # systems of the same state with laws of other kinds, as long as columns are made
+        self._of_other_laws: list[System] = []
         model = at.system.model
         acting = [m for m in (*model.loads, *model.mechanisms) if isinstance(m, Mechanism) and not m.several]
         # kinds of which a case has only one: a proposed mechanism replaces them
@@ -256,6 +260,7 @@ class Effects:
         growth = ((k, (1.0 + m.growth(mesh, m.factor())) / present_volume - 1.0) for k, m, f in each if Growing in f)
         total = np.zeros((len(at.sensors), len(mechanisms)))
         pushing, matrix = sparse_columns(3 * system.size, forces)
+        self._of_other_laws.clear()
         if pushing:
             total[:, pushing] += at.answers_of_columns(matrix)
         for columns, forces_of in ((stiffness, "element_forces"), (growth, "growth_forces")):
@@ -309,17 +314,20 @@ class Effects:
             self._internal = at.internal_forces()
         materials = system.model.materials
         substitutes = substituted(materials, mechanism)
-        try:
-            system.set_materials(substitutes)
-        except InputError:
+        for other in (system, *self._of_other_laws):
+            try:
+                other.set_materials(substitutes)
+            except InputError:
+                continue
+            break
+        else:
             # a law for which other kernels are launched
-            other_system = System(
-                replace(system.model, materials=substitutes), str(system.device), system.precision.name
-            )
-            other_system.remember_as(system)
-            return at.internal_forces(other_system) - self._internal
-        change = at.internal_forces() - self._internal
-        system.set_materials(materials)
+            other = System(replace(system.model, materials=substitutes), str(system.device), system.precision.name)
+            other.remember_as(system)
+            self._of_other_laws.append(other)
+        change = at.internal_forces(other) - self._internal
+        if other is system:
+            system.set_materials(materials)
         return change
 
 

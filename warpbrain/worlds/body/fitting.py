@@ -57,6 +57,8 @@ _MATTERS = 0.3
 _ROUNDS = 8
 #: After how many in succession it ends, too, that reach nothing better and leave no less: some go back and forth.
 _WORSE = 2
+#: How many times what is expected may be gained of the log evidence.
+_TRUST = 2.0
 #: Gain that is expected of a step of which none comes, where that may be rounding.
 _ROUNDING = 0.1
 #: Part of what these have changed of the log posterior density to which the next search is exact.
@@ -515,6 +517,7 @@ class Fitter:
         screened: SetMarginal,
         nearby: SolvedState | None = None,
         subset: Refit | None = None,
+        wanted: float = -np.inf,
     ) -> Refit:
         """Fit one set; `SolveError` if there is no equilibrium near the start.
 
@@ -524,7 +527,8 @@ class Fitter:
         surface may belong to one side or the other there are several best points, and a fit with a mechanism must not
         miss the one that the fit without it has reached. `screened`: scale of the noise and gross errors of the set in
         the linear model. `nearby`: nearer to the start than the base. `subset`: a fit with the first of the effects, or
-        with all of them, nearer still, whose share of the mesh's error is kept.
+        with all of them, nearer still, whose share of the mesh's error is kept. `wanted`: a log evidence; a search that
+        expects to reach less ends before it has converged.
         """
         search = FitSearch(self.base, self.mesh_errors, effects, columns, screened)
         if subset is not None:
@@ -547,7 +551,7 @@ class Fitter:
             better = best is None or fit.log_evidence > best.log_evidence
             worse = 0 if better or gain < least else worse + 1
             best, least = fit if better else best, min(gain, least)
-            if worse == _WORSE:
+            if worse == _WORSE or fit.marginal.log_evidence + _TRUST * gain < wanted:
                 break
             enough = min(max(_ENOUGH, _PART * expected), _ROUGHLY)
         assert best is not None

@@ -35,7 +35,7 @@ from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit, c
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
-from warpbrain.worlds.body.placing import moved_about_fit, weigh, with_refined_places, with_refined_strain
+from warpbrain.worlds.body.placing import Weighing, moved_about_fit, with_refined_places, with_refined_strain
 from warpbrain.worlds.body.states import States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
@@ -114,10 +114,10 @@ class HypothesisSearch:
         if nothing.gross.any():
             noise_factor = nothing.noise.noise_factor / nothing.scale
             models.append(GaussianModel(noise_factor, base.nuisances.columns))
+        weighing = Weighing(base, self._visible, nothing.sizes)
         for model in models:
             screened = posterior(model, base.residual, self._visible.causes, _search(most=2))
-            work = partial(weigh, base, causes=self._visible, screened=model, sizes=nothing.sizes)
-            for candidate in in_threads(work, _most_probable(screened)):
+            for candidate in in_threads(partial(weighing.weigh, screened=model), _most_probable(screened)):
                 _keep_better(self._sets, candidate)
         # a local cause that has been missed by half a cell seems to do nothing
         singles = [
@@ -237,7 +237,7 @@ class HypothesisSearch:
             reduced = superset.without(mechanism, self.base)
             if reduced.marginal.log_evidence < subset.marginal.log_evidence + _BETTER:
                 continue
-            refitted = self._fitted_less(superset, [mechanism])
+            refitted = self._fitted_less(superset, [mechanism], subset.refit.log_evidence + _BETTER)
             if refitted is None or refitted.refit is None:
                 continue
             gain = refitted.refit.log_evidence - subset.refit.log_evidence
@@ -246,8 +246,13 @@ class HypothesisSearch:
                 self._sets[subset.names] = better.with_evidence(subset.hypothesis.log_evidence + gain)
                 self._forget_supersets(subset.names)
 
-    def _fitted_less(self, superset: WeightedSet, mechanisms: Sequence[str]) -> WeightedSet | None:
-        """A set with some mechanisms less than a fitted one, fitted from its optimum; None if it cannot be."""
+    def _fitted_less(
+        self, superset: WeightedSet, mechanisms: Sequence[str], wanted: float = -np.inf
+    ) -> WeightedSet | None:
+        """A set with some mechanisms less than a fitted one, fitted from its optimum; None if it cannot be.
+
+        `wanted`: see `Fitter.fit`.
+        """
         begun, reduced = superset.refit, superset
         assert begun is not None
         for mechanism in mechanisms:
@@ -255,7 +260,9 @@ class HypothesisSearch:
             reduced = reduced.without(mechanism, self.base)
         screened = reduced.marginal
         try:
-            refit = self._fitter.fit(reduced.effects, reduced.columns, [reduced.coordinates], screened, subset=begun)
+            refit = self._fitter.fit(
+                reduced.effects, reduced.columns, [reduced.coordinates], screened, subset=begun, wanted=wanted
+            )
         except CANNOT_BE_FITTED:
             return None
         gain = refit.log_evidence - screened.log_evidence
@@ -315,29 +322,27 @@ class HypothesisSearch:
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
         causes = visible(causes, marginal.model)
         best: dict[frozenset[str], WeightedSet] = {}
+        weighing = Weighing(self.base, causes, marginal.sizes, fitted)
         for factor in noise_factors:
-            for superset in self._supersets(fitted, causes, candidates.source, GaussianModel(factor, fitted.columns)):
+            for superset in self._supersets(fitted, causes, weighing, GaussianModel(factor, fitted.columns)):
                 _keep_better(best, superset)
-        for names, superset in best.items():
-            known = self._sets.get(names)
-            if known is None or known.refit is None:
-                self._sets[names] = superset
+        fits = {names for names, known in self._sets.items() if known.refit is not None}
+        placed = len(fitted.effects)
+        refine = partial(with_refined_places, self.base, spacing=self.spacing, source=candidates.source, placed=placed)
+        for superset in in_threads(refine, [superset for names, superset in best.items() if names not in fits]):
+            self._sets[superset.names] = superset
 
     def _supersets(
-        self, fitted: WeightedSet, causes: BodyCauses, source: Effects, unscaled: GaussianModel
+        self, fitted: WeightedSet, causes: BodyCauses, weighing: Weighing, unscaled: GaussianModel
     ) -> Iterator[WeightedSet]:
-        """The most probable sets of one cause more than a fitted one, with that at the best place under a noise.
+        """The most probable sets of one cause more than a fitted one, with that at the best place of a scan.
 
         `unscaled`: model of the rows with the fitted causes, at a scale of one.
         """
         screened = posterior(unscaled, fitted.residual, causes.causes, _search(most=1))
         hypotheses = [hypothesis for hypothesis in _most_probable(screened, singles=False) if hypothesis.causes]
-
-        def work(hypothesis: Hypothesis) -> WeightedSet:
-            candidate = weigh(self.base, hypothesis, causes, unscaled, fitted.marginal.sizes, fitted)
-            return with_refined_places(self.base, candidate, self.spacing, source, len(fitted.effects))
-
-        for hypothesis, candidate in zip(hypotheses, in_threads(work, hypotheses), strict=True):
+        weighed = in_threads(partial(weighing.weigh, screened=unscaled), hypotheses)
+        for hypothesis, candidate in zip(hypotheses, weighed, strict=True):
             # both with gross errors of their own
             gain = candidate.hypothesis.log_evidence - fitted.marginal.log_evidence
             # causes in the order of their effects

@@ -255,6 +255,11 @@ class Linearisation:
         return other
 
     @cached_property
+    def extent(self) -> float:
+        """Of the body [m]; see `warpbrain.mesh.quality`."""
+        return extent(self.system.model.mesh.points)
+
+    @cached_property
     def compliance(self) -> Floats:
         """`A` (n, 3 N), made when it is needed: for few forces equilibria are cheaper."""
         rows, which = self._rows
@@ -294,8 +299,7 @@ class Linearisation:
     def _surface(self, key: bytes, held: Bools) -> HeldSurface:
         """A held surface with the responses of the sensors to it, made once."""
         if key not in self._surfaces:
-            mesh = self.system.model.mesh
-            self._surfaces[key] = HeldSurface(self, held, vertex_normals(mesh), extent(mesh.points))
+            self._surfaces[key] = HeldSurface(self, held, vertex_normals(self.system.model.mesh), self.extent)
         if key not in self._surface_responses:
             # Fortran order: of each patch a few columns are used
             self._surface_responses[key] = np.asfortranarray(self._surfaces[key].answers(self))
@@ -336,8 +340,11 @@ class Linearisation:
             return answers[which]
         forces = forces.toarray() if issparse(forces) else forces
         du = self.displacements(forces)
-        dR = np.where(self.free[:, None], 0.0, self.stiffness @ du - forces)
-        return np.asarray(self.sensors.by_displacement @ du + self.sensors.by_reactions @ dR)
+        answers = np.asarray(self.sensors.by_displacement @ du)
+        if self.sensors.by_reactions.nnz:
+            dR = np.where(self.free[:, None], 0.0, self.stiffness @ du - forces)
+            answers += self.sensors.by_reactions @ dR
+        return answers
 
     def displacements(self, forces: Floats) -> Floats:
         """Of all components (3 N, k) [m] under nodal forces (3 N, k) [N]."""

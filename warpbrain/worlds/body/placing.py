@@ -14,13 +14,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.inference import GaussianModel
-from warpbrain.inference.causes import Hypothesis
+from warpbrain.inference.causes import Hypothesis, Member
 from warpbrain.inference.gross_errors import FurtherColumns, PointRows
 from warpbrain.inference.noise import outliers, scales
 from warpbrain.mesh.quality import principal_axes
@@ -31,7 +32,7 @@ from warpbrain.worlds.body.causes import BodyCauses, scaled
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
 from warpbrain.worlds.body.effects import Effect, Effects, width_of
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
-from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
+from warpbrain.worlds.body.weighted_set import Refit, SetMarginal, WeightedSet, evidence_of
 
 #: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
 _RADII = (0.8, 1.0, 1.25)
@@ -168,75 +169,71 @@ def _middles(base: Base, patch: Patch | None) -> Floats:
     return np.asarray(mesh.points[faces].mean(axis=1))
 
 
-def weigh(
-    base: Base,
-    hypothesis: Hypothesis,
-    causes: BodyCauses,
-    screened: GaussianModel,
-    sizes: tuple[int, int],
-    about: WeightedSet | None = None,
-) -> WeightedSet:
-    """A hypothesis of screening in the linear model about the base, or about a fit, with gross errors of its own.
+class Weighing:
+    """Hypotheses of screening in the linear model about the base, or about a fit, with gross errors of their own.
 
-    Screening gives all hypotheses the gross errors of one model. What this one gains by having its own is added to its
-    log evidence: the mean over its likeliest places, since points that a local cause moves far are gross errors where
-    it is thought to be elsewhere.
-
-    `causes`: those that were screened.
-    `screened`: of the rows without them.
-    `sizes`: see `evidence_of`.
-    `about`: a fitted set, whose causes act beside those of the hypothesis; the base, where no cause acts, unless given.
+    `causes`: those that are screened. `sizes`: see `evidence_of`. `about`: a fitted set, whose causes act beside those
+    of each hypothesis; the base, where no cause acts, unless given.
     """
-    configurations = (hypothesis.best, *hypothesis.elsewhere)
-    weighed = [
-        _weigh_at(base, replace(hypothesis, best=configuration), causes, screened, sizes, about)
-        for configuration in configurations
-    ]
-    shares = np.array([configuration.log_density for configuration in configurations])
-    logs = np.array([candidate.hypothesis.log_evidence for candidate in weighed]) + shares
-    log_evidence = float(np.logaddexp.reduce(logs) - np.logaddexp.reduce(shares))
-    best = int(np.argmax(logs))
-    of_places = float(np.logaddexp.reduce([configuration.log_share for configuration in configurations]))
-    log_share = min(float(logs[best] - np.logaddexp.reduce(logs)) + of_places, 0.0)
-    return replace(weighed[best].with_evidence(log_evidence), log_share=log_share)
 
+    def __init__(
+        self, base: Base, causes: BodyCauses, sizes: tuple[int, int], about: WeightedSet | None = None
+    ) -> None:
+        self._base, self._causes, self._sizes = base, causes, sizes
+        self._acting: tuple[Effect, ...] = () if about is None else about.effects
+        self._residual = base.residual if about is None else about.residual
+        self._columns = base.model.columns if about is None else about.columns
+        # the same ones are often found with several noises
+        self._at = cache(self._acting_with)
 
-def _weigh_at(
-    base: Base,
-    hypothesis: Hypothesis,
-    causes: BodyCauses,
-    screened: GaussianModel,
-    sizes: tuple[int, int],
-    about: WeightedSet | None,
-) -> WeightedSet:
-    """The same as if its best configuration stood for all places."""
-    acting: tuple[Effect, ...]
-    if about is None:
-        start, model_columns, acting = base.residual, base.model.columns, ()
-    else:
-        start, model_columns, acting = about.residual, about.columns, about.effects
-    members = hypothesis.best.members
-    effects = [(member, causes.effect(member)) for member in members]
-    linear = [causes.columns(member) for member, effect in effects if effect is None]
-    added = [effect for _, effect in effects if effect is not None]
-    residual = start - sum((causes.mean(member) for member in members), start=np.zeros(len(start)))
-    blocks = [*linear, *(effect.columns for effect in added)]
-    further = np.column_stack(blocks) if members else np.zeros((len(residual), 0))
-    values, log_prior = scales()
-    log_screened = screened.with_columns(further).log_marginal(residual, values, log_prior)
-    # nuisances, linear causes, effects: those that act already come first
-    split = model_columns.shape[1] - width_of(acting)
-    columns = np.column_stack(
-        [model_columns[:, :split], *linear, model_columns[:, split:], *(effect.columns for effect in added)]
-    )
-    columns, result = evidence_of(base, columns, residual, hypothesis.best.scale, sizes)
-    return WeightedSet(
-        replace(hypothesis, log_evidence=hypothesis.log_evidence + result.log_evidence - log_screened),
-        (*acting, *added),
-        residual,
-        columns,
-        result,
-    )
+    def weigh(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
+        """A hypothesis with gross errors of its own.
+
+        Screening gives all hypotheses the gross errors of one model. What this one gains by having its own is added to
+        its log evidence: the mean over its likeliest places, since points that a local cause moves far are gross errors
+        where it is thought to be elsewhere.
+
+        `screened`: of the rows without its causes.
+        """
+        configurations = (hypothesis.best, *hypothesis.elsewhere)
+        weighed = [self._weigh_at(replace(hypothesis, best=best), screened) for best in configurations]
+        shares = np.array([configuration.log_density for configuration in configurations])
+        logs = np.array([candidate.hypothesis.log_evidence for candidate in weighed]) + shares
+        log_evidence = float(np.logaddexp.reduce(logs) - np.logaddexp.reduce(shares))
+        best = int(np.argmax(logs))
+        of_places = float(np.logaddexp.reduce([configuration.log_share for configuration in configurations]))
+        log_share = min(float(logs[best] - np.logaddexp.reduce(logs)) + of_places, 0.0)
+        return replace(weighed[best].with_evidence(log_evidence), log_share=log_share)
+
+    def _weigh_at(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
+        """The same as if its best configuration stood for all places."""
+        effects, residual, columns, further, result = self._at(hypothesis.best.members, hypothesis.best.scale)
+        values, log_prior = scales()
+        log_screened = screened.with_columns(further).log_marginal(residual, values, log_prior)
+        log_evidence = hypothesis.log_evidence + result.log_evidence - log_screened
+        return WeightedSet(replace(hypothesis, log_evidence=log_evidence), effects, residual, columns, result)
+
+    def _acting_with(
+        self, members: tuple[Member, ...], scale: float
+    ) -> tuple[tuple[Effect, ...], Floats, Floats, Floats, SetMarginal]:
+        """Effects, residual (n,) and columns (n, q + k) with members of a hypothesis, columns (n, k) of these alone.
+
+        And the evidence, whose sum begins at a scale of the noise.
+        """
+        causes, effects = self._causes, [self._causes.effect(member) for member in members]
+        linear = [causes.columns(member) for member, effect in zip(members, effects, strict=True) if effect is None]
+        added = [effect for effect in effects if effect is not None]
+        residual = self._residual - sum(
+            (causes.mean(member) for member in members), start=np.zeros(len(self._residual))
+        )
+        blocks = [*linear, *(effect.columns for effect in added)]
+        further = np.column_stack(blocks) if members else np.zeros((len(residual), 0))
+        # nuisances, linear causes, effects: those that act already come first
+        split = self._columns.shape[1] - width_of(self._acting)
+        before, after = np.hsplit(self._columns, [split])
+        columns = np.column_stack([before, *linear, after, *(effect.columns for effect in added)])
+        columns, result = evidence_of(self._base, columns, residual, scale, self._sizes)
+        return (*self._acting, *added), residual, columns, further, result
 
 
 def with_refined_places(

@@ -28,6 +28,7 @@ from warpbrain.inference import Kind
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, marginal_of, outward
+from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
@@ -178,10 +179,10 @@ def evidence_of(
     fractions = fractions if moving else np.ones(1)
     others = np.delete(columns, np.r_[part], axis=1) if moving else columns
     models, relative = [noise.of_noise(others) for noise in base.noises], None
-    inflation: list[Floats | None] = [None] * len(models)
+    inflation: Floats | None = None
     if moving:
         as_given = RowsAtScales(models[0], residual, base.points, columns[:, part]).with_gross_errors(scale)
-        inflation[0] = as_given.inflation
+        inflation = as_given.inflation
         moved = _displacement(base, residual - others @ (others.T @ as_given.weighted))
         relative = moved[:, None] * nuisances.relative
 
@@ -194,16 +195,25 @@ def evidence_of(
     def log_evidence(fraction: int, noise: int) -> float:
         if (fraction, noise) not in summed:
             # gross errors are nearly the same whatever the smooth part; what is not resolved may look like some
-            known = next((result for (_, other), result in summed.items() if other == noise), None)
-            near = (scale, inflation[noise]) if known is None else (known.scale, known.inflation)
+            known = next((result for (_, other), result in list(summed.items()) if other == noise), None)
+            near = (scale, None if noise else inflation) if known is None else (known.scale, known.inflation)
             summed[fraction, noise] = rows(noise).summed(float(fractions[fraction]), *near)
         return summed[fraction, noise].log_evidence
 
     if sizes is None:
         sizes = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction)))), 0
     best, noise = sizes if moving else (0, sizes[1])
+
+    def beside(*pairs: tuple[int, int]) -> None:
+        """What is asked for in any case, in threads."""
+        there = [(f, k) for f, k in pairs if 0 <= f < len(fractions) and 0 <= k < len(models)]
+        in_threads(lambda pair: log_evidence(*pair), there)
+
+    log_evidence(best, noise)
+    beside((best - 1, noise), (best + 1, noise))
     by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
     best, first = int(np.argmax(by_fraction)), noise
+    beside((best, noise - 1), (best, noise + 1))
     by_noise = outward(lambda number: log_evidence(best, number), first, len(base.noises), _NEGLIGIBLE)
     noise = int(np.argmax(by_noise))
     if noise != first:
