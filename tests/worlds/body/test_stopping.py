@@ -46,6 +46,15 @@ def test_what_an_unknown_rests_on_is_fitted_and_then_that_without_it():
     assert following(nothing, fitted, weighted(60.0, *both, fitted=True)) is None
 
 
+def test_before_something_has_no_name_the_likeliest_mechanism_is_fitted():
+    # stress that relaxes with two times is far from linear, and gains dozens of nats by a fit
+    nothing, unknown = weighted(0.0, fitted=True), weighted(60.0, "unknown", fitted=True)
+    likely, less = weighted(20.0, "viscoelasticity"), weighted(10.0, "swelling")
+    assert following(nothing, unknown, likely, less) == ["viscoelasticity"]
+    fitted = weighted(20.0, "viscoelasticity", fitted=True)
+    assert following(nothing, unknown, fitted, less) is None
+
+
 def test_a_named_mechanism_is_fitted_then_expanded_then_left():
     nothing = weighted(0.0, fitted=True)
     assert following(nothing, weighted(30.0, "pressure")) == ["pressure"]

@@ -116,16 +116,19 @@ def _part_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> Weighte
 
 
 def _unknown_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> WeightedSet | None:
-    """The likeliest set with an unknown force and no mechanism, else the same without that force, if it was not fitted.
+    """One not fitted yet of the likeliest set with the unknown alone, that without it, and the likeliest mechanism.
 
-    None if both were, or the verdict is another one. In the linear model, what a finite rigid rotation does to second
-    order looks like an unknown force.
+    None if all were, or the verdict is another one. In the linear model, what a finite rigid rotation does to second
+    order looks like an unknown force, and what a mechanism does that is far from linear like tissue or a force.
     """
     if decision.verdict != UNKNOWN:
         return None
     without_names = (candidate for candidate in sets if UNKNOWN in candidate.names and not candidate.mechanisms)
     likely = next((candidate.names for candidate in without_names), frozenset())
-    parts = (candidate for candidate in sets if candidate.names in (likely, likely - {UNKNOWN}))
+    mechanism = next(
+        (candidate.names for candidate in sets if len(candidate.names) == len(candidate.mechanisms) == 1), likely
+    )
+    parts = (candidate for candidate in sets if candidate.names in (likely, likely - {UNKNOWN}, mechanism))
     return next((part for part in parts if part.refit is None and not part.failure), None)
 
 
