@@ -80,7 +80,9 @@ def toward_equilibrium(
         system.u.assign(u)
         internal = system.internal_forces()
         r = free * (external - internal)
-        norm = float(np.linalg.norm(r))
+        # a step may have led far from any equilibrium: infinity, which ends this
+        with np.errstate(over="ignore"):
+            norm = float(np.linalg.norm(r))
         if not norm < _FALLS * norms[-2]:
             break
         if norm < min(norms):
