@@ -219,8 +219,8 @@ def traits_in_words(unknown: Traits, extent: float) -> str:
     """What is known of an unknown force in a body of an extent [m], to follow a sentence."""
     if unknown.resistance:
         return (
-            " The same loads move tissue further at one time than at another, as where it has a memory, wears or "
-            "heals: no force need act."
+            " The same loads move tissue further at one time than at another, as they do where stress relaxes or "
+            "tissue is damaged or heals: no force need act."
         )
     size, sd = unknown.size
     where = f"about {place(unknown.centre, extent)}"

@@ -17,7 +17,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
-from multiprocessing import active_children, get_context
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -211,10 +211,11 @@ class Processes:
         except BrokenProcessPool:
             raise SolveError("a worker process was ended; the same command goes on with what is missing") from None
         finally:
+            # `kill_workers` of Python 3.14. What they compute is wanted no more, and the interpreter would wait for it;
+            # one that is still starting would print that this process is gone
+            processes = list((pool._processes or {}).values())
             pool.shutdown(wait=False, cancel_futures=True)
-            # what they are at is wanted no more, and the interpreter would wait for it; one that still begins would
-            # find this process gone, and say so
-            for process in active_children():
+            for process in processes:
                 process.kill()
 
 

@@ -106,7 +106,7 @@ def test_tissue_that_is_softer_at_one_time_moves_as_equilibria_of_softer_tissue(
     step = 1e-4
     softer, stiffer = (states.solve(Hypothesis(theta + sign * step, field)).sensors.computed for sign in (-1.0, 1.0))
     at = states.solve(Hypothesis(theta, field)).linearised()
-    columns = resistances(at, TIMES, other_volume(states))
+    columns = resistances(at, TIMES, other_volume(states), np.zeros((len(at.sensors), 0)))
     rows = at.sensors.is_displacement
     assert np.mean(np.sum(columns[rows] ** 2, axis=1)) == pytest.approx(1.0)
     # more and more, less and less, and in between alone

@@ -160,7 +160,7 @@ class BaseFinder:
             nuisances,
             unknown,
             strains,
-            resistances(linear.at, self.states.times, other_volume(self.states)),
+            resistances(linear.at, self.states.times, other_volume(self.states), next(iter(unknown.values()))),
             GaussianModel(factor, nuisances.columns),
             _noises(linear, resolved=errors is None or self._without_nuisances),
             linear.noise,

@@ -21,7 +21,7 @@ from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import Nuisances
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
-from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses, modes_of_rows
+from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses, modes_of_rows, with_courses
 
 UNKNOWN, RESISTANCE = "unknown", "resistance"
 #: What each means, in a sentence.
@@ -147,30 +147,17 @@ def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:
     `factors` (n, r): of the modes of each course of a field on the rows. In one place there is only the first.
     """
     noise, in_one_place = base.typical_noise, belief("unknown.in_one_place")
-    fields = [
-        Place(noise * (columns[:, :, None] * factor[:, None]).reshape(len(columns), -1))
-        for columns in base.unknown.values()
-        for factor in factors
-    ]
+    fields = [Place(noise * with_courses(columns, factor)) for columns in base.unknown.values() for factor in factors]
     strains = [Place(noise * factors[0][:, :1] * columns) for columns in base.strains.columns]
     groups = [(fields, 1.0 - in_one_place), (strains, in_one_place)]
-    # no resistance is seen where nothing that is known loads the body, or at one time
-    if base.resistance.any():
+    if base.resistance.size:
         resistance = belief("unknown.resistance")
         groups = [(places, (1.0 - resistance) * share) for places, share in groups]
-        groups.insert(0, ([Place(noise * _resistance(base), label=RESISTANCE)], resistance))
+        groups.insert(0, ([Place(noise * base.resistance, label=RESISTANCE)], resistance))
     # strains come last, see `with_refined_strain`
     shares = np.concatenate([np.full(len(places), share / max(len(places), 1)) for places, share in groups])
     places = tuple(place for group, _ in groups for place in group)
     return Cause(UNKNOWN, places, math.log(belief("causes.unknown")), beliefs("unknown.sizes"), Kind.UNKNOWN, shares)
-
-
-def _resistance(base: Base) -> Floats:
-    """Columns (n, k) of tissue whose resistance changes in time, and by how much that is not linear."""
-    smooth = next(iter(base.unknown.values()))
-    factors = modes_of_rows(base.states.times, base.at.sensors)
-    over_time = (smooth[:, :, None] * factors[:, None]).reshape(len(smooth), -1)
-    return np.column_stack([base.resistance, belief("unknown.not_linear") * over_time])
 
 
 def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]:

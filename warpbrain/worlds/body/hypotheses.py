@@ -168,10 +168,10 @@ class HypothesisSearch:
             self._sets[fitted.names] = fitted
         return fitted
 
-    def likely_unknown(self, beside: WeightedSet) -> str:
-        """Label of what is unknown, were it that alone which acts beside a weighted set."""
+    def likely_unknown(self, weighted: WeightedSet) -> str:
+        """Label of the most probable place of the unknown in the residuals of a weighted set; see `Place.label`."""
         cause = self.causes.named(UNKNOWN)
-        screened = posterior(beside.marginal.model, beside.residual, (cause,), _search(most=1))
+        screened = posterior(weighted.marginal.model, weighted.residual, (cause,), _search(most=1))
         [member] = next(hypothesis.best.members for hypothesis in screened if hypothesis.causes)
         return cause.places[member.place].label
 

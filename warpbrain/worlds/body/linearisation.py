@@ -222,11 +222,15 @@ class Linearisation:
 
         `answer`: from the linear model about one state to what it changes of the rows of that.
         """
+        return self.summed_in_time(lambda state, _: answer(state))
+
+    def summed_in_time(self, answer: Callable[[Linearisation, Floats], Floats]) -> Floats:
+        """The same of what depends on time: `answer` has the times (m,) [s] of the rows of that state, too."""
         if not self.moments:
-            return answer(self)
+            return answer(self, self.sensors.times)
         total: Floats | None = None
         for moment in self.moments:
-            change = answer(moment.at)
+            change = answer(moment.at, np.full(len(moment.rows), moment.time))
             total = np.zeros((len(self.sensors), *change.shape[1:])) if total is None else total
             total[moment.rows] += moment.sign * change
         assert total is not None

@@ -125,9 +125,8 @@ def _unknown_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> Weig
         return None
     without_names = (candidate for candidate in sets if UNKNOWN in candidate.names and not candidate.mechanisms)
     likely = next((candidate.names for candidate in without_names), frozenset())
-    mechanism = next(
-        (candidate.names for candidate in sets if len(candidate.names) == len(candidate.mechanisms) == 1), likely
-    )
+    mechanisms = (candidate.names for candidate in sets if len(candidate.names) == len(candidate.mechanisms) == 1)
+    mechanism = next(mechanisms, frozenset())
     parts = (candidate for candidate in sets if candidate.names in (likely, likely - {UNKNOWN}, mechanism))
     return next((part for part in parts if part.refit is None and not part.failure), None)
 

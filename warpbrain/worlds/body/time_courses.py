@@ -82,6 +82,11 @@ def modes_of_rows(times: Sequence[float], sensors: Sensors) -> Floats:
     return _since_reference(modes_between(ends, modes, seconds), sensors)
 
 
+def with_courses(columns: Floats, courses: Floats) -> Floats:
+    """Columns (n, k r) of coefficients each of which has every course: columns (n, k) times courses (n, r)."""
+    return np.asarray((columns[:, :, None] * courses[:, None]).reshape(len(columns), -1))
+
+
 def _since_reference(factors: Floats, sensors: Sensors) -> Floats:
     """Factors (2 n, r) at the times of rows and then at those of what they are counted from: their change (n, r)."""
     after, before = np.split(factors, 2)

@@ -22,7 +22,7 @@ from warpbrain.threads import in_threads
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
-from warpbrain.worlds.body.time_courses import finite_times, modes_of
+from warpbrain.worlds.body.time_courses import finite_times, modes_of, modes_of_rows, with_courses
 
 #: Components of a symmetric tensor.
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
@@ -141,18 +141,19 @@ def _gaussians(points: Floats, sites: Floats, length: float) -> Floats:
     return np.asarray(np.exp(-0.5 * (cdist(points, sites) / length) ** 2))
 
 
-def resistances(at: Linearisation, times: Sequence[float], volume: Proposal) -> Floats:
-    """Columns (n, k) of tissues that resist more or less at one of several times [s] than at another; none of one time.
+def resistances(at: Linearisation, times: Sequence[float], volume: Proposal, smooth: Floats) -> Floats:
+    """Columns (n, k) of tissues that resist more or less at one of several times [s] than at another.
 
-    That is what a law with memory, wear or healing does, whatever its form: under the same loads the body moves further
-    or creeps back. The logarithm of each tissue's moduli has the modes of a course, and beside it that of how much all
-    of them resist a change of volume more than one of shape.
+    That is what relaxation, damage or healing does, whatever the law: under the same loads the body moves further
+    or creeps back. The logarithm of each tissue's moduli has the modes of a course, and beside it that of the ratio of
+    bulk and shear modulus of all of them. A smooth field, far smaller, stands for what is not linear.
 
-    `volume`: of another Poisson ratio; its coefficient is a logarithm, too.
+    `volume`: of another Poisson ratio; its coefficient is a logarithm, too. `smooth` (n, j): of 1 m root mean
+    square. No columns of one time, or where no known load acts.
     """
-    sensors = at.sensors
+    nothing = np.zeros((len(at.sensors), 0))
     if len(times) < 2:
-        return np.zeros((len(sensors), 0))
+        return nothing
     mesh = at.system.model.mesh
     tissues = (mesh.tissue[:, None] == np.array(mesh.labels)).astype(np.float64)
     ends, modes = finite_times(np.array(times)), modes_of(len(times))
@@ -162,14 +163,14 @@ def resistances(at: Linearisation, times: Sequence[float], volume: Proposal) -> 
         courses = modes_between(ends, modes, finite_times(np.concatenate([times, seconds]))[len(times) :])
         [bulk] = Effects(state).of([volume])
         columns = np.column_stack([state.answers_of_elements(state.element_forces, tissues), bulk.columns / volume.sd])
-        return np.asarray((columns[:, :, None] * courses[:, None]).reshape(len(seconds), -1))
+        return with_courses(columns, courses)
 
-    if not at.moments:
-        return _visible_modes(about(at, sensors.times), sensors.is_displacement)
-    columns = np.zeros((len(sensors), (tissues.shape[1] + 1) * modes.shape[1]))
-    for moment in at.moments:
-        columns[moment.rows] += moment.sign * about(moment.at, np.full(len(moment.rows), moment.time))
-    return _visible_modes(columns, sensors.is_displacement)
+    columns = _visible_modes(at.summed_in_time(about), at.sensors.is_displacement)
+    # nothing that is known loads the body
+    if not columns.any():
+        return nothing
+    not_linear = with_courses(smooth, modes_of_rows(times, at.sensors))
+    return np.column_stack([columns, belief("unknown.not_linear") * not_linear])
 
 
 def stress_beside_held(at: Linearisation, length: float) -> Floats:

@@ -204,16 +204,16 @@ def evidence_of(
         sizes = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction)))), 0
     best, noise = sizes if moving else (0, sizes[1])
 
-    def beside(*pairs: tuple[int, int]) -> None:
-        """What is asked for in any case, in threads."""
+    def evaluate(*pairs: tuple[int, int]) -> None:
+        """Log evidences that are asked for in any case, in threads."""
         there = [(f, k) for f, k in pairs if 0 <= f < len(fractions) and 0 <= k < len(models)]
         in_threads(lambda pair: log_evidence(*pair), there)
 
     log_evidence(best, noise)
-    beside((best - 1, noise), (best + 1, noise))
+    evaluate((best - 1, noise), (best + 1, noise))
     by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
     best, first = int(np.argmax(by_fraction)), noise
-    beside((best, noise - 1), (best, noise + 1))
+    evaluate((best, noise - 1), (best, noise + 1))
     by_noise = outward(lambda number: log_evidence(best, number), first, len(base.noises), _NEGLIGIBLE)
     noise = int(np.argmax(by_noise))
     if noise != first:
