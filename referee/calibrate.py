@@ -20,7 +20,7 @@ from referee.outcomes import Outcome, ScoredSet, read_outcomes
 from referee.reliability import reliability
 from referee.scores import ALPHA
 from referee.sealed import open_labels
-from referee.temperature import TRAITS, Ballot, Floats, Scale, fit, held_out, interval, log_loss
+from referee.temperature import Ballot, Floats, Scale, fit, held_out, interval, log_loss
 
 #: Where the tool reads it.
 FILE = Path(warpbrain.__file__).parent / "inference" / "calibration.json"
@@ -32,7 +32,7 @@ PRICES, WRONG = (2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0, 64.0), 0
 
 
 def calibrate(sets: Sequence[ScoredSet], write: Path = FILE, price_alone: bool = False) -> str:
-    """Fit the temperature and the price of a false name, count right names, and write all of it; weights of sets stay.
+    """Fit the temperature and the price of a false name, count right names, and write all of it.
 
     Parameters
     ----------
@@ -70,13 +70,12 @@ def calibrate(sets: Sequence[ScoredSet], write: Path = FILE, price_alone: bool =
         )
     chosen = [b for _, b in useful]
     known = known_of(write)
-    weights = [known["log_weights"][trait] for trait in TRAITS]
-    scale, ends, apart = fit(chosen, weights), interval(chosen, weights), held_out(chosen, weights)
+    scale, ends, apart = fit(chosen), interval(chosen), held_out(chosen)
     # names of cases whose truth was not tried are spoken and false, too
     others = [(o, b) for o, b in zip(outcomes, ballots, strict=True) if not b.right.any()]
     everyone = [*useful, *others]
     if price_alone:
-        scale, ends = Scale(known["temperature"], tuple(weights)), known["interval"]["temperature"]
+        scale, ends = Scale(known["temperature"]), known["interval"]["temperature"]
         apart = [scale.probabilities(b.hypotheses) for b in chosen]
     probabilities = [*apart, *(scale.probabilities(b.hypotheses) for _, b in others)]
     losses, spoken = priced([o for o, _ in everyone], [b for _, b in everyone], probabilities, known["losses"])
@@ -89,7 +88,6 @@ def calibrate(sets: Sequence[ScoredSet], write: Path = FILE, price_alone: bool =
         "temperature": round(scale.temperature, 3),
         # by the rule of succession: that all were right does not make the next one certain; in whole percent
         "most_said": known["most_said"] if price_alone else math.floor(100 * (spoken.hits + 1) / (spoken.of + 2)) / 100,
-        "log_weights": known["log_weights"],
         "losses": losses,
         "interval": {"temperature": np.round(ends, 3).tolist()},
     }
@@ -103,7 +101,7 @@ def calibrate(sets: Sequence[ScoredSet], write: Path = FILE, price_alone: bool =
         f"temperature {scale.temperature:.2f}, {ends[0]:.2f} to {ends[1]:.2f}",
         "",
         f"A false name costs {losses['false name']:g}: names right{apart_from}: {spoken}.",
-        *_before_and_after(chosen, apart, weights),
+        *_before_and_after(chosen, apart),
         f"Written: {write.name}",
     ]
     return "\n".join(lines)
@@ -176,8 +174,8 @@ def _spoken(
     return spoken
 
 
-def _before_and_after(ballots: Sequence[Ballot], apart: Sequence[Floats], weights: Sequence[float]) -> list[str]:
-    right, one = np.concatenate([b.right for b in ballots]), Scale(1.0, tuple(weights))
+def _before_and_after(ballots: Sequence[Ballot], apart: Sequence[Floats]) -> list[str]:
+    right, one = np.concatenate([b.right for b in ballots]), Scale(1.0)
     plain = [one.probabilities(b.hypotheses) for b in ballots]
     lines = ["", f"mean log loss at a temperature of 1: {log_loss(one, ballots):.3f}; calibration error:"]
     for name, rows in (("at a temperature of 1", plain), ("by the other four fifths", apart)):

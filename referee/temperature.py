@@ -107,44 +107,38 @@ class _Together:
         return float(-np.log(np.maximum(true, 1e-300)).mean())
 
 
-def fit(ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights) -> Scale:
-    """The scale with the temperature of highest likelihood of the truth, and the weights as they are given.
+def fit(ballots: Sequence[Ballot]) -> Scale:
+    """The scale with the temperature of highest likelihood of the truth, and no weights.
 
     The likelihood is that with weights of the set the cases are of.
     """
     from scipy.optimize import minimize
 
-    given, together = np.array(weights), _Together.of(ballots)
+    together = _Together.of(ballots)
 
     def cost(point: Floats) -> float:
-        scale = Scale(float(np.exp(point[0])), tuple((given + point[1:]).tolist()))
+        scale = Scale(float(np.exp(point[0])), tuple(point[1:].tolist()))
         prior = (point[0] / _SPREAD) ** 2 + np.sum((point[1:] / _SPREAD_OF_WEIGHTS) ** 2)
         return len(ballots) * together.log_loss(scale) + 0.5 * float(prior)
 
     best = minimize(
         cost, np.zeros(1 + len(TRAITS)), method="L-BFGS-B", bounds=[(-3.0, 5.0), *[(-8.0, 8.0)] * len(TRAITS)]
     )
-    return Scale(float(np.exp(best.x[0])), tuple(given.tolist()))
+    return Scale(float(np.exp(best.x[0])))
 
 
-def held_out(ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights, folds: int = 5) -> list[Floats]:
+def held_out(ballots: Sequence[Ballot], folds: int = 5) -> list[Floats]:
     """Probabilities of each case by the scale that the other folds give."""
     place = np.random.default_rng(0).permutation(len(ballots)) % folds
-    scales = {
-        fold: fit([b for b, k in zip(ballots, place, strict=True) if k != fold], weights)
-        for fold in set(place.tolist())
-    }
+    scales = {fold: fit([b for b, k in zip(ballots, place, strict=True) if k != fold]) for fold in set(place.tolist())}
     return [scales[fold].probabilities(b.hypotheses) for b, fold in zip(ballots, place.tolist(), strict=True)]
 
 
-def interval(
-    ballots: Sequence[Ballot], weights: Sequence[float] = Scale().weights, draws: int = 100
-) -> tuple[float, float]:
+def interval(ballots: Sequence[Ballot], draws: int = 100) -> tuple[float, float]:
     """Ends of the 95 % interval of the temperature, by fitting cases drawn with replacement."""
     random = np.random.default_rng(1)
     temperatures = [
-        fit([ballots[k] for k in random.integers(len(ballots), size=len(ballots))], weights).temperature
-        for _ in range(draws)
+        fit([ballots[k] for k in random.integers(len(ballots), size=len(ballots))]).temperature for _ in range(draws)
     ]
     low, high = np.percentile(temperatures, [2.5, 97.5]).tolist()
     return low, high

@@ -11,7 +11,7 @@ from importlib.resources import files
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.inference.causes import Hypothesis, Kind
+from warpbrain.inference.causes import Hypothesis
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,6 @@ class Calibration:
     #: Divisor of log probabilities: the evidence is overconfident where noise, mesh and tissue are only nearly as the
     #: model has them.
     temperature: float
-    #: Added to the log prior of sets: of no cause (`nothing`), for each physical cause beyond the first (`another`), of
-    #: sets with the unknown, and of sets with what is no physics.
-    log_weights: Mapping[str, float]
     losses: Mapping[str, float]  # what each kind of wrong verdict costs, in units of silence where something is missing
     most_said: float  # share of names that were right among scored cases: no higher probability is reported
 
@@ -31,26 +28,15 @@ class Calibration:
         """Of each hypothesis, (h,)."""
         from scipy.special import softmax
 
-        logs = [h.log_evidence + h.log_prior + self._log_weight(h) for h in hypotheses]
+        logs = [h.log_evidence + h.log_prior for h in hypotheses]
         return np.asarray(softmax(np.array(logs) / self.temperature))
-
-    def _log_weight(self, hypothesis: Hypothesis) -> float:
-        """What is added to the log prior of a set."""
-        if not hypothesis.causes:
-            return self.log_weights["nothing"]
-        kinds = hypothesis.kinds
-        physical = kinds.count(Kind.PHYSICS)
-        weight = self.log_weights["another"] * max(physical - 1, 0)
-        for kind in (Kind.UNKNOWN, Kind.NOT_PHYSICS):
-            weight += self.log_weights[kind.value] * (kind in kinds)
-        return weight
 
 
 @cache
 def calibration() -> Calibration:
     """The calibration that the package has."""
     values = json.loads((files("warpbrain.inference") / "calibration.json").read_text(encoding="utf-8"))
-    return Calibration(values["temperature"], values["log_weights"], values["losses"], values["most_said"])
+    return Calibration(values["temperature"], values["losses"], values["most_said"])
 
 
 def percent(probability: float) -> str:
