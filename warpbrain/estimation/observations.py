@@ -23,7 +23,7 @@ from warpbrain.cases.enough import too_few_for_noise
 from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
-from warpbrain.inference.beliefs import belief
+from warpbrain.estimation.within_element import change_over_element, turn_over_element
 from warpbrain.inference.noise import noise_covariance
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.quality import extent
@@ -47,7 +47,7 @@ class Sensors:
     sigma: Floats  # declared standard deviation of the noise; NaN where it is to be estimated
     positions: Floats  # (n, 3), where [m]; NaN of forces
     directions: Floats  # (n, 3), in which direction a displacement was recorded; zero of forces
-    over_element: Floats  # (n, 3), `change_over_element` along each axis [m]; zero of all but points
+    over_element: Floats  # (n, 3), see `warpbrain.estimation.within_element`, along each axis [m]; zero of forces
     groups: Ints  # number of the point, or of the row of a recording, increasing
     recordings: Ints  # number of the recording
     times: Floats  # when [s]; infinite of the end
@@ -134,7 +134,7 @@ class Observation:
     size: int  # components of a row
     positions: Floats  # (n, 3), what a wrong registration moves [m]; NaN of forces
     edges: Floats  # (n,), mean length of the edges of the element in which each is [m]; zero of all but points
-    over_element: Floats  # (n, size, 3)
+    over_element: Floats  # (n, size, 3), see `Sensors`
     times: Floats  # (n,), when [s]
     reference: float  # the time from which they are counted [s]; 0: rest
     after: int  # numbers of the states that they are compared with, and counted from; -1: from rest (`Moments`)
@@ -253,8 +253,8 @@ class Observations:
         }
 
 
-#: Rows, weights, size, positions and edges as of `Observation`, and `at`.
-_Made = tuple[Ints, Floats, int, Floats, Floats, _At]
+#: Rows, weights, size, positions, edges and change over an element as of `Observation`, and `at`.
+_Made = tuple[Ints, Floats, int, Floats, Floats, Floats, _At]
 
 
 def _observations(case: Case, recording: Recording, moments: Moments) -> Iterator[Observation]:
@@ -279,7 +279,7 @@ def _observations(case: Case, recording: Recording, moments: Moments) -> Iterato
     states = np.array([moments.number(time) for time in times[rows].tolist()])
     start = -1 if recording.reference is None else moments.number(recording.reference)
     for number in np.unique(states).tolist():
-        members, weights, size, positions, edges, at = make(case, recording, rows[states == number])
+        members, weights, size, positions, edges, change, at = make(case, recording, rows[states == number])
         sigma, sigmas = recording.sigma, getattr(recording, "sigmas", None)
         # of each row, or None: it is to be estimated
         declared = None
@@ -289,7 +289,6 @@ def _observations(case: Case, recording: Recording, moments: Moments) -> Iterato
                 if not (math.isfinite(value) and value > 0.0):
                     raise InputError(f"recording '{recording.name}': sigma = {value:g}: expected a positive number")
             declared = declared / np.sqrt(weights)
-        change = np.zeros((len(members), size, 3))
         about = declared, weights, size, positions, edges, change, times[members], recording.reference or 0.0
         yield Observation(recording.name, recording.kind, unit, members, *about, number, start, at)
 
@@ -314,7 +313,8 @@ def _points(case: Case, recording: PointsRecording, rows: Ints) -> _Made:
         rigid = -moved_back_columns(positions, motion, centre)
         return residual.ravel(), rigid.reshape(-1, 6), by_displacement, nothing
 
-    return rows, weights, 3, positions, location.edge, at
+    # of the points of all recordings together, see `_with_changes`
+    return rows, weights, 3, positions, location.edge, np.zeros((len(rows), 3, 3)), at
 
 
 def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Made:
@@ -345,7 +345,8 @@ def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Made:
         rigid = -np.einsum("nj,njk->nk", directions, moved_back_columns(positions, motion, centre))
         return side * closest.distance, rigid, by_displacement, csr_matrix(shape)
 
-    return rows, np.ones(len(rows)), 1, positions, np.zeros(len(rows)), at
+    turn = turn_over_element(mesh.points, faces)[closest_points(positions, mesh.points, faces).face]
+    return rows, np.ones(len(rows)), 1, positions, np.zeros(len(rows)), turn[:, None], at
 
 
 def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Made:
@@ -366,7 +367,8 @@ def _force(case: Case, recording: ForceRecording, rows: Ints) -> _Made:
         residual = force - reactions[nodes].sum(axis=0)[recorded]
         return residual.ravel(), np.zeros((residual.size, 6)), nothing, by_reactions
 
-    return rows, np.ones(len(rows)), size, np.full((len(rows), 3), np.nan), np.zeros(len(rows)), at
+    nowhere, nothing_changes = np.full((len(rows), 3), np.nan), np.zeros((len(rows), size, 3))
+    return rows, np.ones(len(rows)), size, nowhere, np.zeros(len(rows)), nothing_changes, at
 
 
 def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observation, ...]:
@@ -388,45 +390,3 @@ def _with_changes(each: Sequence[tuple[Recording, Observation]]) -> tuple[Observ
         for (number, row), change in zip(members, change_over_element(points, moved, edges), strict=True):
             changes[number][row] = change
     return tuple(replace(seen, over_element=change) for (_, seen), change in zip(each, changes, strict=True))
-
-
-#: Rounds of weighted least squares that come to least absolute deviations, and the least of these, relative to the
-#: displacement: smaller ones are alike.
-_ROUNDS, _LEAST = 6, 1e-3
-
-
-def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> Floats:
-    """Change of recorded displacement over an edge of the element in which each point is.
-
-    A wall that was cut out of elements is a staircase, and a linear element has one gradient. Where displacement
-    changes much from place to place the mesh has a recorded point beside where it is, by a part of the edge of its
-    element, and its displacement is wrong by that part of this change (errors in variables, by effective variances:
-    Orear, Am. J. Phys. 50 (1982) 912). A finer mesh with the same wall does not show this error; taken for noise alone
-    it would look like a second force beside the first. It is that of what was recorded, whatever is thought to act.
-
-    Gradients over each point and its neighbours are by least absolute deviations: a gross error is no gradient of its
-    neighbours, and what changes faster than tissue can is not tissue. Points and displacement (n, 3) were recorded at
-    one time [m]; `edges` (n,) are mean lengths of those of the element [m]. Returns (n, 3, 3), of each component along
-    each axis [m]; zero of points that are too few to tell.
-    """
-    from scipy.spatial import cKDTree
-
-    neighbours = min(round(belief("mesh.neighbours")), len(points) - 1)
-    if neighbours < 3:
-        return np.zeros((len(points), 3, 3))
-    near = cKDTree(points).query(points, neighbours + 1)[1]
-    weights = np.ones((*near.shape, 1))
-    least = _LEAST * float(np.median(np.linalg.norm(displacement, axis=1)))
-    for _ in range(_ROUNDS):
-        share = weights / weights.sum(axis=1, keepdims=True)
-        offsets = points[near] - np.sum(share * points[near], axis=1, keepdims=True)
-        changes = displacement[near] - np.sum(share * displacement[near], axis=1, keepdims=True)
-        # of points in one plane the gradient across it is not known, and taken for zero
-        root = np.sqrt(weights)
-        gradients = np.linalg.pinv(root * offsets, rcond=belief("mesh.flat")) @ (root * changes)
-        left = np.linalg.norm(changes - offsets @ gradients, axis=2, keepdims=True)
-        weights = 1.0 / np.maximum(left, least + np.finfo(float).tiny)
-    steepest = belief("mesh.steepest")
-    sizes = np.linalg.norm(gradients, ord=2, axis=(1, 2), keepdims=True)
-    gradients *= np.minimum(1.0, steepest / np.maximum(sizes, steepest))
-    return np.asarray(edges[:, None, None] * gradients.transpose(0, 2, 1))

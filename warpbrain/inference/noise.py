@@ -4,7 +4,7 @@
     R_ij = sigma_i sigma_j (delta_ij + s^2 exp(-|x_i - x_j|^2 / (2 l^2)) d_i . d_j) + m_i . m_j delta(x_i, x_j)
 
 for rows i, j that were recorded at one time, at the places `x` in the directions `d`, with errors `m` of what the mesh
-does not resolve (`warpbrain.estimation.observations`); rows without a direction, such as forces, are independent. `s`
+does not resolve (`warpbrain.estimation.within_element`); rows without a direction, such as forces, are independent. `s`
 is `noise.shared` of `priors.toml`, and `l` is `noise.reach` of the radius of the body. The logarithm of `kappa` is a
 Student t. Of a few points the noise is many times larger, see `gross_errors`.
 """

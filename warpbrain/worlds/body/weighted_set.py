@@ -1,7 +1,7 @@
 """A set of causes of a body with its evidence, the linear model about its most probable point, and its fit.
 
 The evidence is summed over the sizes of what is not known of the mesh's error. One part of that is correlated in space,
-as what a local cause moves is; another is what the mesh does not resolve (`warpbrain.estimation.observations`). The
+as what a local cause moves is; another is what the mesh does not resolve (`warpbrain.estimation.within_element`). The
 first is relative to the displacement under the set, which is that of its causes where these move more than all else. A
 set that explains the recordings leaves small ones; under a wrong set they take up what is left. With one size for all
 sets they would hide causes.
