@@ -7,7 +7,7 @@ import argparse
 import json
 
 from warpbrain.errors import SolveError
-from warpbrain.terminal.completing import shell_code
+from warpbrain.terminal.arguments import shell_code
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.record import Record
 
