@@ -15,7 +15,7 @@ from warpbrain.cases.starting import start_from_labels, start_from_mesh
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh, write_mesh
-from warpbrain.report.case_text import started_lines
+from warpbrain.report.summary import started_lines
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System

@@ -33,7 +33,7 @@ def show(options: argparse.Namespace) -> None:
     from warpbrain.atomic import check_writable, safe_name
     from warpbrain.cases.shipped import find_case
     from warpbrain.report.case_picture import write_case_picture
-    from warpbrain.report.case_text import show_lines
+    from warpbrain.report.summary import show_lines
 
     case = find_case(options.name, options.tissue)
     path = options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}.png")
@@ -47,7 +47,7 @@ def check(options: argparse.Namespace) -> None:
     """Check case folders completely."""
     from warpbrain.cases.checking import check_case
     from warpbrain.cases.shipped import files_of
-    from warpbrain.report.case_text import check_lines
+    from warpbrain.report.summary import check_lines
     from warpbrain.simulation.run import why_not
 
     wrong = 0
@@ -71,7 +71,7 @@ def begin(options: argparse.Namespace) -> None:
     """Make a case folder from a segmentation or from a mesh."""
     from warpbrain.cases.starting import start_from_labels, start_from_mesh
     from warpbrain.frame import Frame
-    from warpbrain.report.case_text import started_lines
+    from warpbrain.report.summary import started_lines
 
     foreign = ("units", "axes", "array") if options.labels else ("others", "size", "preset")
     for name in foreign:

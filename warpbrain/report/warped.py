@@ -20,9 +20,8 @@ from warpbrain.images.reading import Image, labels_of, read_image, require
 from warpbrain.images.writing import write_displacement, write_transform, write_volume
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.electrodes import is_electrodes
-from warpbrain.report.files import MILLIMETRES, write_body
+from warpbrain.report.files import LEFT, MILLIMETRES, SEEN, TRUST, UNSEEN, SavedState, write_body
 from warpbrain.report.page import lines, rendered
-from warpbrain.report.state_files import LEFT, SEEN, TRUST, UNSEEN, SavedState
 
 #: Names of the transforms: what they do to an image.
 FORTH, BACK = "transform-before-to-after.nii.gz", "transform-after-to-before.nii.gz"
