@@ -121,13 +121,7 @@ def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
 
 
 def _improve(
-    which: Ints,
-    candidates: Ints,
-    points: Floats,
-    corners: Floats,
-    face: Ints,
-    distance: Floats,
-    weights: Floats,
+    which: Ints, candidates: Ints, points: Floats, corners: Floats, face: Ints, distance: Floats, weights: Floats
 ) -> None:
     """Take over, in place, the candidates that are closer than the best so far; a tie goes to the smaller number."""
     barycentric, apart = _on_triangles(points[which], corners[candidates])

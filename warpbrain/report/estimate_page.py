@@ -16,12 +16,7 @@ from warpbrain.inference.calibration import percent
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view, fields_of, known_displacement
 from warpbrain.report.comparison import SHOWN, Explained, explained
-from warpbrain.report.estimate import (
-    averaged_row,
-    parameter_row,
-    prediction_row,
-    recorded_points,
-)
+from warpbrain.report.estimate import averaged_row, parameter_row, prediction_row, recorded_points
 from warpbrain.report.files import MILLIMETRES, read_state
 from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import NARROW, inlined
