@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 
 from warpbrain.errors import InputError
@@ -62,16 +63,16 @@ def check(options: argparse.Namespace) -> None:
 
 def print_schema(options: argparse.Namespace) -> None:
     """Print the JSON Schema of `case.toml`."""
-    from warpbrain.cases.format.schema import schema_text
+    from warpbrain.cases.format.schema import case_schema
 
-    print(schema_text(), end="")
+    print(json.dumps(case_schema(), indent=2))
 
 
 def begin(options: argparse.Namespace) -> None:
     """Make a case folder from a segmentation or from a mesh."""
     from warpbrain.cases.starting import start_from_labels, start_from_mesh
     from warpbrain.frame import Frame
-    from warpbrain.report.summary import started_lines
+    from warpbrain.report.page import lines
 
     foreign = ("units", "axes", "array") if options.labels else ("others", "size", "preset")
     for name in foreign:
@@ -85,7 +86,7 @@ def begin(options: argparse.Namespace) -> None:
         case = start_from_mesh(
             options.folder, options.mesh, frame, options.tissue, options.array, overwrite=options.overwrite
         )
-    print(*started_lines(case), sep="\n")
+    print(*lines("case.txt", "started", case), sep="\n")
 
 
 def build(options: argparse.Namespace) -> None:

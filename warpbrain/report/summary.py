@@ -22,7 +22,6 @@ from warpbrain.simulation.result import Result
 
 if TYPE_CHECKING:
     from warpbrain.cases.drawn import FromPrior
-    from warpbrain.cases.starting import StartedCase
     from warpbrain.simulation.system import System
 
 #: Said wherever a stand-in is met.
@@ -176,8 +175,3 @@ def check_lines(checked: Checked, cannot: str) -> list[str]:
     """What checking found, as printed: problems first; `cannot` says why a sound case cannot be run yet."""
     recorded = [] if checked.case is None else list(map(recording_line, checked.case.recordings))
     return lines("case.txt", "check", checked, cannot, recorded, SET_TITLES)
-
-
-def started_lines(started: StartedCase) -> list[str]:
-    """What a user should read about a new case, as printed."""
-    return lines("case.txt", "started", started)
