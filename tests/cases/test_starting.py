@@ -15,7 +15,7 @@ from warpbrain.cases.starting import start_from_labels, start_from_mesh
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh, write_mesh
-from warpbrain.report.case_text import started_lines
+from warpbrain.report.page import lines
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
@@ -102,7 +102,7 @@ def test_new_case_solves(started, tmp_path):
 
 def test_summary_says_what_was_made(started):
     case, _ = started
-    text = "\n".join(started_lines(case))
+    text = "\n".join(lines("case.txt", "started", case))
     assert f"{case.quality.nodes} nodes, {case.quality.tetrahedra} tetrahedra" in text
     assert "tissue 2   grey matter: " in text and "cavities  " in text
     assert f"surface {case.mesh.node_sets['surface'].sum()}" in text
@@ -154,7 +154,7 @@ def test_a_mesh_keeps_its_labels_and_sets(tmp_path, unit, axes):
     left = read.mesh.element_sets["left"]
     assert read.mesh.points[read.mesh.tetrahedra[left]].mean(axis=1)[:, 0].max() < 0.01
     assert case.cavity == pytest.approx(8e-6)
-    assert "cavities  8 cm3" in "\n".join(started_lines(case))
+    assert "cavities  8 cm3" in "\n".join(lines("case.txt", "started", case))
 
 
 def test_sets_that_a_mesh_has_stay(tmp_path):

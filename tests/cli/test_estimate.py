@@ -12,7 +12,7 @@ from synthetic import GREY, WHITE, beads, block, truth
 
 from warpbrain.cases.writing import write_case
 from warpbrain.estimation.options import EstimationOptions
-from warpbrain.report.state_files import SEEN, UNSEEN, read_state
+from warpbrain.report.files import SEEN, UNSEEN, read_state
 
 QUICK = ("--samples", "25", "--no-causes")
 

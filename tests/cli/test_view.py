@@ -9,7 +9,7 @@ from folders import write_folder
 
 from warpbrain.errors import InputError
 from warpbrain.report.body_sections import write_view_page
-from warpbrain.report.state_files import read_state
+from warpbrain.report.files import read_state
 
 
 @pytest.fixture(scope="module")

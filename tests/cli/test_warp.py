@@ -16,7 +16,7 @@ from command import run, warpbrain
 from folders import write_folder
 from landmark_files import fcsv, markup
 
-from warpbrain.report.state_files import LEFT, TRUST, UNSEEN, read_state
+from warpbrain.report.files import LEFT, TRUST, UNSEEN, read_state
 from warpbrain.report.warped import read_request, write_warped
 
 nibabel = pytest.importorskip("nibabel")

@@ -14,7 +14,7 @@ from warpbrain.images.moving_points import read_point_file
 from warpbrain.images.reading import read_image
 from warpbrain.images.writing import write_volume
 from warpbrain.mesh import write_mesh
-from warpbrain.report.state_files import read_state
+from warpbrain.report.files import read_state
 
 TRIES = 120
 

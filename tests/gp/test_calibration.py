@@ -13,7 +13,7 @@ from warpbrain.gp.leaving_out import (
     methods_of,
 )
 from warpbrain.gp.literature.studies import read_studies
-from warpbrain.report.generative_text import calibration_lines, comparison_lines
+from warpbrain.report.page import lines
 
 
 def score(values, levels=(), name="a"):
@@ -32,9 +32,9 @@ def test_levels_are_counted_by_method():
             assert low == pytest.approx(beta.ppf(0.025, hits, one.count - hits + 1) if hits else 0.0)
             missed = one.count - hits
             assert high == pytest.approx(beta.ppf(0.975, hits + 1, missed) if missed else 1.0)
-    lines = calibration_lines([first, second, whole], "paper")
-    assert len(lines) == 4 and all(f"{100 * part:g} % interval" in lines[0] for part in INTERVALS)
-    assert "3:  75 %" in lines[1] and lines[1].endswith("3 0 1 0")
+    table = lines("gp.txt", "calibrations", [first, second, whole], "paper", INTERVALS)
+    assert len(table) == 4 and all(f"{100 * part:g} % interval" in table[0] for part in INTERVALS)
+    assert "3:  75 %" in table[1] and table[1].endswith("3 0 1 0")
 
 
 def test_levels_of_a_calibrated_model_are_within_their_intervals():
@@ -51,7 +51,8 @@ def test_sign_test():
     # two-sided: as uneven or more, on either side
     assert found.p_value == pytest.approx(2.0 * binom.sf(18, 30, 0.5))
     assert found.difference == pytest.approx(-(theirs.mean()))
-    assert "19 of 30" in comparison_lines("a", [found])[1] and "0.2" in comparison_lines("a", [found])[1]
+    row = lines("gp.txt", "comparisons", "a", [found])[1]
+    assert "19 of 30" in row and "0.2" in row
     tied = compared(score([1.0, 2.0]), score([1.0, 1.0]))
     assert (tied.wins, tied.count) == (1, 1)
 

@@ -21,7 +21,7 @@ from warpbrain.gp.leaving_out import (
 )
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.literature.study import Study
-from warpbrain.report.generative_text import score_lines
+from warpbrain.report.page import lines
 
 GREY = "hyperelastic/grey matter"
 SOME = [s for s in read_studies("corrected") if s.group in (GREY, "MRE/grey matter", "linear/brain")][::2]
@@ -108,7 +108,7 @@ def test_scores_come_back_from_their_file(tmp_path):
     write_scores(path, [score], held)
     assert read_scores(path, held) == [score]
     assert score.median == pytest.approx(np.median(score.values))
-    assert "knows" in score_lines([score])[1]
+    assert "knows" in lines("gp.txt", "scores", [score])[1]
     with pytest.raises(InputError, match="not a comparison of these studies"):
         read_scores(path, ["other"])
     path.write_text(path.read_text() + "cut,1.0\n")

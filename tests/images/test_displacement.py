@@ -6,8 +6,7 @@ from image_grids import SIZE, turned_grid
 from shapes import box
 
 from warpbrain.images.displacement import DisplacementField, displacement_field, inverse, resampled
-from warpbrain.images.grid import MILLIMETRES, Grid
-from warpbrain.images.inside import voxels_inside
+from warpbrain.images.grid import MILLIMETRES, Grid, voxels_inside
 from warpbrain.images.writing import write_displacement, write_transform, write_volume
 
 

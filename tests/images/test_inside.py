@@ -5,8 +5,7 @@ import pytest
 from image_grids import SIZE, turned_grid
 from shapes import box
 
-from warpbrain.images.grid import MILLIMETRES, Grid
-from warpbrain.images.inside import voxels_inside
+from warpbrain.images.grid import MILLIMETRES, Grid, voxels_inside
 from warpbrain.mesh.surface import EDGES
 from warpbrain.recordings.location import locate
 

@@ -8,7 +8,7 @@ import warp as wp
 from material_point import random_gradients, random_rotations
 
 from warpbrain.kernels.precision import Precision
-from warpbrain.kernels.svd import singular_value_decomposition
+from warpbrain.kernels.principal import singular_value_decomposition
 
 
 @wp.kernel(enable_backward=False, module="warpbrain_test_svd")

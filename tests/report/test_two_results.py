@@ -9,8 +9,8 @@ from folders import block, write_recorded
 from shapes import box
 
 from warpbrain.errors import InputError
+from warpbrain.report.files import SavedState
 from warpbrain.report.page import lines
-from warpbrain.report.state_files import SavedState
 from warpbrain.report.two_results import SavedResult, describe_two, difference, read_result
 
 pytestmark = pytest.mark.usefixtures("undrawn")

@@ -9,7 +9,7 @@ import pytest
 
 from warpbrain.cases.shipped import SHIPPED
 from warpbrain.physics.mechanisms import mechanisms
-from warpbrain.terminal.completing import mechanism_kinds
+from warpbrain.terminal.arguments import mechanism_kinds
 
 
 def completed(line: str) -> set[str]:

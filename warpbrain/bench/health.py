@@ -12,7 +12,7 @@ import os
 import platform
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,6 @@ from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
 from warpbrain.mesh import boundary_faces, nodes_of
 from warpbrain.physics.laws import NeoHookean
-from warpbrain.report.page import lines
 from warpbrain.simulation.equilibrium import solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.system import System
@@ -114,11 +113,6 @@ def _pictures() -> str | None:
             continue
         return None
     return "there is no OpenGL library: on Debian and Ubuntu, apt-get install libegl1"
-
-
-def health_lines(report: Mapping[str, Any]) -> list[str]:
-    """As printed; `report` is of `health`."""
-    return lines("doctor.txt", "health", report)
 
 
 #: Largest error of a displacement that passes, of the largest displacement: Newton stops at 1e-8 of the forces.

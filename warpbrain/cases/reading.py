@@ -11,10 +11,9 @@ from warpbrain.cases.format.reading import Context, parse_toml
 from warpbrain.cases.format.tables import CASE, TABLES
 from warpbrain.cases.parts.anatomy import read_anatomy
 from warpbrain.cases.parts.boundaries import check_faces, check_together, read_boundaries
-from warpbrain.cases.parts.magnitudes import check_magnitudes
 from warpbrain.cases.parts.mechanisms import read_mechanisms
 from warpbrain.cases.parts.named import Named
-from warpbrain.cases.parts.recordings import read_recordings
+from warpbrain.cases.parts.recordings import check_magnitudes, read_recordings
 from warpbrain.cases.parts.tissues import read_body, read_tissues
 from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame

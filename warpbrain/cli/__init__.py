@@ -9,9 +9,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from warpbrain import __version__
-from warpbrain.terminal.arguments import add_commands, call, described_in
+from warpbrain.terminal.arguments import add_commands, call, complete, described_in
 from warpbrain.terminal.command import OneLineParser, exit_status
-from warpbrain.terminal.completing import complete
 from warpbrain.terminal.record import Record
 
 

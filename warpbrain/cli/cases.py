@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from pathlib import Path
 
 from warpbrain.errors import InputError
@@ -33,7 +34,7 @@ def show(options: argparse.Namespace) -> None:
     from warpbrain.atomic import check_writable, safe_name
     from warpbrain.cases.shipped import find_case
     from warpbrain.report.case_picture import write_case_picture
-    from warpbrain.report.case_text import show_lines
+    from warpbrain.report.summary import show_lines
 
     case = find_case(options.name, options.tissue)
     path = options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}.png")
@@ -47,7 +48,7 @@ def check(options: argparse.Namespace) -> None:
     """Check case folders completely."""
     from warpbrain.cases.checking import check_case
     from warpbrain.cases.shipped import files_of
-    from warpbrain.report.case_text import check_lines
+    from warpbrain.report.summary import check_lines
     from warpbrain.simulation.run import why_not
 
     wrong = 0
@@ -62,16 +63,16 @@ def check(options: argparse.Namespace) -> None:
 
 def print_schema(options: argparse.Namespace) -> None:
     """Print the JSON Schema of `case.toml`."""
-    from warpbrain.cases.format.schema import schema_text
+    from warpbrain.cases.format.schema import case_schema
 
-    print(schema_text(), end="")
+    print(json.dumps(case_schema(), indent=2))
 
 
 def begin(options: argparse.Namespace) -> None:
     """Make a case folder from a segmentation or from a mesh."""
     from warpbrain.cases.starting import start_from_labels, start_from_mesh
     from warpbrain.frame import Frame
-    from warpbrain.report.case_text import started_lines
+    from warpbrain.report.page import lines
 
     foreign = ("units", "axes", "array") if options.labels else ("others", "size", "preset")
     for name in foreign:
@@ -85,7 +86,7 @@ def begin(options: argparse.Namespace) -> None:
         case = start_from_mesh(
             options.folder, options.mesh, frame, options.tissue, options.array, overwrite=options.overwrite
         )
-    print(*started_lines(case), sep="\n")
+    print(*lines("case.txt", "started", case), sep="\n")
 
 
 def build(options: argparse.Namespace) -> None:

@@ -25,8 +25,7 @@ from warpbrain.report.diagnosis.files import (
 )
 from warpbrain.report.diagnosis.page import write_page
 from warpbrain.report.diagnosis.text import diagnosis_lines
-from warpbrain.report.files import write_summary
-from warpbrain.report.state_files import read_state
+from warpbrain.report.files import read_state, write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import choose_folder, results_in

@@ -31,11 +31,9 @@ from warpbrain.kernels.module import find_device
 from warpbrain.recordings.registration import Registration
 from warpbrain.report import views
 from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
-from warpbrain.report.estimate_page import write_estimate_page
-from warpbrain.report.estimate_picture import agreement_figure, densities_figure, residuals_figure
-from warpbrain.report.files import fingerprint_of, write_summary
+from warpbrain.report.estimate_page import agreement_figure, densities_figure, residuals_figure, write_estimate_page
+from warpbrain.report.files import fingerprint_of, read_state, write_summary
 from warpbrain.report.rendering import ready_to_render
-from warpbrain.report.state_files import read_state
 from warpbrain.report.sweep import (
     TABLE,
     columns,

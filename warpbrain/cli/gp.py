@@ -14,18 +14,15 @@ from warpbrain.gp.hierarchy import Hierarchical
 from warpbrain.gp.leaving_out import DEFAULT, candidates
 from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.process import Process
-from warpbrain.gp.sampling import draw_many, law_of_curve, moduli, unstable
+from warpbrain.gp.sampling import draw_laws, law_of_curve, moduli, unstable
 from warpbrain.gp.trained import KINDS, find_model, fit_model, trained, write_model
 from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
 from warpbrain.report.generative_text import (
     LawRow,
     asymmetry_lines,
-    calibration_lines,
-    comparison_lines,
     law_lines,
     moduli_lines,
     redrawn_lines,
-    score_lines,
     write_laws,
     write_moduli,
 )
@@ -149,8 +146,8 @@ def sample(options: argparse.Namespace) -> None:
 def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
     draws, seed = [], options.seed or 0
     with Progress("draws") as bar:
-        for drawn in draw_many(model, options.group, options.model, options.number, seed, options.poisson):
-            draws.append(drawn)
+        for number in range(options.number):
+            draws.append(draw_laws(model, options.group, options.model, number, seed, options.poisson))
             bar.show(len(draws) / options.number)
     rows = [LawRow((str(draw.number), str(1 + len(draw.rejected))), draw.fits, draw.rejected) for draw in draws]
     return rows, redrawn_lines(draws)
@@ -191,15 +188,16 @@ def compare(options: argparse.Namespace) -> None:
     papers = len({study.paper for study in studies})
     print(f"{len(studies)} studies of {papers} papers, one {options.leave} after the other left out:")
     shown = [score for score in scores if options.only in score.name]
-    print(*score_lines(shown), sep="\n")
+    print(*lines("gp.txt", "scores", shown), sep="\n")
     for score in shown:
         if score.levels:
-            calibrated = calibration_lines(leaving_out.calibration(score, leaving_out.methods_of(left)), options.leave)
+            calibrated = leaving_out.calibration(score, leaving_out.methods_of(left))
+            table = lines("gp.txt", "calibrations", calibrated, options.leave, leaving_out.INTERVALS)
             title = f"{score.name}: {options.leave}s whose level is within an interval (95 % interval of that part)"
-            print("", title, *calibrated, sep="\n")
+            print("", title, *table, sep="\n")
     default = next((score for score in scores if score.name == DEFAULT), None)
     others = [score for score in shown if score.name != DEFAULT]
     if default is not None and others:
         compared = [leaving_out.compared(default, other) for other in others]
-        print("", *comparison_lines(default.name, compared), sep="\n")
+        print("", *lines("gp.txt", "comparisons", default.name, compared), sep="\n")
     print("", f"written to {path}", sep="\n")

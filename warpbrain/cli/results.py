@@ -9,9 +9,8 @@ import sys
 from warpbrain.atomic import check_writable
 from warpbrain.errors import InputError
 from warpbrain.report.body_sections import window, write_view_page
-from warpbrain.report.files import write_summary
+from warpbrain.report.files import read_state, write_summary
 from warpbrain.report.page import lines
-from warpbrain.report.state_files import read_state
 from warpbrain.report.two_results import describe_two, read_result
 
 

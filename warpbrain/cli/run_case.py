@@ -25,11 +25,10 @@ from warpbrain.physics.words import tabled
 from warpbrain.report import summary as tables
 from warpbrain.report import views
 from warpbrain.report.comparison import describe_comparisons, describe_mesh_error, recorded_rows, write_comparisons
-from warpbrain.report.files import write_result, write_summary
+from warpbrain.report.files import read_state, write_result, write_summary
 from warpbrain.report.page import lines
 from warpbrain.report.rendering import render_nothing
 from warpbrain.report.run_page import write_run_page
-from warpbrain.report.state_files import read_state
 from warpbrain.report.summary import describe_prior
 from warpbrain.report.warped import WarpRequest
 from warpbrain.simulation.equilibrium import NewtonStep

@@ -9,7 +9,7 @@ from warpbrain.atomic import check_output_folder
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.report import warped
-from warpbrain.report.state_files import SavedState, read_state
+from warpbrain.report.files import SavedState, read_state
 from warpbrain.report.warped import WarpRequest, read_request, write_warped
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.record import Record

@@ -23,14 +23,7 @@ from warpbrain.inference import Cause, GaussianModel, Kind, Place
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import Confirmation
-from warpbrain.inference.predict import (
-    Prediction,
-    along_own_axes,
-    p_value,
-    predict,
-    predict_with,
-    predictive_p,
-)
+from warpbrain.inference.predict import Prediction, along_own_axes, p_value, predict, predict_with, predictive_p
 from warpbrain.inference.subsets import Blocks
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.body.base import Base

@@ -233,10 +233,7 @@ def folds(studies: Sequence[Study], fold: Fold) -> dict[str, list[Study]]:
 
 
 def leave_out(
-    candidate: Candidate,
-    studies: Sequence[Study],
-    fold: Fold,
-    progress: Callable[[float], None] = lambda part: None,
+    candidate: Candidate, studies: Sequence[Study], fold: Fold, progress: Callable[[float], None] = lambda part: None
 ) -> Score:
     """Score a candidate by leaving out each study, or each paper, in turn, and fitting it again without.
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.gp.process import Process
-from warpbrain.gp.sampling import DrawnLaws, draw_many
+from warpbrain.gp.sampling import DrawnLaws, draw_laws
 
 if TYPE_CHECKING:
     from warpbrain.physics.laws import Law
@@ -139,7 +139,7 @@ class Prior:
             raise InputError(f"groups {', '.join(groups)}: one is given twice; tissues of one group are one tissue")
         if count < 10 * size:
             raise InputError(f"count {count}: expected at least {10 * size} draws for {size} parameters")
-        draws = list(draw_many(model, groups, names, count, seed, poisson, formulation))
+        draws = [draw_laws(model, groups, names, number, seed, poisson, formulation) for number in range(count)]
         attempts = sum(1 + len(drawn.rejected) for drawn in draws)
         at_bound = np.mean([[bool(fitted.at_bound) for fitted in drawn.fits] for drawn in draws], axis=0)
         return cls(model, tuple(groups), names, poisson, formulation, seed, _theta(draws), attempts, at_bound)
@@ -159,7 +159,8 @@ class Prior:
         drawn = self.seed if seed is None else seed
         if drawn == self.seed and count <= len(self.theta):
             return self.theta[:count].copy()
-        return _theta(draw_many(self.model, self.groups, self.laws_of, count, drawn, self.poisson, self.formulation))
+        about = self.model, self.groups, self.laws_of
+        return _theta([draw_laws(*about, k, drawn, self.poisson, self.formulation) for k in range(count)])
 
     @cached_property
     def mean(self) -> Floats:

@@ -12,7 +12,7 @@ negative throughout a box, and of any order of magnitude. That changes the way, 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from operator import attrgetter
@@ -427,20 +427,6 @@ def draw_laws(
     )
 
 
-def draw_many(
-    model: Process,
-    groups: Sequence[str],
-    law: str | Sequence[str],
-    count: int,
-    seed: int = 0,
-    poisson: float = 0.45,
-    formulation: str | Sequence[str] = "coupled",
-) -> Iterator[DrawnLaws]:
-    """Draws 0 to `count` - 1, see `draw_laws`."""
-    for number in range(count):
-        yield draw_laws(model, groups, law, number, seed, poisson, formulation)
-
-
 def rejection_rate(draws: Sequence[DrawnLaws]) -> float:
     """Part of all attempts at some draws that were unstable."""
     rejected = sum(len(draw.rejected) for draw in draws)
@@ -474,7 +460,7 @@ def moduli(model: Process, group: str, law: str, draws: int = 1000, seed: int = 
     True
     """
     fits = tuple(law_of_curve(model, group, k, law) for k in CURVES)
-    drawn = list(draw_many(model, [group], law, draws, seed, poisson))
+    drawn = [draw_laws(model, [group], law, number, seed, poisson) for number in range(draws)]
     values = np.array([draw.shear_moduli[0] for draw in drawn])
     low, median, high = np.quantile(values, [0.025, 0.5, 0.975]).tolist()
     # of a normal distribution's median, in logarithms

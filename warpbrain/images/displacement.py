@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.arrays import Bools, Floats, Ints, Singles
 from warpbrain.images.continuation import continued
-from warpbrain.images.grid import MILLIMETRES, Grid
-from warpbrain.images.inside import VoxelsInside
+from warpbrain.images.grid import MILLIMETRES, Grid, VoxelsInside
 
 #: Error of the inverse at a voxel's centre [mm] that is small enough, and iterations after which it stays as it is.
 _TOLERANCE, _ITERATIONS = 1e-3, 60

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -76,23 +77,21 @@ class GaussianModel:
 
     def with_scale(self, scale: float) -> GaussianModel:
         """The same model with another factor on the noise; nothing is factorised again."""
-        other = GaussianModel(self.noise_factor, self.columns, scale)
-        other.__dict__["_noise"] = self._noise
-        other.__dict__["_whitened"] = self._whitened
-        other.__dict__["_spectrum"] = self._spectrum
-        return other
+        return self._sharing(self.columns, scale, _whitened=self._whitened, _spectrum=self._spectrum)
 
     def of_noise(self, columns: Floats, scale: float = 1.0) -> GaussianModel:
         """Other columns (n, q) with the same noise, at a scale of their own; the noise is not factorised again."""
-        other = GaussianModel(self.noise_factor, columns, scale)
-        other.__dict__["_noise"] = self._noise
-        return other
+        return self._sharing(columns, scale)
 
     def with_columns(self, columns: Floats) -> GaussianModel:
         """The same model with more columns (n, k) of normal coefficients."""
-        other = GaussianModel(self.noise_factor, np.column_stack([self.columns, columns]), self.scale)
-        other.__dict__["_noise"] = self._noise
-        other.__dict__["_whitened"] = np.column_stack([self._whitened, self._by_noise(columns)])
+        whitened = np.column_stack([self._whitened, self._by_noise(columns)])
+        return self._sharing(np.column_stack([self.columns, columns]), self.scale, _whitened=whitened)
+
+    def _sharing(self, columns: Floats, scale: float, **known: Any) -> GaussianModel:
+        """A model of the same noise, of which cached properties are known."""
+        other = GaussianModel(self.noise_factor, columns, scale)
+        other.__dict__.update(_noise=self._noise, **known)
         return other
 
     def rows(self, rows: Bools) -> GaussianModel:

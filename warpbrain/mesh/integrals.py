@@ -100,12 +100,7 @@ def _points_on(corners: Floats, bary: Floats) -> Floats:
 
 
 def _summed(
-    mesh: TetMesh | QuadraticMesh,
-    nodes: NDArray[np.integer],
-    at: Floats,
-    sizes: Floats,
-    shapes: Floats,
-    field: Field,
+    mesh: TetMesh | QuadraticMesh, nodes: NDArray[np.integer], at: Floats, sizes: Floats, shapes: Floats, field: Field
 ) -> Floats:
     """Sum over elements with nodes (k, s), at points (q, k, 3) that stand for sizes (q, k), shape values (q, s)."""
     values = field(at.reshape(-1, 3)).reshape(at.shape)

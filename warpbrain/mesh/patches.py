@@ -1,4 +1,4 @@
-"""A patch of a surface: the connected piece of it near a point, seen from one side."""
+"""A patch of a surface: the connected piece of it near a point, seen from one side; and points nearest on triangles."""
 
 from __future__ import annotations
 
@@ -31,8 +31,7 @@ def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius:
     near = np.flatnonzero(np.linalg.norm(middle, axis=1) < radius + reach)
     if not len(near):
         return near
-    weights = nearest_to_origin(corners[near])
-    distance = np.linalg.norm(np.einsum("kc,kci->ki", weights, corners[near]), axis=1)
+    distance = closest_on_triangles(np.zeros(3), corners[near])[1]
     start = int(np.argmin(distance))
     if distance[start] >= radius:
         return np.zeros(0, dtype=np.int64)
@@ -45,21 +44,38 @@ def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius:
     return np.asarray(near[taken[together == together[np.searchsorted(taken, start)]]])
 
 
-def nearest_to_origin(corners: Floats) -> Floats:
-    """Barycentric coordinates (k, 3) of the points nearest to the origin of triangles with corners (k, 3, 3)."""
-    a, along = corners[:, 0], corners[:, 1:] - corners[:, :1]
-    metric = along @ along.transpose(0, 2, 1)
-    inner = np.linalg.solve(metric, -np.einsum("kci,ki->kc", along, a)[..., None])[..., 0]
-    barycentric = np.column_stack([1.0 - inner.sum(axis=1), inner])
-    outside = np.flatnonzero((barycentric < 0.0).any(axis=1))
-    # beyond the triangle the nearest point is on a side
-    ends = corners[outside][:, SIDES]
-    part, distance = _nearest_on_sides(ends)
-    side, every = np.argmin(distance, axis=1), np.arange(len(outside))
-    barycentric[outside] = 0.0
-    barycentric[outside, SIDES[side, 0]] = 1.0 - part[every, side]
-    barycentric[outside, SIDES[side, 1]] = part[every, side]
-    return barycentric
+def closest_on_triangles(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
+    """Barycentric coordinates (n, 3) of the closest point of one triangle (n, 3, 3) a point, and its distance (n,).
+
+    `points` (n, 3), or (3,) if it is one. Triangles without area count as the segments they are.
+    """
+    a = corners[:, 0]
+    ab, ac, ap = corners[:, 1] - a, corners[:, 2] - a, points - a
+    normal = np.cross(ab, ac)
+    area = np.einsum("ij,ij->i", normal, normal)
+    longest = np.maximum(np.einsum("ij,ij->i", ab, ab), np.einsum("ij,ij->i", ac, ac))
+    flat = area <= 1e-28 * longest**2
+    safe = np.where(flat, 1.0, area)
+    v = np.einsum("ij,ij->i", np.cross(ap, ac), normal) / safe
+    w = np.einsum("ij,ij->i", np.cross(ab, ap), normal) / safe
+    best = np.stack([1.0 - v - w, v, w], axis=1)
+    inside = ~flat & (best >= 0.0).all(axis=1)
+    distance = np.where(inside, _distance(points, corners, best), np.inf)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        side = corners[:, j] - corners[:, i]
+        square = np.einsum("ij,ij->i", side, side)
+        along = np.einsum("ij,ij->i", points - corners[:, i], side) / np.where(square > 0.0, square, 1.0)
+        along = np.clip(along, 0.0, 1.0)
+        candidate = np.zeros_like(best)
+        candidate[:, i], candidate[:, j] = 1.0 - along, along
+        apart = _distance(points, corners, candidate)
+        closer = apart < distance
+        best[closer], distance[closer] = candidate[closer], apart[closer]
+    return best, distance
+
+
+def _distance(points: Floats, corners: Floats, weights: Floats) -> Floats:
+    return np.linalg.norm(np.einsum("ni,nij->nj", weights, corners - points[..., None, :]), axis=1)
 
 
 def _nearest_on_sides(ends: Floats) -> tuple[Floats, Floats]:

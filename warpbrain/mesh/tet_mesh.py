@@ -374,9 +374,4 @@ def ordered(mesh: TetMesh) -> TetMesh:
     number[nodes] = np.arange(count)
     tetrahedra = number[mesh.tetrahedra].astype(np.int32)
     elements = np.lexsort(np.sort(tetrahedra, axis=1).T[::-1])
-    return TetMesh(
-        mesh.points[nodes],
-        tetrahedra[elements],
-        mesh.tissue[elements],
-        *mesh._named(nodes, elements),
-    )
+    return TetMesh(mesh.points[nodes], tetrahedra[elements], mesh.tissue[elements], *mesh._named(nodes, elements))

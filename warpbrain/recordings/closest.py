@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.errors import InputError
+from warpbrain.mesh.patches import closest_on_triangles
 
 #: Barycentric coordinates up to this are none.
 _ON = 1e-12
@@ -121,50 +122,13 @@ def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
 
 
 def _improve(
-    which: Ints,
-    candidates: Ints,
-    points: Floats,
-    corners: Floats,
-    face: Ints,
-    distance: Floats,
-    weights: Floats,
+    which: Ints, candidates: Ints, points: Floats, corners: Floats, face: Ints, distance: Floats, weights: Floats
 ) -> None:
     """Take over, in place, the candidates that are closer than the best so far; a tie goes to the smaller number."""
-    barycentric, apart = _on_triangles(points[which], corners[candidates])
+    barycentric, apart = closest_on_triangles(points[which], corners[candidates])
     order = np.lexsort((candidates, apart, which))
     first = order[np.append(True, which[order][1:] != which[order][:-1])] if len(order) else order
     at = which[first]
     closer = (apart[first] < distance[at]) | ((apart[first] == distance[at]) & (candidates[first] < face[at]))
     first, at = first[closer], at[closer]
     face[at], distance[at], weights[at] = candidates[first], apart[first], barycentric[first]
-
-
-def _on_triangles(points: Floats, corners: Floats) -> tuple[Floats, Floats]:
-    """Barycentric coordinates (n, 3) of the closest point of one triangle (n, 3, 3) a point, and its distance (n,)."""
-    a = corners[:, 0]
-    ab, ac, ap = corners[:, 1] - a, corners[:, 2] - a, points - a
-    normal = np.cross(ab, ac)
-    area = np.einsum("ij,ij->i", normal, normal)
-    longest = np.maximum(np.einsum("ij,ij->i", ab, ab), np.einsum("ij,ij->i", ac, ac))
-    flat = area <= 1e-28 * longest**2
-    safe = np.where(flat, 1.0, area)
-    v = np.einsum("ij,ij->i", np.cross(ap, ac), normal) / safe
-    w = np.einsum("ij,ij->i", np.cross(ab, ap), normal) / safe
-    best = np.stack([1.0 - v - w, v, w], axis=1)
-    inside = ~flat & (best >= 0.0).all(axis=1)
-    distance = np.where(inside, _distance(points, corners, best), np.inf)
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        side = corners[:, j] - corners[:, i]
-        square = np.einsum("ij,ij->i", side, side)
-        along = np.einsum("ij,ij->i", points - corners[:, i], side) / np.where(square > 0.0, square, 1.0)
-        along = np.clip(along, 0.0, 1.0)
-        candidate = np.zeros_like(best)
-        candidate[:, i], candidate[:, j] = 1.0 - along, along
-        apart = _distance(points, corners, candidate)
-        closer = apart < distance
-        best[closer], distance[closer] = candidate[closer], apart[closer]
-    return best, distance
-
-
-def _distance(points: Floats, corners: Floats, weights: Floats) -> Floats:
-    return np.linalg.norm(np.einsum("ni,nij->nj", weights, corners - points[:, None]), axis=1)

@@ -55,15 +55,12 @@ def rows_at(recording: Recording, time: float | None = None) -> Ints:
     apart = -times if time is None else np.abs(times - time)
     order = np.lexsort((times, apart, groups))
     nearest = times[order[np.unique(groups[order], return_index=True)[1]]]
-    allowed = np.inf if time is None else _half_interval(times)
+    allowed = np.inf
+    if time is not None:
+        steps = np.diff(np.unique(times))
+        allowed = (float(np.median(steps)) / 2.0 if len(steps) else 0.0) + 1e-9 * float(np.abs(times).max())
     rows = np.flatnonzero((times == nearest[groups]) & (apart <= allowed))
     if len(rows) == 0:
         span = f"{times.min():g} s to {times.max():g} s"
         raise InputError(f"recording '{recording.name}' has nothing at {time:g} s: its times are {span}")
     return rows
-
-
-def _half_interval(times: Floats) -> float:
-    steps = np.diff(np.unique(times))
-    rounding = 1e-9 * float(np.abs(times).max())
-    return (float(np.median(steps)) / 2.0 if len(steps) else 0.0) + rounding

@@ -14,13 +14,12 @@ from warpbrain.arrays import Floats
 from warpbrain.atomic import write_text
 from warpbrain.mesh import TetMesh
 from warpbrain.report import views
-from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.files import LEFT, MILLIMETRES, TRUST, UNSEEN, SavedState
 from warpbrain.report.page import Section, Top, document, part
 from warpbrain.report.page.figures import TEXT, colour_bar, data, inlined, panels
 from warpbrain.report.page.scene import Arrows, Field, View, viewer
 from warpbrain.report.picture import Moved, Pictures, annotations_of, arrow_colours, heading, round_factor, scene_of
 from warpbrain.report.slices import cut
-from warpbrain.report.state_files import LEFT, TRUST, UNSEEN, SavedState
 from warpbrain.report.views import BLUE, QUIET, VERMILLION
 
 #: A large displacement is shown this long in a view, as a part of the size of the body.

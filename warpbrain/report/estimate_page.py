@@ -1,36 +1,29 @@
-"""`report.html` of an estimate: the tissue, how well it is known, and what it makes of what was recorded.
-
-The words are in `page/estimate.html`.
-"""
+"""`report.html` of an estimate, and its figures: prior and posterior, observed against predicted, what is left."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from warpbrain.arrays import Floats
 from warpbrain.atomic import write_text
-from warpbrain.estimation.posterior import Posterior
+from warpbrain.estimation.posterior import Marginal, Posterior, Prediction
 from warpbrain.inference.calibration import percent
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view, fields_of, known_displacement
-from warpbrain.report.comparison import Explained, explained
-from warpbrain.report.estimate import (
-    averaged_row,
-    parameter_row,
-    prediction_row,
-    recorded_points,
-)
-from warpbrain.report.estimate_picture import agreement_figure, densities_figure
+from warpbrain.report.comparison import SHOWN, Explained, explained
+from warpbrain.report.estimate import averaged_row, parameter_row, prediction_row, recorded_points
+from warpbrain.report.files import MILLIMETRES, read_state
 from warpbrain.report.page import Top, document, lines, sections_of
-from warpbrain.report.page.figures import inlined
+from warpbrain.report.page.figures import NARROW, inlined
 from warpbrain.report.picture import Moved, Pictures, begin_pictures, draw
 from warpbrain.report.run_page import BADGES
-from warpbrain.report.state_files import read_state
 from warpbrain.report.summary import left_out
+from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 from warpbrain.simulation.of_case import model_of
 
 #: Causes that are less probable are not listed.
@@ -115,3 +108,119 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     top = Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts)
     write_text(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))
     return pictures
+
+
+_MARKERS = ("o", "s", "^", "D", "v", "P")
+_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
+
+
+def densities_figure(posterior: Posterior, narrow: bool) -> Any:
+    """The density of each parameter before and after, one below the other for a narrow window."""
+    count = len(posterior.marginals)
+    figure, axes = _side_by_side(count, narrow, 3.0, (max(4.6 * count, 6.4), 3.8))
+    for column, marginal in enumerate(posterior.marginals):
+        draws = None if posterior.chain is None else posterior.chain.theta[:, column]
+        _draw_marginal(axes[column], marginal, posterior.prior.theta[:, column], draws)
+    axes[0].legend(fontsize=9, frameon=False)
+    return figure
+
+
+def _side_by_side(count: int, narrow: bool, height: float, size: tuple[float, float]) -> tuple[Any, list[Any]]:
+    """Panels, one below the other on a narrow window, each of that height [inch]."""
+    return views.panels(count, 1, (NARROW, height * count)) if narrow else views.panels(1, count, size)
+
+
+def _draw_marginal(axes: Any, marginal: Marginal, prior: Floats, draws: Floats | None) -> None:
+    from scipy.stats import gaussian_kde, norm
+
+    modulus = marginal.parameter.is_modulus
+    low, high = np.percentile(prior, [0.5, 99.5])
+    low, high = min(low, marginal.interval[0]), max(high, marginal.interval[1])
+    fine = np.linspace(marginal.mean - 5 * marginal.deviation, marginal.mean + 5 * marginal.deviation, 301)
+    at = np.sort(np.concatenate([np.linspace(low, high, 400), fine[(fine >= low) & (fine <= high)]]))
+    before = gaussian_kde(prior)(at)
+    spread = draws is not None and float(np.ptp(draws)) > 0.0
+    after = gaussian_kde(draws)(at) if spread else norm.pdf(at, marginal.mean, marginal.deviation)
+    shown = np.exp(at) if modulus else at
+    # each is as high as the other: what counts is where they are and how wide
+    axes.fill_between(shown, before / before.max(), color=ORANGE, alpha=0.35, linewidth=0)
+    axes.plot(shown, before / before.max(), color=ORANGE, linestyle="--", label="prior")
+    axes.plot(shown, after / after.max(), color=BLUE, label="posterior")
+    for end in marginal.interval:
+        axes.axvline(np.exp(end) if modulus else end, color=BLUE, linewidth=0.8, linestyle=":")
+    if modulus:
+        axes.set_xscale("log")
+    name = "shear modulus [Pa]" if modulus else f"{marginal.parameter.coordinate.name} [1]"
+    axes.set_xlabel(f"{marginal.parameter.tissue}: {name}")
+    axes.set_ylabel("density, relative to its top")
+    axes.set_ylim(0.0, 1.15)
+
+
+def agreement_figure(posterior: Posterior, narrow: bool) -> Any:
+    """Components as they were observed and as they are predicted, one unit below the other for a narrow window."""
+    # a distance to a surface has no sign that was recorded: before, after is all there is to compare
+    shown = [prediction for prediction in posterior.predictions if prediction.kind != "surface"]
+    units = list(dict.fromkeys(prediction.unit for prediction in shown)) or ["m"]
+    figure, axes = _side_by_side(len(units), narrow, 5.0, (5.4 * len(units), 6.2))
+    for column, unit in enumerate(units):
+        _draw_pairs(
+            axes[column], [prediction for prediction in shown if prediction.unit == unit], unit, 1 if narrow else 2
+        )
+    return figure
+
+
+def _draw_pairs(axes: Any, predictions: Sequence[Prediction], unit: str, columns: int) -> None:
+    factor, name = SHOWN[unit]
+    ends = [0.0]
+    for number, prediction in enumerate(predictions):
+        observed, predicted = factor * prediction.before, factor * (prediction.before - prediction.after)
+        ends += [float(observed.min()), float(observed.max()), float(predicted.min()), float(predicted.max())]
+        label = f"{prediction.name} ({prediction.role})"
+        style = {"s": 12, "marker": _MARKERS[number % 6], "linewidths": 0.6}
+        good, gross = ~prediction.gross, f"{label}: gross errors"
+        hollow = {"facecolors": "none", "edgecolors": _COLOURS[number % 6]}
+        axes.scatter(predicted[good], observed[good], label=label, **hollow, **style)
+        if prediction.gross.any():
+            axes.scatter(
+                predicted[prediction.gross], observed[prediction.gross], color=VERMILLION, label=gross, **style
+            )
+    margin = 0.05 * (max(ends) - min(ends) or 1.0)
+    ends = [min(ends) - margin, max(ends) + margin]
+    axes.plot(ends, ends, color="0.4", linewidth=0.8)
+    axes.set_xlim(*ends)
+    axes.set_ylim(*ends)
+    axes.set_aspect("equal")
+    quantity = "force" if unit == "N" else "displacement"
+    axes.set_xlabel(f"predicted {quantity}, each component [{name}]")
+    axes.set_ylabel(f"observed {quantity}, each component [{name}]")
+    if predictions:
+        axes.legend(fontsize=8, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncol=columns)
+    else:
+        axes.text(0.5, 0.5, "only surfaces were recorded", ha="center", transform=axes.transAxes)
+
+
+def residuals_figure(posterior: Posterior) -> Any:
+    """How far each recorded point is from its prediction, on the outlines of the anatomy from three sides."""
+    whole, mesh = posterior.case.mesh, posterior.case.remaining[0]
+    residuals = [
+        (recording.points[prediction.rows], MILLIMETRES * np.linalg.norm(prediction.after, axis=1))
+        for prediction, recording in recorded_points(posterior)
+    ]
+    points = np.concatenate([np.empty((0, 3)), *(where for where, _ in residuals)])
+    lengths = np.concatenate([np.empty(0), *(sizes for _, sizes in residuals)])
+    order, top = np.argsort(lengths), max(float(np.percentile(lengths, 98)), 1e-3) if len(lengths) else 1.0
+    figure, axes = views.panels(1, 3, (13.5, 5.0))
+    shown: Any = None
+    places = views.places(whole)
+    for panel, view, place in zip(axes, views.VIEWS, places, strict=True):
+        views.draw_outline(panel, mesh, view, place, colour="0.45")
+        flat = views.in_view(points[order][:, view.plane])
+        shown = panel.scatter(
+            flat[:, 0], flat[:, 1], c=lengths[order], s=16, cmap="viridis_r", vmin=0.0, vmax=top, edgecolors="0.2",
+            linewidths=0.3, zorder=3,
+        )  # fmt: skip
+        views.frame(panel, whole, view)
+        panel.set_title(f"outline at {views.heading(whole, view, place)}", fontsize=10)
+    label = "distance between observed and predicted [mm], points of all depths"
+    figure.colorbar(shown, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.03, label=label)
+    return figure

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.gp.asymmetry import Asymmetry
-from warpbrain.gp.leaving_out import INTERVALS, Calibration, Comparison, Score
 from warpbrain.gp.sampling import CURVES, DrawnLaws, Fit, Moduli, rejection_rate
 from warpbrain.report.files import write_csv
 from warpbrain.report.page import lines
@@ -127,18 +126,3 @@ def redrawn_lines(draws: Sequence[DrawnLaws]) -> list[str]:
     kinds = Counter(reason.rsplit(": ", 1)[-1] for reason in reasons).most_common(3)
     examples = [(count, kind, next(reason for reason in reasons if reason.endswith(kind))) for kind, count in kinds]
     return lines("gp.txt", "redrawn", len(reasons), len(draws), rejection_rate(draws), examples)
-
-
-def score_lines(scores: Sequence[Score]) -> list[str]:
-    """The table of models that were scored on studies that they had not seen."""
-    return lines("gp.txt", "scores", scores, max(len(score.name) for score in scores))
-
-
-def calibration_lines(calibrations: Sequence[Calibration], left: str) -> list[str]:
-    """The table of one model: hits of intervals, and what part of hits they are compatible with."""
-    return lines("gp.txt", "calibrations", calibrations, left, INTERVALS)
-
-
-def comparison_lines(name: str, comparisons: Sequence[Comparison]) -> list[str]:
-    """One model against the others."""
-    return lines("gp.txt", "comparisons", name, comparisons, max(len(comparison.other) for comparison in comparisons))

@@ -15,12 +15,11 @@ from warpbrain.errors import InputError
 from warpbrain.estimation.posterior import Marginal, Posterior
 from warpbrain.inference.calibration import percent
 from warpbrain.recordings.comparison import Comparison
-from warpbrain.report.case_text import show_lines
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.ensemble import describe_ensemble, ensemble_lines
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page import part
-from warpbrain.report.summary import SET_TITLES, describe_result, left_out
+from warpbrain.report.summary import SET_TITLES, describe_result, left_out, show_lines
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.run import Run
 from warpbrain.simulation.specimen import SpecimenRun

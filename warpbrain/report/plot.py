@@ -90,7 +90,7 @@ def plot(
 
         figure = tests_figure(what.tests, COLUMNS)
     elif isinstance(what, Posterior) and field == "moduli":
-        from warpbrain.report.estimate_picture import densities_figure
+        from warpbrain.report.estimate_page import densities_figure
 
         figure = densities_figure(what, narrow=False)
     if figure is not None:

@@ -13,15 +13,7 @@ from typing import Any
 from warpbrain.atomic import write_text
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view
-from warpbrain.report.comparison import (
-    IN_PART,
-    NEARER,
-    NO_NEARER,
-    UNKNOWN,
-    WORSE,
-    explained_of,
-    recorded_rows,
-)
+from warpbrain.report.comparison import IN_PART, NEARER, NO_NEARER, UNKNOWN, WORSE, explained_of, recorded_rows
 from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field

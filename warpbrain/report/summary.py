@@ -1,4 +1,4 @@
-"""What a run prints and writes as JSON: dictionaries, from which the printed tables are made too."""
+"""What a run prints and writes as JSON: dictionaries, from which printed tables are made, too; and a case in words."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from warpbrain import __version__
 from warpbrain.cases.case import Case, Tissue
-from warpbrain.cases.checking import NOTHING_ACTS
+from warpbrain.cases.checking import NOTHING_ACTS, Checked
+from warpbrain.mesh import measure
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import tabled
+from warpbrain.recordings.recording import Recording
 from warpbrain.report.files import MILLIMETRES, fingerprints, picked
+from warpbrain.report.page import lines
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
@@ -152,3 +155,23 @@ def describe_prior(prior: FromPrior) -> dict[str, Any]:
         for described, fitted in zip(tissues.values(), drawn.fits, strict=True):
             described["rms_of_fit"] = fitted.rms
     return {"model": prior.model.name, "variant": prior.model.variant, "draw": draw, "tissues": tissues}
+
+
+def recording_line(recording: Recording) -> str:
+    """One line about a recording."""
+    role = "" if recording.role == "fit" else "; only checked, never fitted"
+    scale, unit = (MILLIMETRES, "mm") if recording.noise_unit == "m" else (1.0, "")
+    noise = f"; noise {scale * recording.sigma:g} {unit}".rstrip() if recording.sigma is not None else ""
+    return f"{recording.name}: {recording.content}{noise}{role}"
+
+
+def show_lines(case: Case) -> list[str]:
+    """Everything a case says, as printed."""
+    recorded = list(map(recording_line, case.recordings))
+    return lines("case.txt", "show", case, measure(case.mesh), recorded, SET_TITLES, STAND_IN)
+
+
+def check_lines(checked: Checked, cannot: str) -> list[str]:
+    """What checking found, as printed: problems first; `cannot` says why a sound case cannot be run yet."""
+    recorded = [] if checked.case is None else list(map(recording_line, checked.case.recordings))
+    return lines("case.txt", "check", checked, cannot, recorded, SET_TITLES)

@@ -13,8 +13,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.recordings.location import locate
-from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.state_files import FILES, SavedState, read_state
+from warpbrain.report.files import FILES, MILLIMETRES, SavedState, read_state
 
 #: Files that say what a result is, and the command that wrote them; an ensemble's has the same name as a run's.
 _KINDS = {"diagnosis.json": "diagnose", "estimate.json": "estimate", "summary.json": "run"}

@@ -14,16 +14,14 @@ from warpbrain.atomic import write_text
 from warpbrain.errors import InputError
 from warpbrain.images.continuation import LENGTH
 from warpbrain.images.displacement import DisplacementField, displacement_field, inverse, resampled
-from warpbrain.images.grid import Grid
-from warpbrain.images.inside import VoxelsInside, voxels_inside
+from warpbrain.images.grid import Grid, VoxelsInside, voxels_inside
 from warpbrain.images.moving_points import PointFile, move_points, read_point_file, write_moved
 from warpbrain.images.reading import Image, labels_of, read_image, require
 from warpbrain.images.writing import write_displacement, write_transform, write_volume
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.electrodes import is_electrodes
-from warpbrain.report.files import MILLIMETRES, write_body
+from warpbrain.report.files import LEFT, MILLIMETRES, SEEN, TRUST, UNSEEN, SavedState, write_body
 from warpbrain.report.page import lines, rendered
-from warpbrain.report.state_files import LEFT, SEEN, TRUST, UNSEEN, SavedState
 
 #: Names of the transforms: what they do to an image.
 FORTH, BACK = "transform-before-to-after.nii.gz", "transform-after-to-before.nii.gz"

@@ -171,13 +171,7 @@ class PatchStiffnessTerm(_PatchTerm):
         )  # fmt: skip
 
     def add_stiffness(
-        self,
-        x: wp.array,
-        factor: float,
-        y: wp.array,
-        columns: wp.array,
-        rows: wp.array,
-        scale: wp.array | None = None,
+        self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array, scale: wp.array | None = None
     ) -> None:
         """See `Term.add_stiffness`; `scale` (1,) is one more factor, which a captured graph reads."""
         k, size = self._kernels, len(self.stencils)

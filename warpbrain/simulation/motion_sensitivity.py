@@ -29,13 +29,7 @@ from warpbrain.errors import InputError
 from warpbrain.kernels.linear import LinearSolver
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Model
-from warpbrain.simulation.sensitivity import (
-    ROUNDINGS,
-    Corrections,
-    ModelOf,
-    ParameterStencil,
-    lengths,
-)
+from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, ModelOf, ParameterStencil, lengths
 
 #: Iterations of a linear solve.
 _MAX_CG = 10_000

@@ -212,10 +212,7 @@ class System:
         return by_code
 
     def _parameters(
-        self,
-        law_type: type[Law],
-        materials: Mapping[int, Material],
-        modulus: Callable[[Material], float] | None = None,
+        self, law_type: type[Law], materials: Mapping[int, Material], modulus: Callable[[Material], float] | None = None
     ) -> Floats:
         """Parameters by element; 1 where it is of no tissue of the group."""
         if modulus is None:

@@ -104,8 +104,8 @@ def choose_folder(requested: Path | None, usual: str, overwrite: bool, allowed_m
     A folder that was made for nothing goes again when the command ends (`release`).
 
     Without one that is asked for it is of the usual name, in the working folder; where that has results, or another
-    process writes to it, the next free one of ``NAME-2``, ``NAME-3``, ... `beside` are those of `MARKS` that may lie in
-    it: what the command reads or goes on with. `InputError` if the folder that was asked for has results and may not be
+    process writes to it, the next free one of ``NAME-2``, ``NAME-3``, ... Of `MARKS` the allowed ones may lie in it:
+    what the command reads or goes on with. `InputError` if the folder that was asked for has results and may not be
     overwritten, belongs to another process, cannot be one or be written to.
     """
     if requested is None and not overwrite:

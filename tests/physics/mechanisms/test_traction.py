@@ -7,7 +7,7 @@ from shapes import box, sphere
 
 from warpbrain.cases.shipped import find_case
 from warpbrain.mesh import QuadraticMesh, TetMesh, closed_surfaces, face_vectors, nodes_of, patch_around
-from warpbrain.mesh.patches import nearest_to_origin
+from warpbrain.mesh.patches import closest_on_triangles
 from warpbrain.physics.mechanism import ParameterError
 from warpbrain.physics.mechanisms.traction import Traction
 
@@ -85,9 +85,10 @@ def test_a_round_body_is_pressed_as_by_a_ball_alone():
 def test_the_nearest_points_of_triangles():
     random = np.random.default_rng(0)
     corners = random.normal(size=(60, 3, 3)) + random.normal(size=(60, 1, 3))
-    weights = nearest_to_origin(corners)
+    weights, distance = closest_on_triangles(np.zeros(3), corners)
     assert weights.min() >= -1e-12 and np.abs(weights.sum(axis=1) - 1.0).max() < 1e-12
     found = np.linalg.norm(np.einsum("kc,kci->ki", weights, corners), axis=1)
+    assert distance == pytest.approx(found, rel=1e-12)
     # among many points of each triangle none is nearer, and one is nearly as near
     others = random.dirichlet((0.5, 0.5, 0.5), 4000)
     least = np.linalg.norm(np.einsum("pc,kci->kpi", others, corners), axis=2).min(axis=1)

@@ -8,8 +8,7 @@ from sinking_block import OPTIONS
 from warpbrain.report.diagnosis.description import describe
 from warpbrain.report.diagnosis.files import write_covariance, write_diagnosed_state, write_map, write_points
 from warpbrain.report.diagnosis.page import write_page
-from warpbrain.report.files import write_summary
-from warpbrain.report.state_files import read_state
+from warpbrain.report.files import read_state, write_summary
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ import numpy as np
 
 from warpbrain.mesh.vtu import read_vtu
 from warpbrain.report.diagnosis.files import write_diagnosed_state
-from warpbrain.report.state_files import LEFT, SEEN, UNSEEN, read_state
+from warpbrain.report.files import LEFT, SEEN, UNSEEN, read_state
 from warpbrain.worlds.body.uncertainty import displacement_deviation
 
 

@@ -164,7 +164,9 @@ def open_angles(cells: Cells, wanted: float) -> Cells:
     """
     points = cells.points.copy()
     tets = cells.tetrahedra
-    owners = _stars(tets, len(points))
+    # elements around each node
+    ends = np.cumsum(np.bincount(tets.ravel(), minlength=len(points)))
+    owners = np.split(np.argsort(tets.ravel(), kind="stable") // 4, ends[:-1])
     normals = _normals(cells)
     lifted = np.zeros(len(points))
     for _ in range(SWEEPS):
@@ -175,12 +177,6 @@ def open_angles(cells: Cells, wanted: float) -> Cells:
         if not moved:
             break
     return Cells(points, tets, cells.labels)
-
-
-def _stars(tets: Ints, count: int) -> list[Ints]:
-    order = np.argsort(tets.ravel(), kind="stable")
-    ends = np.cumsum(np.bincount(tets.ravel(), minlength=count))
-    return np.split(order // 4, ends[:-1])
 
 
 def _normals(cells: Cells) -> list[Floats]:

@@ -69,10 +69,7 @@ class LabelMesh:
 
 
 def mesh_labels(
-    image: Image,
-    assignment: Assignment,
-    size: float | None = None,
-    progress: Callable[[str], None] = lambda line: None,
+    image: Image, assignment: Assignment, size: float | None = None, progress: Callable[[str], None] = lambda line: None
 ) -> LabelMesh:
     """Mesh a segmentation with a wanted mean edge [mm], by default one that gives about 5,000 nodes.
 

@@ -7,7 +7,6 @@ with the mesh, only reading the case can tell.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Collection
 from typing import Any
@@ -49,11 +48,6 @@ def case_schema() -> dict[str, Any]:
         "oneOf": [{"required": ["mesh"]}, {"required": ["specimen"]}],
         "additionalProperties": False,
     }
-
-
-def schema_text() -> str:
-    """The schema as `warpbrain cases schema` prints it."""
-    return json.dumps(case_schema(), indent=2) + "\n"
 
 
 def _laws(name: str) -> list[dict[str, Any]]:

@@ -133,11 +133,7 @@ _SQUARES = _other(
 )
 
 
-@_form(
-    lambda *, mu: mu,
-    shear=_ours("mu"),
-    young=_other(lambda *, E, nu: {"mu": 0.5 * E / (1.0 + nu)}, "E", _NU),
-)
+@_form(lambda *, mu: mu, shear=_ours("mu"), young=_other(lambda *, E, nu: {"mu": 0.5 * E / (1.0 + nu)}, "E", _NU))
 def linear(l: Floats, *, mu: float) -> Floats:
     """Linear elasticity on a path that keeps volume: `mu dev(e) : dev(e) = 2/3 mu (l - l^-1/2)^2`, `e_i = l_i - 1`.
 

@@ -134,7 +134,7 @@ def parts_of(pattern: Pattern, blocks: int, threads: int, banks: int) -> Parts:
     offsets, columns, active = pattern.offsets, pattern.columns, pattern.active
     n, rows = len(active), pattern.rows
     counted = active[rows] & active[columns]
-    lengths = _ints(np.bincount(rows[counted], minlength=n))
+    lengths = integers(np.bincount(rows[counted], minlength=n))
     ids = np.flatnonzero(active)
     part = np.full(n, -1)
     part[ids] = bisected(pattern.points[ids], lengths[ids], blocks)
@@ -175,20 +175,21 @@ def parts_of(pattern: Pattern, blocks: int, threads: int, banks: int) -> Parts:
         threads,
         places,
         _starts(members),
-        _ints(np.concatenate(members)),
+        integers(np.concatenate(members)),
         _starts(outer),
-        _ints(np.concatenate(outer)),
-        _ints(np.concatenate([part[nodes] << 16 | row_of[nodes] for nodes in outer])),
+        integers(np.concatenate(outer)),
+        integers(np.concatenate([part[nodes] << 16 | row_of[nodes] for nodes in outer])),
         pairs.reshape(blocks, threads, places),
         np.ascontiguousarray(local.reshape(blocks, threads, places).transpose(0, 2, 1)),
         segment_starts,
-        _ints(row_segments),
+        integers(row_segments),
     )
 
 
 def _starts(lists: list[NDArray[np.int_]]) -> Ints:
-    return _ints(np.cumsum([0, *map(len, lists)]))
+    return integers(np.cumsum([0, *map(len, lists)]))
 
 
-def _ints(values: object) -> Ints:
+def integers(values: object) -> Ints:
+    """As 32-bit ones."""
     return np.asarray(values, dtype=np.int32)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
-from warpbrain.kernels.batched.parts import Ints, bisected
+from warpbrain.kernels.batched.parts import Ints, bisected, integers
 
 #: Local nodes of the six edges of an element.
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
@@ -105,7 +105,7 @@ def patches_of(
     keys = pairs[:, 0].astype(np.int64) * len(points) + pairs[:, 1]
 
     def pairs_of(i: NDArray[np.int64], j: NDArray[np.int64]) -> Ints:
-        return _ints(np.searchsorted(keys, i * len(points) + j))
+        return integers(np.searchsorted(keys, i * len(points) + j))
 
     ends = np.array(EDGES)
     of_edges = pairs_of(tetrahedra[:, ends[:, 0]].astype(np.int64), tetrahedra[:, ends[:, 1]].astype(np.int64))
@@ -173,7 +173,7 @@ def _rows_of(listed: Ints, pairs: int) -> tuple[Ints, Bools, Sums]:
     extra_of = np.zeros(pairs, dtype=np.int64)
     extra_of[shared] = starts[:-1]
     rows = np.where(rank == 0, listed, pairs + extra_of[listed] + rank - 1)
-    return _ints(rows), np.asarray(rank == 0), Sums(_ints(shared), _ints(starts))
+    return integers(rows), np.asarray(rank == 0), Sums(integers(shared), integers(starts))
 
 
 def _tables(
@@ -189,7 +189,7 @@ def _tables(
 ) -> Patches:
     edges = [np.unique(of_edges[piece], return_inverse=True) for piece in pieces]
     nodes = [np.unique(tetrahedra[piece], return_inverse=True) for piece in pieces]
-    rounds = [rounds_of(_ints(inverse.reshape(-1, 6)), width) for _, inverse in edges]
+    rounds = [rounds_of(integers(inverse.reshape(-1, 6)), width) for _, inverse in edges]
     turns = [-(-len(of) // together) * together for of in rounds]
     elements = np.full((len(pieces), max(turns), width), -1)
     corners = np.zeros((*elements.shape, 4), dtype=np.int32)
@@ -215,14 +215,10 @@ def _tables(
             np.arange(count_of_edges), -1 - np.arange(count_of_edges)
         ][order]
     return Patches(
-        _ints(elements), corners, at, _ints(turns),
-        _ints([len(of_patch) for of_patch, _ in edges]),
-        _ints(np.cumsum([0, *(len(of_patch) for of_patch, _ in nodes)])),
-        _ints(np.concatenate([of_patch for of_patch, _ in nodes])),
-        _ints(np.r_[0, np.cumsum(np.concatenate(counts))]), _ints(np.concatenate(spokes)),
-        _ints(starts - starts[0]), rows, _ints(kept),
+        integers(elements), corners, at, integers(turns),
+        integers([len(of_patch) for of_patch, _ in edges]),
+        integers(np.cumsum([0, *(len(of_patch) for of_patch, _ in nodes)])),
+        integers(np.concatenate([of_patch for of_patch, _ in nodes])),
+        integers(np.r_[0, np.cumsum(np.concatenate(counts))]), integers(np.concatenate(spokes)),
+        integers(starts - starts[0]), rows, integers(kept),
     )  # fmt: skip
-
-
-def _ints(values: object) -> Ints:
-    return np.asarray(values, dtype=np.int32)

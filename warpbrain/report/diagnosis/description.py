@@ -10,7 +10,6 @@ from typing import Any
 from warpbrain.diagnosis.checking import distance
 from warpbrain.diagnosis.result import Diagnosis, Ranked, confusion_sentences, effect_sentence, sentence_of_kind
 from warpbrain.inference.causes import Kind
-from warpbrain.inference.decide import Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
 from warpbrain.physics.words import Smallest, Value
@@ -60,10 +59,6 @@ def describe(diagnosis: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions
 def _picked(instance: Any, *names: str, **renamed: str) -> Any:
     """Attributes as of `picked`; None of none."""
     return None if instance is None else picked(instance, *names, **renamed)
-
-
-def _decision(decision: Decision) -> Any:
-    return _picked(decision, "verdict", "causes")
 
 
 def _values(values: Sequence[Value]) -> dict[str, Any]:
@@ -116,7 +111,7 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
             asdict(combination) | {"kinds": [kind.value for kind in combination.kinds]}
             for combination in diagnosis.combinations
         ],
-        "by_posterior": _decision(diagnosis.by_posterior),
+        "by_posterior": _picked(diagnosis.by_posterior, "verdict", "causes"),
         "where": place and place | {"region": best.region if best is not None else ""}
         | {"local_p": where.local_p, "global_p": where.global_p},
         "mechanisms": named,
@@ -205,7 +200,7 @@ def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
         "when": {"seconds": where.time} if where is not None and where.time is not None else None,
         "ranking": [_ranked_of_specimen(ranked) for ranked in diagnosis.ranking] + rejected,
         "combinations": [asdict(combination) for combination in diagnosis.combinations],
-        "before_checks": _decision(diagnosis.by_posterior),
+        "before_checks": _picked(diagnosis.by_posterior, "verdict", "causes"),
         "smallest_detectable": {name: _smallest(name, smallest) for name, smallest in diagnosis.smallest.items()},
         "fit": {
             "rmse_pa": {name: score and score.fitted for name, score in scores.items()},

@@ -13,9 +13,9 @@ from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST,
 from warpbrain.report.body_sections import known_displacement
 from warpbrain.report.diagnosis import pictures, text
 from warpbrain.report.diagnosis.files import Recorded
+from warpbrain.report.files import SavedState
 from warpbrain.report.page import Top, document, sections_of
 from warpbrain.report.page.scene import viewer
-from warpbrain.report.state_files import SavedState
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY, VIEWS
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 

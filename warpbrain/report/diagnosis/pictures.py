@@ -19,17 +19,7 @@ from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page.figures import NARROW, TEXT, WIDTH, colour_bar, inlined, panels, shades
 from warpbrain.report.page.scene import Arrows, Field, View
 from warpbrain.report.slices import Cut, cut
-from warpbrain.report.views import (
-    BLACK,
-    BLUE,
-    GREEN,
-    ORANGE,
-    VERMILLION,
-    VIEWS,
-    in_view,
-    round_below,
-    scale_length,
-)
+from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, VERMILLION, VIEWS, in_view, round_below, scale_length
 from warpbrain.worlds.specimen.protocol import Test
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 

@@ -223,10 +223,7 @@ def switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effe
 
 
 def candidates_about_fit(
-    state: SolvedState,
-    acting: Sequence[Effect],
-    candidates: Candidates,
-    places: Mapping[str, Ints],
+    state: SolvedState, acting: Sequence[Effect], candidates: Candidates, places: Mapping[str, Ints]
 ) -> Candidates:
     """The effects of a dictionary at the state of a fit, in which some mechanisms act.
 

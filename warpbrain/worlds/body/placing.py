@@ -322,7 +322,9 @@ def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: fl
         moved = _moved_once(base, fitter, fitted.refit, _MOVE * spacing)
         if moved is None:
             break
-        fitted = _with_fit(fitted, moved, moved.log_evidence - fitted.refit.log_evidence)
+        # both places are as probable as each other before anything is recorded: their evidence is added up
+        gain = float(np.logaddexp(0.0, moved.log_evidence - fitted.refit.log_evidence))
+        fitted = fitted.fitted(moved).with_evidence(fitted.hypothesis.log_evidence + gain)
     return fitted
 
 
@@ -362,11 +364,3 @@ def _moved_effects(base: Base, effect: Effect, step: float) -> Iterator[Effect]:
     size = float(np.max(proposal.sd / proposal.elsewhere(proposal.centre, proposal.radius).sd))
     for other in places_about(base, proposal, step):
         yield replace(scaled(replace(effect, proposal=other), size), columns=effect.columns)
-
-
-def _with_fit(fitted: WeightedSet, refit: Refit, better: float) -> WeightedSet:
-    """A set at another place that was fitted.
-
-    Both places are as probable as each other before anything is recorded: their evidence is added up.
-    """
-    return fitted.fitted(refit).with_evidence(fitted.hypothesis.log_evidence + float(np.logaddexp(0.0, better)))

@@ -241,12 +241,7 @@ class States:
         ]
 
     def _equilibrium(
-        self,
-        system: System,
-        external: Floats,
-        start: Floats | None,
-        options: EquilibriumOptions,
-        known: Floats | None,
+        self, system: System, external: Floats, start: Floats | None, options: EquilibriumOptions, known: Floats | None
     ) -> Equilibrium:
         """The equilibrium under nodal forces (N, 3) [N]; beside a known state (N, 3) [m] the stable one on its branch.
 

@@ -356,20 +356,9 @@ def _situation(case: Case, instants: int) -> Situation:
     assumed = frozenset(mechanism.kind for mechanism in case.mechanisms)
     laws = frozenset(tissue.model for tissue in case.tissues.values())
     return Situation(
-        case.mesh,
-        case.gravity_axis,
-        case.density,
-        case.poisson,
-        assumed,
-        laws,
-        (),
-        (),
-        instants,
-        none,
-        none,
-        0.0,
-        axes=axes,
-    )
+        case.mesh, case.gravity_axis, case.density, case.poisson, assumed, laws, held=(), free=(), instants=instants,
+        volume_sites=none, surface_sites=none, spacing=0.0, axes=axes,
+    )  # fmt: skip
 
 
 def _registered(kind: type[Mechanism], shown: Tests, situation: Situation) -> Effect:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -139,17 +138,13 @@ class HomogeneousMaterial:
         """`S = mu0 J^(-2/3) (I - I1/3 C^-1)`: xx, yy, zz and xz."""
         lx, ly, lz = stretches.T
         J, I1 = lx * ly * lz, lx**2 + ly**2 + lz**2 + g**2
-        scale = self._mu * J ** (-2.0 / 3.0)
+        scale = self.law.shear_modulus * J ** (-2.0 / 3.0)
         det = (lx * lz) ** 2
         xx, zz, xz = (g**2 + lz**2) / det, lx**2 / det, -lx * g / det
         return (
             scale * (1.0 - I1 / 3.0 * xx), scale * (1.0 - I1 / 3.0 / ly**2),
             scale * (1.0 - I1 / 3.0 * zz), -scale * I1 / 3.0 * xz,
         )  # fmt: skip
-
-    @cached_property
-    def _mu(self) -> float:
-        return self.law.shear_modulus
 
     def _settled(self, stretches: Floats, free: tuple[tuple[int, ...], ...], time: Floats | None) -> Floats:
         """Stretches (n, 3) at which nothing pulls along the free axes; those of a group are alike."""
@@ -192,7 +187,7 @@ class HomogeneousMaterial:
             for i, group in enumerate(free):
                 for axis in group:
                     force[:, i] += stretches[:, axis] * self._held(S[axis], time)
-                slope[:, i, i] += _BRANCH_SLOPE * len(group) * self._mu * sum(self.moduli)
+                slope[:, i, i] += _BRANCH_SLOPE * len(group) * self.law.shear_modulus * sum(self.moduli)
         return force, slope
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpbrain.kernels.powers import expm1_ratio, power_minus_one, power_quotient
 from warpbrain.kernels.precision import Precision
+from warpbrain.physics.laws.ogden import expm1_ratio, power_minus_one, power_quotient
 
 ALPHAS = (-20.0, -11.92, -4.7, -2.0, -1.0, 1.0, 2.0, 8.0, 25.0)
 DELTAS = (0.0, 1e-14, 1e-12, 1e-10, 1e-8, 1e-4, 1e-2, 0.3, -1e-10, -0.3)
