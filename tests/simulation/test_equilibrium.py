@@ -286,6 +286,16 @@ def test_a_crushed_body_says_so(device: str) -> None:
     assert system.energy()[1] == system.energy()[1]  # the system can still be used
 
 
+def test_a_start_without_end_is_told_and_warns_of_nothing(device: str, recwarn: pytest.WarningsRecorder) -> None:
+    system = System(pushed(BRAIN, 0.01), device)
+    far = np.zeros(system.model.mesh.points.shape)
+    # stretched as far as numbers go whose square is not one
+    far[:, 2] = 1e170 * system.model.mesh.points[:, 2]
+    with pytest.raises(SolveError, match="the out-of-balance force is not finite"):
+        EquilibriumSolver(system).solve(start=far)
+    assert not recwarn.list
+
+
 def dead_tractions(material: Material, tractions: tuple[float, float, float]) -> Model:
     """The unit cube under uniform dead tractions [Pa], held on its three planes of symmetry: uniform states."""
     n = 2

@@ -393,8 +393,10 @@ class EquilibriumSolver:
                 system.gather_forces()
             internal = system.internal.numpy().astype(np.float64)
             r = self._free * (external - internal)
-            scale = float(np.linalg.norm(internal) + np.linalg.norm(external))
-            norm = float(np.linalg.norm(r))
+            # far from any equilibrium a norm is infinite, which ends this
+            with np.errstate(over="ignore"):
+                scale = float(np.linalg.norm(internal) + np.linalg.norm(external))
+                norm = float(np.linalg.norm(r))
             # converged when norm <= tolerance * scale + noise; what has grown has larger faces for the same stress
             noise = self._noise * float(system.growth_stretches.max()) ** 2
             relative = norm / (scale + noise / self.tolerance)
