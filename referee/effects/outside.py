@@ -98,6 +98,8 @@ class Wire(Effect):
     unit: ClassVar[str] = "N"
     limits: ClassVar[tuple[float, float]] = (0.005, 2.0)
     forces: ClassVar[bool] = True
+    #: Each end is a force on a patch of the surface, as that of a tether is.
+    also: ClassVar[tuple[str, ...]] = ("traction",)
 
     centre: Place
     other: Place
