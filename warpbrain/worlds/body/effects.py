@@ -260,7 +260,11 @@ class Effects:
 
         if not mechanisms:
             return np.zeros((len(self.at.sensors), 0))
-        sums = identity(len(mechanisms), format="csr") if weights is None else block_diag(weights, format="csr")
+        sums = (
+            identity(len(mechanisms), format="csr")
+            if weights is None
+            else block_diag([each for each in weights if each.size], format="csr")
+        )
         total = self._added(mechanisms, present, sums)
         if present is None:
             for kind, replaced in self._exclusive.items():
