@@ -163,9 +163,10 @@ class PressureTerm(TriangleTerm):
         return 0.5 * (stiffness - stiffness.T)
 
 
-def _apart(stencils: Ints, nodes: Ints) -> list[Ints]:
+def _apart(stencils: Ints, nodes: NDArray[np.integer]) -> list[NDArray[np.integer]]:
     """Nodes (m,) in groups of which no two are of one stencil (k, s)."""
-    groups, left = [], nodes
+    groups: list[NDArray[np.integer]] = []
+    left = nodes
     while len(left):
         chosen: list[int] = []
         taken = np.zeros(len(stencils), dtype=bool)
@@ -174,6 +175,6 @@ def _apart(stencils: Ints, nodes: Ints) -> list[Ints]:
             if not (of_node & taken).any():
                 taken |= of_node
                 chosen.append(node)
-        groups.append(np.array(chosen))
+        groups.append(np.array(chosen, dtype=nodes.dtype))
         left = np.setdiff1d(left, chosen)
     return groups

@@ -29,8 +29,8 @@ from warpbrain.threads import fill_columns
 
 #: Matrices of the size of the dense one for which there has to be memory, and columns that are solved together.
 _MATRICES, _TOGETHER_ON_GPU = 3, 2048
-#: Columns that are solved together at most: more take longer each.
-_TOGETHER = 32
+#: Columns that are solved together at most on a host, where more take longer each, and beside a skew part on a GPU.
+_TOGETHER, _BESIDE_SKEW = 32, 256
 
 
 class DenseFactors:
@@ -185,9 +185,14 @@ class Factors:
                 solution -= skew.correction(solution, transposed)
             return solution if left is None else left @ solution
 
-        # as large as each other, whatever the number of threads
         count = max(columns.shape[1], 1)
-        fill_columns(result, solved, -(-count // -(-count // _TOGETHER)))
+        if isinstance(factors, DenseFactors):
+            for first in range(0, count, _BESIDE_SKEW):
+                part = slice(first, first + _BESIDE_SKEW)
+                result[:, part] = solved(part)
+        else:
+            # as large as each other, whatever the number of threads
+            fill_columns(result, solved, -(-count // -(-count // _TOGETHER)))
         return result
 
 
