@@ -8,8 +8,14 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import PointRows, columns_of_inflation, with_gross_errors
-from warpbrain.inference.noise import Outliers
+from warpbrain.inference.gross_errors import (
+    PointNoise,
+    PointRows,
+    columns_of_inflation,
+    log_densities_of,
+    with_gross_errors,
+)
+from warpbrain.inference.noise import Outliers, outliers
 
 PRIOR = Outliers(0.03, 15.0)
 #: Two kinds of gross errors.
@@ -129,6 +135,18 @@ def test_begun_with_gross_errors_of_a_similar_hypothesis_it_ends_at_the_same(pri
     residual[POINTS[1]] += 40.0 * random.normal(size=3)
     cold = with_gross_errors(one, residual, POINTS, prior)
     for sound in (cold.inflation, np.where(np.arange(6) == 3, prior.inflation, 1.0)):
-        warm = PointRows(one, residual, POINTS).with_gross_errors(prior, sound)
+        warm = PointRows(one, residual, PointNoise(one, POINTS)).with_gross_errors(prior, sound)
         np.testing.assert_array_equal(warm.inflation, cold.inflation)
         assert warm.log_density == pytest.approx(cold.log_density, abs=1e-9)
+
+
+def test_several_causes_are_weighed_as_each_by_itself() -> None:
+    random = np.random.default_rng(12)
+    one = model(random)
+    residual = one.draws(1, random)[:, 0]
+    residual[POINTS[1]] += 40.0 * random.normal(size=3)
+    tried = [(random.normal(size=18), random.normal(size=(18, count))) for count in (1, 3)]
+    found = log_densities_of(one, residual, POINTS, tried)
+    for (mean, columns), log_density in zip(tried, found, strict=True):
+        alone = with_gross_errors(one.with_columns(columns), residual - mean, POINTS, outliers())
+        assert log_density == pytest.approx(alone.log_density, rel=1e-9)

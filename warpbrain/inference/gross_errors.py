@@ -30,11 +30,14 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.noise import Outliers, outliers, scales
+from warpbrain.threads import in_threads
 
 #: Passes over the points at most.
 _SWEEPS = 10
 #: The sum over scales ends where a term is below this part of the largest.
 _NEGLIGIBLE = 1e-3
+#: Rows for which there is room when some are added.
+_ROOM = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,47 +53,57 @@ class GrossErrors:
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Points with equally many rows: numbers (g,), rows (g, d), noise (g, d, d), and `P_ii` if all are sound."""
+    """Points with equally many rows: numbers (g,), rows (d, g), and noise (d, d, g)."""
 
     numbers: Ints
     rows: Ints
     noise: Floats
-    precision: Floats
+
+
+class PointNoise:
+    """Noise of recorded points by themselves: the same for all hypotheses, and at all scales but for a factor.
+
+    `model`: of that noise. `points`: rows of each point; rows of none are never gross errors.
+    """
+
+    def __init__(self, model: GaussianModel, points: Sequence[Ints]) -> None:
+        self.points = points
+        sizes = np.array([len(rows) for rows in points], dtype=np.int64)
+        self.groups = []
+        #: Of each point the inverse (d, d) of its noise, and the logarithm of its determinant.
+        self.inverse: dict[int, tuple[Floats, float]] = {}
+        for size in np.unique(sizes).tolist():
+            numbers = np.flatnonzero(sizes == size)
+            rows = np.array([points[number] for number in numbers.tolist()])
+            noise = model.noise_blocks(rows) / model.scale**2
+            self.groups.append(_Group(numbers, np.ascontiguousarray(rows.T), _points_last(noise)))
+            logs = np.linalg.slogdet(noise)[1].tolist()
+            self.inverse |= zip(numbers.tolist(), zip(np.linalg.inv(noise), logs, strict=True), strict=True)
 
 
 class PointRows:
     """Rows of recorded points under a model: what hypotheses with further columns have in common.
 
     `residual` (n,): less what is expected of the causes.
-    `points`: rows of each point; rows of none are never gross errors.
+    `noise`: of its points.
     `weighted` (n,): `S^-1 r`, if it is known.
     """
 
     def __init__(
-        self, model: GaussianModel, residual: Floats, points: Sequence[Ints], weighted: Floats | None = None
+        self, model: GaussianModel, residual: Floats, noise: PointNoise, weighted: Floats | None = None
     ) -> None:
-        self.model, self.points, self.residual = model, points, residual
+        self.model, self.noise, self.residual = model, noise, residual
         self.weighted = model.precision_times(residual) if weighted is None else weighted
         self.log_density = model.log_density_of(residual, self.weighted)
-        sizes = np.array([len(rows) for rows in points], dtype=np.int64)
-        self.groups = []
-        for size in np.unique(sizes).tolist():
-            numbers = np.flatnonzero(sizes == size)
-            rows = np.array([points[number] for number in numbers.tolist()])
-            self.groups.append(_Group(numbers, rows, model.noise_blocks(rows), model.precision_blocks(rows)))
-        #: Of each point the inverse (d, d) of its noise, and the logarithm of its determinant.
-        self.noise: dict[int, tuple[Floats, float]] = {}
-        for group in self.groups:
-            logs = np.linalg.slogdet(group.noise)[1].tolist()
-            self.noise |= zip(group.numbers.tolist(), zip(np.linalg.inv(group.noise), logs, strict=True), strict=True)
+        #: Of each group of points `P_ii` (d, d, g) if all are sound.
+        self.precisions = [_points_last(model.precision_blocks(group.rows.T)) for group in noise.groups]
 
-    def less(self, mean: Floats) -> PointRows:
-        """The same less a change (n,) of the rows."""
+    def less(self, mean: Floats, weighted: Floats) -> PointRows:
+        """The same less a change (n,) of the rows, of which `S^-1` times it (n,) is known."""
         if not mean.any():
             return self
         other = copy.copy(self)
-        other.residual = self.residual - mean
-        other.weighted = self.model.precision_times(other.residual)
+        other.residual, other.weighted = self.residual - mean, self.weighted - weighted
         other.log_density = self.model.log_density_of(other.residual, other.weighted)
         return other
 
@@ -112,7 +125,7 @@ class PointRows:
         if start is not None and (start > 1.0).any():
             search.begin_with(np.searchsorted(prior.inflations, start))
         log_prior = prior.log_probabilities
-        numbers = np.arange(len(self.points))
+        numbers = np.arange(len(self.noise.points))
         # the point whose odds change sides the most goes first
         for _ in range(_SWEEPS * max(len(numbers), 1)):
             logs = search.log_ratios() + log_prior
@@ -139,17 +152,39 @@ class FurtherColumns:
         values, vectors = np.linalg.eigh(columns.T @ weighted)
         #: `l` (k,) and `D^T` (k, n).
         self.values, self.dual = np.maximum(values, 0.0), vectors.T @ weighted.T
-        #: Of each group of points with the rows (g, d), products of each two rows of `D`: (k, g d^2).
+        #: Of each group of points with the rows (d, g), products of each two rows of `D`: (k, d^2 g).
         self.products = []
-        for group in rows.groups:
+        for group in rows.noise.groups:
             of_points = self.dual[:, group.rows]
-            pairs = of_points[..., :, None] * of_points[..., None, :]
-            self.products.append(pairs.reshape(len(self.dual), group.rows.size * group.rows.shape[1]))
+            pairs = of_points[:, :, None] * of_points[:, None]
+            self.products.append(pairs.reshape(len(self.dual), group.rows.size * len(group.rows)))
 
 
 def with_gross_errors(model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> GrossErrors:
     """Density of rows where some points may be gross errors: `PointRows`, with the causes among the columns."""
-    return PointRows(model, residual, points).with_gross_errors(prior)
+    return PointRows(model, residual, PointNoise(model, points)).with_gross_errors(prior)
+
+
+def log_densities_of(
+    model: GaussianModel, residual: Floats, points: Sequence[Ints], tried: Sequence[tuple[Floats, Floats]]
+) -> Floats:
+    """Log density (k,) of rows under each of several causes, with gross errors of its own.
+
+    `model`: of the rows without any of them. `residual` (n,). `points`: rows of each point. `tried`: mean (n,) and
+    columns (n, j) of each.
+    """
+    rows, prior = PointRows(model, residual, PointNoise(model, points)), outliers()
+    # one pass over the inverse for all
+    weighted = model.precision_times(np.column_stack([np.column_stack(each) for each in tried]))
+    first = np.cumsum([0, *(1 + columns.shape[1] for _, columns in tried)]).tolist()
+
+    def log_density(number: int) -> float:
+        (mean, columns), at = tried[number], first[number]
+        less = rows.less(mean, weighted[:, at])
+        further = FurtherColumns(less, columns, weighted[:, at + 1 : first[number + 1]])
+        return less.with_gross_errors(prior, further=further).log_density
+
+    return np.array(in_threads(log_density, range(len(tried))))
 
 
 def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation: Floats) -> Floats:
@@ -172,26 +207,36 @@ class _Search:
     """
 
     def __init__(self, rows: PointRows, prior: Outliers, further: FurtherColumns | None, length: float) -> None:
-        self.kinds = np.zeros(len(rows.points), dtype=np.int64)
+        self.kinds = np.zeros(len(rows.noise.points), dtype=np.int64)
         self._rows = rows
         # variance with each inflation, in units of that of a sound point
         self._variances = prior.inflations**2
-        self._Y = rows.model.low_rank
+        # rows of `Y`, and of `Z` after these: one product with all of them, and room for more
+        self._low_rank, self._count = rows.model.low_rank, len(rows.model.low_rank)
         self.weighted, self.log_density = rows.weighted, rows.log_density
-        self._precisions = [group.precision for group in rows.groups]
+        self._precisions = rows.precisions
         if further is not None:
             self._add_columns(further, length)
-        self._sound = self.weighted, self.log_density, self._precisions
-        self.begin_with(self.kinds)
+        self._sound = self.weighted, self.log_density, self._precisions, self._count
 
     def _add_columns(self, further: FurtherColumns, length: float) -> None:
         lengthened = 1.0 + length**2 * further.values
         weights, projected = length**2 / lengthened, further.dual @ self._rows.residual
-        self._Y = np.concatenate([self._Y, further.dual * np.sqrt(weights)[:, None]])
+        self._append(further.dual * np.sqrt(weights)[:, None])
         self.weighted = self.weighted - (weights * projected) @ further.dual
         self.log_density += 0.5 * float(weights @ projected**2) - 0.5 * float(np.log(lengthened).sum())
         pairs = zip(self._precisions, further.products, strict=True)
         self._precisions = [P - (weights @ products).reshape(P.shape) for P, products in pairs]
+
+    def _append(self, added: Floats) -> None:
+        """Add rows (k, n) to the low rank; what others may read is copied before it is written to."""
+        end = self._count + len(added)
+        if end > len(self._low_rank) or self._low_rank is self._rows.model.low_rank:
+            larger = np.empty((end + _ROOM, added.shape[1]))
+            larger[: self._count] = self._low_rank[: self._count]
+            self._low_rank = larger
+        self._low_rank[self._count : end] = added
+        self._count = end
 
     def change(self, number: int, kind: int) -> None:
         """Give a point another inflation."""
@@ -204,70 +249,79 @@ class _Search:
     def begin_with(self, kinds: Ints) -> None:
         """Give all points their inflations at once."""
         self.kinds = kinds.copy()
-        weighted, self.log_density, precisions = self._sound
-        self.weighted, self._precisions = weighted.copy(), [precision.copy() for precision in precisions]
-        self._Z = np.zeros((0, len(weighted)))
+        self.weighted, self.log_density, self._precisions, self._count = self._sound
         self._inflate(np.flatnonzero(kinds).tolist())
 
     def _inflate(self, numbers: Sequence[int], before: int = 0) -> None:
         """Add the rows of points, of a lesser inflation before, to `Z`, and what follows to inverse and log density."""
+        # NumPy's own take ten times as long for a point
+        from scipy.linalg.lapack import dpotrf, dtrtri
+
         if not numbers:
             return
-        points, noise = self._rows.points, self._rows.noise
-        R = np.concatenate([points[number] for number in numbers])
-        columns = self._rows.model.noise_precision(R)
-        for low_rank in (self._Y, self._Z):
-            columns -= low_rank[:, R].T @ low_rank
+        noise, model = self._rows.noise, self._rows.model
+        R = np.concatenate([noise.points[number] for number in numbers])
+        low_rank = self._low_rank[: self._count]
+        columns = model.noise_precision(R) - low_rank[:, R].T @ low_rank
         inner, at, log_determinant = columns[:, R], 0, 0.0
         for number in numbers:
-            part = slice(at, at := at + len(points[number]))
-            increase = float(self._variances[self.kinds[number]] - self._variances[before])
-            inverse, log_of_noise = noise[number]
+            part = slice(at, at := at + len(noise.points[number]))
+            increase = float(self._variances[self.kinds[number]] - self._variances[before]) * model.scale**2
+            inverse, log_of_noise = noise.inverse[number]
             inner[part, part] += inverse / increase
             log_determinant += log_of_noise + len(inverse) * math.log(increase)
-        factor = np.linalg.cholesky(inner)
-        whiten = np.linalg.inv(factor)
+        factor, failed = dpotrf(inner, lower=1)
+        if failed:
+            raise np.linalg.LinAlgError("the covariance without points is not positive definite")
+        whiten = dtrtri(factor, lower=1)[0]
         added, residual = whiten @ columns, whiten @ self.weighted[R]
-        self._Z = np.concatenate([self._Z, added])
-        self.weighted -= residual @ added
-        for group, precision in zip(self._rows.groups, self._precisions, strict=True):
+        self._append(added)
+        self.weighted = self.weighted - residual @ added
+        less = []
+        for group, precision in zip(noise.groups, self._precisions, strict=True):
             of_points = added[:, group.rows]
-            precision -= np.einsum("kgi,kgj->gij", of_points, of_points)
+            less.append(precision - np.einsum("kig,kjg->ijg", of_points, of_points))
+        self._precisions = less
         log_determinant += 2.0 * float(np.log(np.diag(factor)).sum())
         self.log_density += 0.5 * float(residual @ residual) - 0.5 * log_determinant
 
     def log_ratios(self) -> Floats:
         """Log density (g, k) with every inflation of each point, less that with its current one."""
         logs = np.empty((len(self.kinds), len(self._variances)))
-        for group, precision in zip(self._rows.groups, self._precisions, strict=True):
+        for group, precision in zip(self._rows.noise.groups, self._precisions, strict=True):
             # of each point's variance (g, k) in units of its noise
             changes = self._variances - self._variances[self.kinds[group.numbers]][:, None]
+            changes *= self._rows.model.scale**2
             v, noise = self.weighted[group.rows], group.noise
-            inner = np.eye(v.shape[1]) + changes[:, :, None, None] * (noise @ precision)[:, None]
-            right = changes[:, :, None] * np.einsum("gij,gj->gi", noise, v)[:, None]
-            solved, determinant = _solved(inner, right)
-            logs[group.numbers] = 0.5 * (np.einsum("gi,gki->gk", v, solved) - np.log(determinant))
+            A, w = np.einsum("ikg,kjg->ijg", noise, precision), np.einsum("ijg,jg->ig", noise, v)
+            inner = changes * A[..., None] + np.eye(len(A))[:, :, None, None]
+            solved, determinant = _solved(inner, changes * w[..., None])
+            logs[group.numbers] = 0.5 * (np.einsum("ig,igk->gk", v, solved) - np.log(determinant))
         return logs
 
 
+def _points_last(blocks: Floats) -> Floats:
+    """Blocks (g, d, d) as (d, d, g): of thousands of them each component is one array."""
+    return np.ascontiguousarray(blocks.transpose(1, 2, 0))
+
+
 def _solved(A: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Solutions (..., d) and determinants (...) of many small systems (..., d, d); of three rows by Cramer's rule."""
-    if A.shape[-1] == 1:
-        return b / A[..., 0], A[..., 0, 0]
-    if A.shape[-1] != 3:
-        solution = np.asarray(np.linalg.solve(A, b[..., None])[..., 0], dtype=np.float64)
-        return solution, np.asarray(np.linalg.det(A), dtype=np.float64)
-    first, second, third = ([A[..., i, j] for j in range(3)] for i in range(3))
-    of_first, of_second, of_third = _cross(second, third), _cross(third, first), _cross(first, second)
-    determinant = first[0] * of_first[0] + first[1] * of_first[1] + first[2] * of_first[2]
+    """Solutions (d, ...) and determinants (...) of many small systems (d, d, ...); of three rows by Cramer's rule."""
+    if len(A) == 1:
+        return b / A[0], A[0, 0]
+    if len(A) != 3:
+        systems, right = np.moveaxis(A, (0, 1), (-2, -1)), np.moveaxis(b, 0, -1)[..., None]
+        solution = np.moveaxis(np.linalg.solve(systems, right)[..., 0], -1, 0)
+        return np.asarray(solution), np.asarray(np.linalg.det(systems), dtype=np.float64)
+    of_first, of_second, of_third = _cross(A[1], A[2]), _cross(A[2], A[0]), _cross(A[0], A[1])
+    determinant = A[0, 0] * of_first[0] + A[0, 1] * of_first[1] + A[0, 2] * of_first[2]
     solution = np.empty(b.shape)
     for j in range(3):
-        numerator = b[..., 0] * of_first[j] + b[..., 1] * of_second[j] + b[..., 2] * of_third[j]
-        solution[..., j] = numerator / determinant
+        solution[j] = (b[0] * of_first[j] + b[1] * of_second[j] + b[2] * of_third[j]) / determinant
     return solution, determinant
 
 
-def _cross(a: Sequence[Floats], b: Sequence[Floats]) -> tuple[Floats, Floats, Floats]:
+def _cross(a: Floats, b: Floats) -> tuple[Floats, Floats, Floats]:
     """Vector product of components; NumPy's own takes several times as long for small arrays."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
@@ -324,10 +378,10 @@ class RowsAtScales:
     def __init__(
         self, model: GaussianModel, residual: Floats, points: Sequence[Ints], further: Floats | None = None
     ) -> None:
-        self._model, self._residual, self._points = model, residual, points
+        self._model, self._residual, self._noise = model, residual, PointNoise(model, points)
         self._further = np.zeros((len(residual), 0)) if further is None else further
         self._values, self._log_prior = scales()
-        self._weighted = [model.precision_at(rows) for rows in (residual, self._further)]
+        self._weighted = model.precision_at(np.column_stack([residual, self._further]))
         self._at: dict[float, tuple[PointRows, FurtherColumns]] = {}
 
     def summed(self, length: float = 1.0, scale: float = 1.0, inflation: Floats | None = None) -> Summed:
@@ -353,9 +407,9 @@ class RowsAtScales:
     def with_gross_errors(self, scale: float, length: float = 1.0, start: Floats | None = None) -> GrossErrors:
         """Density at one scale of the noise, with the further columns multiplied by `length`."""
         if scale not in self._at:
-            weighted, of_further = (times(scale) for times in self._weighted)
-            rows = PointRows(self._model.with_scale(scale), self._residual, self._points, weighted)
-            self._at[scale] = rows, FurtherColumns(rows, self._further, of_further)
+            weighted = self._weighted(scale)
+            rows = PointRows(self._model.with_scale(scale), self._residual, self._noise, weighted[:, 0])
+            self._at[scale] = rows, FurtherColumns(rows, self._further, weighted[:, 1:])
         rows, further = self._at[scale]
         return rows.with_gross_errors(outliers(), start, further, length)
 

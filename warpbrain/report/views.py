@@ -223,8 +223,11 @@ def draw_part(axes: Any, section: Cut, part: Bools, **style: Any) -> None:
     from matplotlib.path import Path as Shape
 
     if part.any():
-        chosen = [Shape(in_view(p), closed=False) for p, here in zip(section.polygons, part, strict=True) if here]
-        axes.add_artist(PathPatch(Shape.make_compound_path(*chosen), **style))
+        chosen = [polygon for polygon, here in zip(section.polygons, part, strict=True) if here]
+        corners = np.cumsum([0, *map(len, chosen)])
+        codes = np.full(corners[-1], Shape.LINETO)
+        codes[corners[:-1]] = Shape.MOVETO
+        axes.add_artist(PathPatch(Shape(in_view(np.concatenate(chosen)), codes), **style))
 
 
 def draw_hatching(axes: Any, section: Cut, mesh: TetMesh, nodes: Any, hatch: str, colour: str) -> None:

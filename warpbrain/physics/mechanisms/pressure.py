@@ -134,22 +134,47 @@ class PressureTerm(TriangleTerm):
         self._rim = np.unique(rim)
 
     def skew_stiffness(self, u: Floats) -> Any:
-        """See `Term`: of the nodes of the rim alone. Forces are quadratic in `u`, so that differences are exact."""
+        """See `Term`: of the nodes of the rim alone. Forces are quadratic in `u`, so that differences are exact.
+
+        Nodes of which no two are of one triangle are moved together.
+        """
         from scipy.sparse import coo_matrix
 
-        components = (3 * self._rim[:, None] + np.arange(3)).ravel()
         step = float(np.ptp(self.body.mesh.points, axis=0).max())
-        columns = []
-        for component in components.tolist():
-            sides = []
-            for sign in (1.0, -1.0):
-                moved = u.copy()
-                moved.ravel()[component] += sign * step
-                self.evaluate_forces(self.array(moved, self.body.precision.vec3))
-                forces = np.zeros(u.shape)
-                np.add.at(forces, self.stencils, self.forces.numpy())
-                sides.append(forces.ravel()[components])
-            columns.append((sides[0] - sides[1]) / (2.0 * step))
-        skew = 0.5 * (np.column_stack(columns) - np.array(columns))
-        rows, others = np.meshgrid(components, components, indexing="ij")
-        return coo_matrix((skew.ravel(), (rows.ravel(), others.ravel())), shape=(u.size, u.size)).tocsr()
+        stencils, on_rim = np.asarray(self.stencils), np.isin(self.stencils, self._rim)
+        rows, columns, values = [], [], []
+        for nodes in _apart(stencils, self._rim):
+            triangles, corner = np.nonzero(np.isin(stencils, nodes))
+            # components of the nodes of each of these triangles that are of the rim
+            some, other = np.nonzero(on_rim[triangles])
+            of_forces = (3 * stencils[triangles[some], other][:, None] + np.arange(3)).ravel()
+            for axis in range(3):
+                sides = []
+                for sign in (1.0, -1.0):
+                    moved = u.copy()
+                    moved[nodes, axis] += sign * step
+                    self.evaluate_forces(self.array(moved, self.body.precision.vec3))
+                    sides.append(self.forces.numpy()[triangles[some], other].ravel())
+                rows.append(of_forces)
+                columns.append(np.repeat(3 * stencils[triangles[some], corner[some]] + axis, 3))
+                values.append((sides[0] - sides[1]) / (2.0 * step))
+        indices = (np.concatenate(rows), np.concatenate(columns))
+        stiffness = coo_matrix((np.concatenate(values), indices), shape=(u.size, u.size)).tocsr()
+        return 0.5 * (stiffness - stiffness.T)
+
+
+def _apart(stencils: Ints, nodes: NDArray[np.integer]) -> list[NDArray[np.integer]]:
+    """Nodes (m,) in groups of which no two are of one stencil (k, s)."""
+    groups: list[NDArray[np.integer]] = []
+    left = nodes
+    while len(left):
+        chosen: list[int] = []
+        taken = np.zeros(len(stencils), dtype=bool)
+        for node in left.tolist():
+            of_node = (stencils == node).any(axis=1)
+            if not (of_node & taken).any():
+                taken |= of_node
+                chosen.append(node)
+        groups.append(np.array(chosen, dtype=nodes.dtype))
+        left = np.setdiff1d(left, chosen)
+    return groups

@@ -135,10 +135,13 @@ class Effects:
         """The same over other sensors at the same state."""
         return Effects(at, self._switches, self.mesh_errors)
 
-    def of(self, proposals: Sequence[Proposal], present: Mechanism | None = None) -> list[Effect]:
+    def of(
+        self, proposals: Sequence[Proposal], present: Mechanism | None = None, columns_alone: bool = False
+    ) -> list[Effect]:
         """Columns of each proposal, with what they have in common computed once.
 
-        `present`: mechanism of that kind that acts at the state already.
+        `present`: mechanism of that kind that acts at the state already. `columns_alone`: means are not asked for; what
+        smooth proposals do at their start is taken for nothing.
         """
         bases = [proposal if proposal.over_time is None else proposal.over_time.base for proposal in proposals]
         # of each state: effects there, its rows among all, with which sign, and their times
@@ -148,7 +151,7 @@ class Effects:
             parts.append((here, moment.rows, moment.sign, np.full(len(moment.rows), moment.time)))
         parts = parts or [(self, slice(None), 1.0, self.at.sensors.times)]
         each_once = list({id(base): base for base in bases}.values())
-        by_part = [(here._at_one_time(each_once, present), *where) for here, *where in parts]
+        by_part = [(here._at_one_time(each_once, present, columns_alone), *where) for here, *where in parts]
         return [
             self._over_time(proposal, [(effects[id(base)], *where) for effects, *where in by_part])
             for proposal, base in zip(proposals, bases, strict=True)
@@ -179,19 +182,22 @@ class Effects:
 
         return Effect(proposal, total(lambda e: e.mean), total(lambda e: e.columns, True), columns_at)
 
-    def _at_one_time(self, proposals: Sequence[Proposal], present: Mechanism | None) -> dict[int, Effect]:
+    def _at_one_time(
+        self, proposals: Sequence[Proposal], present: Mechanism | None, columns_alone: bool
+    ) -> dict[int, Effect]:
         """Effects at one state by the identity of their proposals."""
         flows = _started([proposal for proposal in proposals if proposal.pace is not None])
         terms = {key: bound_term(self.at.system, cast(Following, flow)) for key, flow in flows.items()}
         courses = {key: consolidation(self.at, term) for key, term in terms.items()}
         fading = _started([proposal for proposal in proposals if proposal.history is not None])
         instant = dict(zip(fading, self._answers(list(fading.values()), present).T, strict=True))
-        stencils = [self._stencil(proposal) for proposal in proposals]
-        answers = self._answers([mechanism for mechanisms in stencils for mechanism in mechanisms], present)
+        stencils = [self._stencil(proposal, columns_alone) for proposal in proposals]
+        mechanisms = [mechanism for each, _ in stencils for mechanism in each]
+        answers = self._answers(mechanisms, present, [weights for _, weights in stencils])
         effects, first = [], 0
-        for proposal, mechanisms in zip(proposals, stencils, strict=True):
-            columns = answers[:, first : first + len(mechanisms)]
-            first += len(mechanisms)
+        for proposal, (_, weights) in zip(proposals, stencils, strict=True):
+            columns = answers[:, first : first + weights.shape[1]]
+            first += weights.shape[1]
             if proposal.pace is not None:
                 effects.append(_effect_of_course(proposal, courses[repr(proposal.make(proposal.start))]))
             elif proposal.history is not None:
@@ -211,15 +217,22 @@ class Effects:
         return Effect(proposal, change(proposal.mean), np.column_stack(columns))
 
     @staticmethod
-    def _stencil(proposal: Proposal) -> list[Mechanism]:
-        """Mechanisms whose effects give the columns, as differences if the proposal is smooth."""
+    def _stencil(proposal: Proposal, columns_alone: bool) -> tuple[list[Mechanism], Floats]:
+        """Mechanisms (s,), and with which weights (s, c) their effects give the answers of `_effect`.
+
+        Of what is smooth they are differences, taken before an equilibrium is found for any of them.
+        """
         if proposal.is_there_or_not or proposal.changes_in_time:
-            return []
+            return [], np.zeros((0, 0))
         axes = np.diag(proposal.sd)
         if proposal.follows == "proportional":
-            return [proposal.make(axis) for axis in axes]
+            return [proposal.make(axis) for axis in axes], np.eye(len(axes))
+        at_start = [] if columns_alone else [proposal.make(proposal.start)]
         shifted = [proposal.make(proposal.start + sign * _STEP * axis) for axis in axes for sign in (-1.0, 1.0)]
-        return [proposal.make(proposal.start), *shifted]
+        weights = np.zeros((len(at_start) + len(shifted), 1 + len(axes)))
+        weights[: len(at_start), 0] = 1.0
+        weights[len(at_start) :, 1:] = np.kron(np.eye(len(axes)), [[-1.0], [1.0]]) / (2.0 * _STEP)
+        return [*at_start, *shifted], weights
 
     def _effect(self, proposal: Proposal, answers: Floats) -> Effect:
         if proposal.is_there_or_not:
@@ -232,22 +245,36 @@ class Effects:
             return Effect(proposal, proposal.mean[0] * answer, proposal.sd[0] * answer[:, None])
         if proposal.follows == "proportional":
             return Effect(proposal, answers @ (proposal.mean / proposal.sd), answers)
-        columns = (answers[:, 2::2] - answers[:, 1::2]) / (2.0 * _STEP)
+        columns = answers[:, 1:]
         offset = (proposal.mean - proposal.start) / proposal.sd
         return Effect(proposal, answers[:, 0] + columns @ offset, columns)
 
-    def _answers(self, mechanisms: Sequence[Mechanism], present: Mechanism | None) -> Floats:
-        """Effect of each mechanism (n, count), in the place of the case's own one where it has only one of the kind."""
-        total = self._added(mechanisms, present)
+    def _answers(
+        self, mechanisms: Sequence[Mechanism], present: Mechanism | None, weights: Sequence[Floats] | None = None
+    ) -> Floats:
+        """Effect of each mechanism (n, count), in the place of the case's own one where it has only one of the kind.
+
+        `weights`: of each run of mechanisms (s, c), in their order: sums (n, c) of their effects instead.
+        """
+        from scipy.sparse import block_diag, identity
+
+        if not mechanisms:
+            return np.zeros((len(self.at.sensors), 0))
+        sums = (
+            identity(len(mechanisms), format="csr")
+            if weights is None
+            else block_diag([each for each in weights if each.size], format="csr")
+        )
+        total = self._added(mechanisms, present, sums)
         if present is None:
             for kind, replaced in self._exclusive.items():
-                of_kind = [mechanism.kind == kind for mechanism in mechanisms]
-                if any(of_kind):
-                    total[:, of_kind] -= self._added([replaced], None)
+                of_kind = np.array([float(mechanism.kind == kind) for mechanism in mechanisms])
+                if of_kind.any():
+                    total -= self._added([replaced], None, identity(1, format="csr")) * (of_kind @ sums)
         return total
 
-    def _added(self, mechanisms: Sequence[Any], present: Mechanism | None) -> Floats:
-        """Effect of each mechanism (n, count) in addition to all that act."""
+    def _added(self, mechanisms: Sequence[Any], present: Mechanism | None, sums: Any) -> Floats:
+        """Sums (n, c), with weights (count, c), of the effects of mechanisms in addition to all that act."""
         at, system = self.at, self.at.system
         mesh = system.model.mesh
         present_stiffness = present.stiffness_factor(mesh, 1.0) if isinstance(present, Weakening) else 1.0
@@ -258,17 +285,20 @@ class Effects:
             (k, m.stiffness_factor(mesh, m.factor()) / present_stiffness - 1.0) for k, m, f in each if Weakening in f
         )
         growth = ((k, (1.0 + m.growth(mesh, m.factor())) / present_volume - 1.0) for k, m, f in each if Growing in f)
-        total = np.zeros((len(at.sensors), len(mechanisms)))
-        pushing, matrix = sparse_columns(3 * system.size, forces)
+        total = np.zeros((len(at.sensors), sums.shape[1]))
         self._of_other_laws.clear()
-        if pushing:
-            total[:, pushing] += at.answers_of_columns(matrix)
-        for columns, forces_of in ((stiffness, "element_forces"), (growth, "growth_forces")):
-            numbers, weights = sparse_columns(system.elements, columns)
+        for columns, size, answers in (
+            (forces, 3 * system.size, at.answers_of_columns),
+            (stiffness, system.elements, lambda w: at.answers_of_elements(at.element_forces, w)),
+            (growth, system.elements, lambda w: at.answers_of_elements(at.growth_forces, w)),
+        ):
+            numbers, matrix = sparse_columns(size, columns)
             if numbers:
-                total[:, numbers] += at.answers_of_elements(getattr(at, forces_of), weights)
+                weighted = (matrix @ sums[numbers]).tocsc()
+                some = np.flatnonzero(np.diff(weighted.indptr))
+                total[:, some] += answers(weighted[:, some])
         if self.mesh_errors is not None and (volumes := self._volumes(mechanisms)).any():
-            total += expected_answer(at.sensors, self.mesh_errors.by_volume)[:, None] * volumes
+            total += expected_answer(at.sensors, self.mesh_errors.by_volume)[:, None] * (volumes @ sums)
         return total
 
     def _volumes(self, mechanisms: Sequence[Any]) -> Floats:

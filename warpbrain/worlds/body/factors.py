@@ -25,11 +25,12 @@ import numpy as np
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import SolveError
 from warpbrain.simulation.sparse_factors import SparseFactors
+from warpbrain.threads import fill_columns
 
 #: Matrices of the size of the dense one for which there has to be memory, and columns that are solved together.
 _MATRICES, _TOGETHER_ON_GPU = 3, 2048
-#: Columns that are solved together.
-_TOGETHER = 256
+#: Columns that are solved together at most on a host, where more take longer each, and beside a skew part on a GPU.
+_TOGETHER, _BESIDE_SKEW = 32, 256
 
 
 class DenseFactors:
@@ -175,13 +176,23 @@ class Factors:
         columns = columns.tocsc() if issparse(columns) else columns
         result = np.empty((rows, columns.shape[1]), order="F")
         assert self._factors is not None
-        for first in range(0, columns.shape[1], _TOGETHER):
-            part = slice(first, first + _TOGETHER)
+        factors, skew = self._factors, self._skew
+
+        def solved(part: slice) -> Any:
             block = columns[:, part].toarray() if issparse(columns) else columns[:, part]
-            solution = self._factors.solve(block)
-            if self._skew is not None:
-                solution -= self._skew.correction(solution, transposed)
-            result[:, part] = solution if left is None else left @ solution
+            solution = factors.solve(block)
+            if skew is not None:
+                solution -= skew.correction(solution, transposed)
+            return solution if left is None else left @ solution
+
+        count = max(columns.shape[1], 1)
+        if isinstance(factors, DenseFactors):
+            for first in range(0, count, _BESIDE_SKEW):
+                part = slice(first, first + _BESIDE_SKEW)
+                result[:, part] = solved(part)
+        else:
+            # as large as each other, whatever the number of threads
+            fill_columns(result, solved, -(-count // -(-count // _TOGETHER)))
         return result
 
 

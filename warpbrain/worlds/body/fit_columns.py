@@ -95,7 +95,7 @@ def columns_about(
             columns[:, part] = columns_over_time(at, effect.proposed, c, mesh_errors)
         elif not effect.proposed.is_there_or_not:
             there = {"mean": c} if effect.proposed.changes_in_time else {"follows": "smooth", "start": c}
-            about = made.of([replace(effect.proposed, **there)], effect.proposed.make(c))[0]
+            about = made.of([replace(effect.proposed, **there)], effect.proposed.make(c), columns_alone=True)[0]
             if not is_linear(about, at):
                 raise SolveError(f"{effect.proposed.region or 'it'}: its effect is not linear here")
             columns[:, part] = about.columns

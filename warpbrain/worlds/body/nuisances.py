@@ -166,7 +166,7 @@ def law_columns(effects: Effects, states: States) -> Floats:
             for of in ("second_invariant", "stiffening")
         ),
     ]
-    return np.concatenate([effect.columns for effect in effects.of(proposals)], axis=1)
+    return np.concatenate([effect.columns for effect in effects.of(proposals, columns_alone=True)], axis=1)
 
 
 class SharedParameter(NamedTuple):

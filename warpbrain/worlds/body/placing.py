@@ -22,11 +22,10 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.causes import Hypothesis, Member
-from warpbrain.inference.gross_errors import FurtherColumns, PointRows
-from warpbrain.inference.noise import outliers, scales
+from warpbrain.inference.gross_errors import log_densities_of
+from warpbrain.inference.noise import scales
 from warpbrain.mesh.quality import principal_axes
 from warpbrain.physics.proposal import Patch, Proposal
-from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses, scaled
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
@@ -59,15 +58,9 @@ def best_in_cell(
     `residual` (n,): less what is expected of all else.
     """
 
-    everywhere = PointRows(without, residual, base.points)
-
-    def log_density(tried: Effect) -> float:
-        rows = everywhere.less(tried.mean)
-        return rows.with_gross_errors(outliers(), further=FurtherColumns(rows, tried.columns)).log_density
-
     def logs_of(places: Sequence[Proposal]) -> tuple[list[Effect], Floats]:
         tried = [best, *(scaled(other, size) for other in _effects_of(effects, places))]
-        return tried, np.array(in_threads(log_density, tried))
+        return tried, log_densities_of(without, residual, base.points, [(each.mean, each.columns) for each in tried])
 
     best = effect
     tried, logs = logs_of(_cell(base, effect, spacing))
@@ -297,12 +290,8 @@ def with_refined_strain(base: Base, candidate: WeightedSet, causes: BodyCauses, 
     elsewhere = strains.at_centres(strains.centres[number] + _cube(base, 0.5 * spacing)[1:])
     tried = [columns, *(factor[:, None] * each for each in elsewhere)]
     without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
-    rows = PointRows(without, candidate.residual, base.points)
-
-    def log_density(each: Floats) -> float:
-        return rows.with_gross_errors(outliers(), further=FurtherColumns(rows, each)).log_density
-
-    logs = np.array(in_threads(log_density, tried))
+    nothing = np.zeros(len(candidate.residual))
+    logs = log_densities_of(without, candidate.residual, base.points, [(nothing, each) for each in tried])
     gain, log_share = _summed_over_cell(logs)
     moved = np.column_stack([others, tried[int(np.argmax(logs))]])
     moved, refined = evidence_of(base, moved, candidate.residual, candidate.marginal.scale, candidate.marginal.sizes)
