@@ -30,6 +30,7 @@ WRONG = {
     "no nodes": (('nodes = "top"\n', ""), r"\[boundary 2\] nodes: missing"),
     "no kind": (('kind = "fixed"\n', ""), r"\[boundary 1\] kind: missing"),
     "no total": (("\ntotal = [0.01, 0.02, -0.05]", ""), r"\[boundary 2\] total: missing"),
+    "no mass": ((FORCE, FORCE + "\nmass = 0.0"), r"\[boundary 2\] mass: "),
     "no axis": (
         ("[body]", GRAVITY + "csf_level = 1\n[body]"),
         r"\[case\] gravity_axis: missing, but \[\[mechanism\]\] gravity",

@@ -79,6 +79,7 @@ name = "weight"
 nodes = "upper edge of the tip"
 kind = "force"
 total = [0, 0, {force:.5f}]    # {grams:g} g
+mass = {mass:g}                   # kg, which swing with the tip
 """
 _RECORDING = """
 [[recording]]
@@ -156,7 +157,7 @@ def sag_of(releases: list[Release]) -> float:
 
 def write_beam(folder: Path, name: str, title: str, grams: float, recordings: dict[str, tuple[str, str]]) -> None:
     """`name.toml` and its tables: of each file the role and the table's text, by file."""
-    weight = _WEIGHT.format(force=-1e-3 * grams * GRAVITY, grams=grams) if grams else ""
+    weight = _WEIGHT.format(force=-1e-3 * grams * GRAVITY, grams=grams, mass=1e-3 * grams) if grams else ""
     source, accuracy = ", ".join(recordings), f"accuracy = {MU_ACCURACY}\n" if grams else ""
     text = _CASE.format(name=name, title=title, source=source, mu=MU, accuracy=accuracy, uneven=UNEVEN, weight=weight)
     for number, (file, (role, content)) in enumerate(recordings.items()):

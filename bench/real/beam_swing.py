@@ -1,67 +1,60 @@
-"""How the tip of the silicone beam swings about its rest and creeps: as recorded, and by the tool's stiffness and laws.
+"""How the silicone beam swings about its rest: as recorded, and by `warpbrain run --to-rest --time-step SECONDS`.
 
     python -m bench.real.beam_swing FOLDER     # the .c3d files; needs ezc3d
 
-The first mode about the state at rest, `K phi = w0^2 M phi`, moves as `warpbrain run --steps` moves it. Of branches of
-stress that relax (`viscoelasticity`, moduli `b_i` relative to that at rest, times `t_i`) its poles are the roots of
+Elements are `tet4-averaged`, the only ones that do not lock and can be viscoelastic, with the modulus with which they
+come to the rest of `tet10-mixed`. Two branches of stress that relaxes (`viscoelasticity`, moduli `b_i` relative to that
+at rest, times `t_i`) are fitted to the first release under the beam's own weight, by the poles of the first mode,
 
-    s^2 + w0^2 (1 + (beta + h) s + sum_i b_i s t_i / (1 + s t_i)) = 0
+    s^2 + w0^2 (1 + sum_i b_i s t_i / (1 + s t_i) + beta s (1 + sum_i b_i)) = 0
 
-`beta` = 1 ms is Rayleigh's damping, `h` = 1 ms to first order that of steps of backward Euler; the step changes the
-frequency by 0.1 %. Two branches are fitted to the first release under the beam's own weight, all else is
-predicted. `--to-rest` is the same motion with steps that double, which do not resolve a swing.
+`w0` of the elastic motion, `beta` = 1 ms Rayleigh's damping. Branches act in plain tetrahedra, which are stiffer: their
+moduli are divided by what the frequency of a first motion says. All else is predicted. With branches, which are of
+second order, poles of steps are not quite those of the body: they are extrapolated from two steps.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.sparse import diags
-from scipy.sparse.linalg import eigsh
 
-from bench.real.beam_cases import GRAVITY_FILES, WEIGHT_FILE
-from bench.real.beam_motion import GRAVITY, read_release
-from warpbrain.cases.boundary import Forced
+import warpbrain as wb
+from bench.real.beam_cases import GRAVITY_FILES, MU, WEIGHT_FILE
+from bench.real.beam_motion import read_release
+from warpbrain.cases.assuming import assume
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import BEAM, find_case
-from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.model import Damping
-from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
 
-#: Time step of a motion [s].
-STEP = 1e-3
+#: Of `--time-step` [s]: a thirtieth of the shorter period.
+STEP = 4e-3
+LINEAR = "tet4-averaged"
 #: Logarithms of the moduli and times [s] of two branches from which they are fitted.
 START = np.log([0.1, 0.1, 1.0, 0.03])
 
 
-def first_mode(case: Case) -> float:
-    """Frequency [Hz] of the first mode about a case at rest, elastic and undamped.
+def sinks(case: Case, elements: str | None = None) -> float:
+    """How far the tip sinks until rest [m], in the mean of its upper edge."""
+    done = wb.run(case, elements=elements, device="cpu")
+    return float(-done.u[done.mesh.node_sets["upper edge of the tip"], 2].mean())
 
-    A force on nodes is a weight that hangs there: its mass goes up and down with them.
-    """
-    # the elements of `warpbrain run` where tissue hardly changes its volume
-    model = replace(model_of(case), elements="tet10-mixed")
-    system = System(model, "cpu")
-    system.u.assign(EquilibriumSolver(system).solve(model.external_forces()).u)
-    masses = np.repeat(model.node_masses[:, None], 3, axis=1)
-    for boundary in case.boundaries:
-        if isinstance(boundary, Forced):
-            members = np.flatnonzero(case.mesh.node_sets[boundary.nodes])
-            masses[members, 2] += np.linalg.norm(boundary.total) / GRAVITY / len(members)
-    free = ~model.constrained.ravel()
-    K = system.stiffness().tocsr()[free][:, free].tocsc()
-    M = diags(masses.ravel()[free]).tocsc()
-    [squared] = eigsh(K, 1, M, sigma=0.0, return_eigenvectors=False)
-    return float(np.sqrt(squared)) / (2.0 * np.pi)
+
+def swing(case: Case, step: float = STEP) -> Floats:
+    """Frequency [Hz] and damping relative to critical of a motion to rest."""
+    solution = wb.run(case, to_rest=True, time_step=step, elements=LINEAR, device="cpu").followed.solution
+    return np.array([solution["swing"]["frequency_Hz"], solution["swing"]["damping"]])
+
+
+def extrapolated(case: Case) -> Floats:
+    """The same, extrapolated to no step: the error of half a step is half as large."""
+    return 2.0 * swing(case, 0.5 * STEP) - swing(case)
 
 
 def release_of(frequency: float, moduli: Floats, times: Floats) -> Floats:
@@ -73,15 +66,16 @@ def release_of(frequency: float, moduli: Floats, times: Floats) -> Floats:
     relaxing = Polynomial([1.0])
     for time in times:
         relaxing *= Polynomial([1.0, time])
-    poles_of = relaxing * Polynomial([squared, squared * (Damping().stiffness + STEP), 1.0])
+    damped = squared * Damping().stiffness * (1.0 + moduli.sum())
+    poles_of = relaxing * Polynomial([squared, damped, 1.0])
     for modulus, time in zip(moduli, times, strict=True):
         poles_of += squared * modulus * Polynomial([0.0, time]) * (relaxing // Polynomial([1.0, time]))
     poles = poles_of.roots()
-    swing = poles[np.argmax(poles.imag)]
-    slow = poles[np.argmin(np.abs(poles))].real if len(times) else -np.inf
+    fastest = poles[np.argmax(poles.imag)]
+    slow = poles[np.argmin(np.abs(poles))].real
     # the part of the step response that the slowest pole has
-    creep = -squared * relaxing(slow) / (slow * poles_of.deriv()(slow)) if len(times) else 0.0
-    return np.array([abs(swing) / (2.0 * np.pi), -swing.real / abs(swing), creep, -1.0 / slow])
+    creep = -squared * relaxing(slow) / (slow * poles_of.deriv()(slow))
+    return np.array([abs(fastest) / (2.0 * np.pi), -fastest.real / abs(fastest), creep, -1.0 / slow])
 
 
 def fitted_branches(frequency: float, recorded: Floats) -> tuple[Floats, Floats]:
@@ -94,11 +88,18 @@ def fitted_branches(frequency: float, recorded: Floats) -> tuple[Floats, Floats]
     return moduli, times
 
 
-def row(values: Floats) -> str:
+def in_words(moduli: Floats, times: Floats) -> str:
+    """Branches as `--with` has them."""
+    return "viscoelasticity:" + ",".join(
+        f"{key}={'/'.join(f'{value:.3g}' for value in values)}"
+        for key, values in (("moduli", moduli), ("times", times))
+    )
+
+
+def row(name: str, values: Floats) -> str:
     """In words."""
-    frequency, damping, creep, time = values
-    creeps = f"creeps by {100.0 * creep:.1f} % in {time:.2f} s" if creep else "does not creep"
-    return f"{frequency:.2f} Hz, {100.0 * damping:.1f} % of critical damping, {creeps}"
+    creeps = f", creeps by {100.0 * values[2]:.1f} % in {values[3]:.2f} s" if len(values) > 2 else ""
+    return f"  {name:<24} {values[0]:.3f} Hz, {100.0 * values[1]:.2f} % of critical damping{creeps}"
 
 
 def main() -> None:
@@ -106,18 +107,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="the swing of the silicone beam")
     parser.add_argument("data", type=Path, help="folder with the .c3d files")
     folder = parser.parse_args().data
-    branches: tuple[Floats, Floats] | None = None
+    mu, viscous = 0.0, ""
     for name, files in zip(BEAM, (GRAVITY_FILES, (WEIGHT_FILE,)), strict=True):
-        frequency = first_mode(find_case(name))
+        case = find_case(name)
+        print(name, flush=True)
         swings = [read_release(folder / file).swing() for file in files]
-        recorded = [np.array([swing.frequency, swing.damping, swing.creep, swing.creep_time]) for swing in swings]
-        branches = branches or fitted_branches(frequency, recorded[0])
-        print(f"{name}\n  elastic       {row(release_of(frequency, np.empty(0), np.empty(0)))}")
-        print(f"  viscoelastic  {row(release_of(frequency, *branches))}")
+        recorded = [np.array([one.frequency, one.damping, one.creep, one.creep_time]) for one in swings]
         for file, values in zip(files, recorded, strict=True):
-            print(f"  recorded      {row(values)}  {file}")
-    moduli, times = ("/".join(f"{value:.3g}" for value in values) for values in branches)
-    print(f"--with viscoelasticity:moduli={moduli},times={times}")
+            print(row(file, values), flush=True)
+        # the way is nearly as one over the modulus
+        mu = mu or MU * sinks(case, LINEAR) / sinks(case)
+        case = case.with_shear_moduli({1: mu})
+        elastic = swing(case)
+        print(row("elastic", elastic), flush=True)
+        if not viscous:
+            moduli, times = fitted_branches(elastic[0], recorded[0])
+            first = extrapolated(assume(case, in_words(moduli, times)))
+            stiffer = (first[0] ** 2 - elastic[0] ** 2) / (recorded[0][0] ** 2 - elastic[0] ** 2)
+            print(row(f"branches {stiffer:.3f} times as stiff", first), flush=True)
+            viscous = in_words(moduli / stiffer, times)
+        print(row("viscoelastic", extrapolated(assume(case, viscous))), flush=True)
+    print(f"--elements {LINEAR} --mu {mu:.0f} --with {viscous}")
 
 
 if __name__ == "__main__":

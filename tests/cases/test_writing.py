@@ -24,7 +24,7 @@ EVERYTHING = [
     ("mu = 3000.0", 'model = "ogden"\nmu = [100.0, -50.0]\nalpha = [2.0, -4.7]\nformulation = "uncoupled"'),
     (
         'kind = "force"\ntotal = [0.01, 0.02, -0.05]',
-        'kind = "force"\ntotal = [0.01, 0.02, -0.05]\nramp = [[0.0, 0.0], [0.05, 1.0]]\n'
+        'kind = "force"\ntotal = [0.01, 0.02, -0.05]\nmass = 0.004\nramp = [[0.0, 0.0], [0.05, 1.0]]\n'
         '[[boundary]]\nname = "pull/1"\nnodes = "corner"\nkind = "displacement"\nvalue = "pull.csv"\n'
         '[[boundary]]\nname = "pull 2"\nnodes = "corner"\nkind = "displacement"\nvalue = [0.1, 0.2, 0.3]\n'
         '[[boundary]]\nname = "air"\nnodes = "top"\nkind = "pressure"\nvalue = -20.0\nramp = [[0.0, 1.0]]\n'

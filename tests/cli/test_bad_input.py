@@ -183,6 +183,12 @@ def test_a_body_that_nothing_holds(tmp_path):
     assert run(tmp_path, "--out", tmp_path / "out", "--steps", "2").status == 0
 
 
+def test_a_step_of_a_motion_that_is_not_followed(folder):
+    for arguments in ([], ["--steps", "3"]):
+        ran = run(folder, "--time-step", "0.01", *arguments)
+        assert refusal(ran) == "--time-step 0.01: means nothing without --to-rest"
+
+
 def test_the_whole_program_says_one_line(tmp_path):
     """As the shell sees it, with the native libraries and the interpreter's end."""
     write_folder(tmp_path)

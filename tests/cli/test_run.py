@@ -190,6 +190,19 @@ def test_motion_comes_to_rest_at_the_equilibrium(block_run):
     assert summary(rest)["solution"]["relative_residual"] <= 1e-8
 
 
+def test_a_swing_is_told_and_ends_at_the_same_rest(block_run):
+    (_, rest), (ran, out) = block_run("--to-rest"), block_run("--to-rest", "--time-step", "0.001")
+    np.testing.assert_allclose(
+        displacement(out), displacement(rest), rtol=0, atol=1e-6 * np.abs(displacement(rest)).max()
+    )
+    assert "swing" not in summary(rest)["solution"]
+    swing = summary(out)["solution"]["swing"]
+    assert swing["time_step_s"] == 0.001
+    # Rayleigh damping of 1 ms
+    assert swing["damping"] == pytest.approx(np.pi * 1e-3 * swing["frequency_Hz"], rel=0.03)
+    assert f"  swings about it at {swing['frequency_Hz']:.4g} Hz with " in ran.out
+
+
 def test_steps(block_run):
     ran, out = block_run("--steps", "3")
     said = summary(out)["solution"]

@@ -10,6 +10,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from warpbrain.diagnosis.result import Fit, Ranked, effect_sentence, sentence_of
+from warpbrain.inference import Kind
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.physics.mechanisms import mechanisms
@@ -99,7 +100,10 @@ def test_every_verdict_is_said(verdict, data):
         ranking=ranking,
         p_value=data.draw(st.sampled_from([0.02, 1.0])) if verdict == "cannot say" else 0.02,
         alpha=0.05,
-        combinations=[SimpleNamespace(causes=(), probability=data.draw(chances))],
+        combinations=[
+            SimpleNamespace(causes=(), kinds=(), probability=data.draw(chances)),
+            SimpleNamespace(causes=("unknown",), kinds=(Kind.UNKNOWN,), probability=data.draw(chances)),
+        ],
         smallest=seen,
         fit=fit,
         unknown=None,
@@ -127,6 +131,15 @@ def test_a_p_value_that_sees_nothing_is_no_reason_for_something_missing(nothing,
     assert "yet these data do not contradict it (p = 1)." in unseen and "missing (p" not in unseen
     seen = verdict_in_words(Decision("cannot say", ("drainage",)), 0.01, 0.05, {}, words)
     assert seen.startswith(f"Something {'is' if nothing < 0.1 else 'may be'} missing (p = 0.01), but these data")
+
+
+@pytest.mark.parametrize("chance", [0.02, 0.31])
+def test_physics_beside_an_error_is_not_denied(chance):
+    words = Words("these data", "", "", [], "", [("Moduli are wrong.", 0.9)], [], 0.0, physics_acts=chance)
+    said = verdict_in_words(Decision("not physics", ("stiffness",)), 0.01, 0.05, {}, words)
+    check(said)
+    assert said.startswith("It is not physics that is missing") and "Moduli are wrong." in said
+    assert ("beside it has a probability of 31 %" in said) == ("as far as these data tell" in said) == (chance > 0.1)
 
 
 def one(kind, *values, **more):

@@ -64,6 +64,15 @@ def test_physics_that_may_be_a_registration_is_not_named():
     assert verdict((("traction",), 0.7), (("registration",), 0.3)).verdict == CANNOT_SAY
 
 
+def test_physics_that_may_act_beside_an_error_does_not_hide_it():
+    """As little as physics that nothing speaks for hides that nothing is missing."""
+    for chance in (0.1, 0.3):
+        beside = verdict((("registration",), 1.0 - chance), (("registration", "traction"), chance))
+        assert beside == Decision(NOT_PHYSICS, ("registration",))
+    instead = verdict((("registration",), 0.7), (("traction",), 0.3))
+    assert instead.verdict == CANNOT_SAY
+
+
 @pytest.mark.parametrize("causes", [(), ("traction",), ("traction", "unknown"), ("unknown",), ("mesh",)])
 def test_nothing_costs_less_than_the_truth(causes):
     truth = Truth.of(hypothesis(*causes))

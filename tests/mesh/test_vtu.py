@@ -53,6 +53,20 @@ def test_vtk_reads_them(tmp_path):
     assert reader.GetOutput().GetNumberOfPoints() == 8
 
 
+def test_the_ways_to_meshio_that_docs_name(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    mesh = box((2, 1, 1), (1.0, 0.5, 0.5))
+    points = {"displacement": np.random.default_rng(1).normal(size=mesh.points.shape)}
+    cells = {"J": [np.linspace(0.9, 1.1, len(mesh.tetrahedra))]}
+    path = tmp_path / "result.vtu"
+    write_vtu(path, meshio.Mesh(mesh.points, [("tetra", mesh.tetrahedra)], point_data=points, cell_data=cells))
+    for read in (read_vtu(path), pyvista.to_meshio(pyvista.read(path))):
+        np.testing.assert_array_equal(read.points, mesh.points)
+        np.testing.assert_array_equal(read.cells_dict["tetra"], mesh.tetrahedra)
+        np.testing.assert_array_equal(read.point_data["displacement"], points["displacement"])
+        np.testing.assert_array_equal(read.cell_data["J"][0], cells["J"][0])
+
+
 def test_every_file_of_vtk_in_the_repository_says_its_axes():
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout.split()
     found = [ROOT / name for name in listed if name.endswith(".vtu")] or list((ROOT / "warpbrain").rglob("*.vtu"))

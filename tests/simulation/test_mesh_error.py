@@ -128,13 +128,14 @@ def test_thick_sphere(n: int) -> None:
 def test_a_finer_case_has_the_same_resultants(tmp_path) -> None:
     """Whatever kind of load: shared forces become those of a load on the surface."""
     case = warpbrain.read_case(write_folder(tmp_path))
-    force = Forced(name="push", nodes="top", total=(0.01, 0.0, -0.03))
+    force = Forced(name="push", nodes="top", total=(0.01, 0.0, -0.03), mass=0.02)
     case = replace(case, boundaries=(*case.boundaries[:1], force))
     model = warpbrain.model_of(case)
     finer = FinerCase(case).model(model)
     assert len(finer.mesh.tetrahedra) == 8 * len(model.mesh.tetrahedra)
     np.testing.assert_allclose(finer.external_forces().sum(axis=0), model.external_forces().sum(axis=0), atol=1e-12)
     np.testing.assert_allclose(finer.external_forces().sum(axis=0), force.total, atol=1e-12)
+    assert finer.node_masses.sum() == pytest.approx(model.node_masses.sum()) == pytest.approx(model.mass + 0.02)
 
 
 @pytest.mark.parametrize("poisson", [0.45, 0.49])
@@ -153,7 +154,7 @@ def test_a_block_of_48_elements(tmp_path, poisson: float) -> None:
     for _ in range(2):
         refined_case = FinerCase(finer)
         finer, forces = refined_case.case, refined_case.spread(forces)
-        loads = [GivenForces(forces=forces)]
+        loads = [GivenForces(forces=forces, masses=np.zeros(len(forces)))]
         small = replace(warpbrain.model_of(finer), loads=loads, elements="tet4-averaged")
         levels.append(solve_equilibrium(System(small, "cpu"), EquilibriumOptions(tolerance=1e-6)).u[: len(result.u)])
     error = levels[1] + (levels[1] - levels[0]) / 3.0 - result.u

@@ -103,20 +103,23 @@ class Displaced(Boundary):
 
 @dataclass(frozen=True, kw_only=True)
 class Forced(Boundary):
-    """Nodes that share a total force [N] evenly, times a factor over time [s]."""
+    """Nodes that share a total force [N] evenly, times a factor over time [s], and what hangs there [kg]."""
 
     kind: ClassVar[str] = "force"
     keys: ClassVar[tuple[Key, ...]] = (
         Key("total", "vector", "Total force, shared evenly by the nodes.", "N", needed=True),
+        Key("mass", "number", "Of what hangs there and moves with the nodes; `total` has its weight.", "kg", above=0.0),
         RAMP,
     )
     holds: ClassVar[bool] = False
     total: tuple[float, float, float]
+    mass: float | None = None  # moves with the nodes
     ramp: Ramp = field(default=())
 
     def sentence(self) -> str:
         size = float(np.linalg.norm(self.total))
-        return f"A force of {size:.3g} N in all, shared evenly by the nodes of the {self.name}."
+        carried = "" if self.mass is None else f", which carry {self.mass:.3g} kg along"
+        return f"A force of {size:.3g} N in all, shared evenly by the nodes of the {self.name}{carried}."
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -52,6 +52,8 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError(f"--until {options.until:g}: means nothing with --to-rest")
     if options.until is not None and options.mesh_error is not None:
         raise InputError(f"--until {options.until:g}: the error of the mesh is not estimated for slow change yet")
+    if options.time_step is not None and not options.to_rest:
+        raise InputError(f"--time-step {options.time_step:g}: means nothing without --to-rest")
     options.moduli = parse_moduli(options.mu)
     if options.sample is not None and options.mu:
         raise InputError(

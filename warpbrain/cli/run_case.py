@@ -70,7 +70,7 @@ def _run_body(
     about_elements = options.elements is None and options.mesh_error == "elements"
     running = Running(
         case,
-        Course(options.steps, options.to_rest, options.until, options.tolerance),
+        Course(options.steps, options.to_rest, options.until, options.tolerance, options.time_step),
         "tet4" if about_elements else options.elements,
         options.device,
         options.precision,
@@ -215,6 +215,7 @@ def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[
         name, columns = "equilibrium", "   load   Newton   residual    CG   step   min J"
     say("", name + columns, sep="\n")
     count = 0
+    length = 0.0
 
     def on_newton(step: NewtonStep) -> None:
         nonlocal count
@@ -231,10 +232,14 @@ def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[
         progress.show(step.load, f"Newton {step.iteration}")
 
     def on_relaxation(step: RelaxationStep) -> None:
-        row(
-            f"{step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}   "
-            f"{step.min_J:>5.3f}"
-        )
+        nonlocal count, length
+        count, length = 0 if step.time_step != length else count + 1, step.time_step
+        # of steps of one length, which there are many of, one in fifty
+        if count % 50 == 0:
+            row(
+                f"{step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}   "
+                f"{step.min_J:>5.3f}"
+            )
         decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
         progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
 

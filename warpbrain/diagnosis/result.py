@@ -159,6 +159,7 @@ def sentence_of(diagnosis: Diagnosis) -> str:
         members=[(_member(diagnosis, kind), chances.get(kind, 0.0)) for kind in diagnosis.group if kind != UNKNOWN],
         perhaps=[clause(sentence_of_kind(ranked.kind)) for ranked in likely],
         nothing_acts=sum(each.probability for each in diagnosis.combinations if not each.causes),
+        physics_acts=sum(each.probability for each in diagnosis.combinations if set(each.kinds) - {Kind.NOT_PHYSICS}),
         only_physics=all(ranked.physics for ranked in likely),
         rest="" if diagnosis.unknown is None else traits_in_words(diagnosis.unknown, extent),
     )

@@ -106,7 +106,9 @@ def loss(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float
         return losses["nothing for something"] * (truth.physical or bool(truth.not_physics))
     if decision.verdict == NOT_PHYSICS:
         if truth.physical:
-            return losses["not physics for physics"]
+            # physics beside an error that is there is left out, as by who says that nothing is missing
+            there = decision.causes[0] in truth.not_physics
+            return losses["nothing for something" if there else "not physics for physics"]
         # where no physics is missing to take nothing for an error costs what the reverse does
         wrong = losses["name left out"] * (decision.causes[0] not in truth.not_physics)
         return wrong if truth.not_physics else losses["nothing for something"]

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
 
@@ -66,6 +66,10 @@ class Load(Ramped, abc.ABC):
         """What `Model.external_forces` sums up of it: forces at factor 1 [N], on nodes (n, 3)."""
         return self.nodal_forces(mesh)
 
+    def nodal_masses(self, mesh: TetMesh | QuadraticMesh) -> Floats:
+        """Masses [kg] that the nodes carry along beside the tissue's, shape (n,)."""
+        return np.zeros(len(mesh.points))
+
     def unit_forces_rate(self, mesh: TetMesh | QuadraticMesh, along: Along) -> Floats:
         """Derivative of `unit_forces` along a path of loads that begins here, by differences unless overridden.
 
@@ -96,15 +100,19 @@ class NodalForce(Load):
         Name of the node set.
     total : tuple of three floats
         Total force [N]; each of the k nodes of the set carries ``total / k``, midside nodes like corners.
+    mass : float
+        Of what pulls [kg], if that moves with the nodes, in all directions: each carries ``mass / k`` along. Its weight
+        is part of the total.
 
     Raises
     ------
     InputError
-        If the total is not finite; by `nodal_forces`, if the mesh has no such set or it is empty.
+        If the total is not finite or the mass negative; by `nodal_forces`, if the mesh has no such set or it is empty.
     """
 
     nodes: str
     total: tuple[float, float, float]
+    mass: float = 0.0
     quadratic: ClassVar[bool] = True
     sentence: ClassVar[str] = "A force presses on part of the surface."
 
@@ -112,8 +120,20 @@ class NodalForce(Load):
         super().__post_init__()
         if len(self.total) != 3 or not np.all(np.isfinite(self.total)):
             raise InputError(f"force on '{self.nodes}': total = {self.total}: expected three finite numbers [N]")
+        if not (math.isfinite(self.mass) and self.mass >= 0.0):
+            raise InputError(f"force on '{self.nodes}': mass = {self.mass}: expected a number >= 0 [kg]")
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
+        members = self._members(mesh)
+        forces = np.zeros(mesh.points.shape)
+        forces[members] = np.asarray(self.total, dtype=float) / members.sum()
+        return forces
+
+    def nodal_masses(self, mesh: TetMesh | QuadraticMesh) -> Floats:
+        members = self._members(mesh)
+        return np.asarray(self.mass * members / members.sum())
+
+    def _members(self, mesh: TetMesh | QuadraticMesh) -> Bools:
         members = mesh.node_sets.get(self.nodes)
         if members is None:
             raise InputError(
@@ -121,6 +141,4 @@ class NodalForce(Load):
             )
         if not members.any():
             raise InputError(f"force: node set '{self.nodes}' is empty")
-        forces = np.zeros(mesh.points.shape)
-        forces[members] = np.asarray(self.total, dtype=float) / members.sum()
-        return forces
+        return members

@@ -37,12 +37,16 @@ from warpbrain.simulation.system import System
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GivenForces(Load):
-    """Forces on the nodes of one mesh."""
+    """Forces on the nodes of one mesh, and masses that they carry along."""
 
     forces: Floats  # (n, 3) [N]
+    masses: Floats  # (n,) [kg]
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         return self.forces
+
+    def nodal_masses(self, mesh: TetMesh | QuadraticMesh) -> Floats:
+        return self.masses
 
 
 class FinerCase:
@@ -62,7 +66,7 @@ class FinerCase:
         self.case = replace(case, mesh=mesh, mechanisms=mechanisms, boundaries=boundaries)
 
     def spread(self, forces: Floats) -> Floats:
-        """Nodal forces (n', 3) that act as those (n, 3) on the mesh that there was do.
+        """Nodal forces (n', c) that act as those (n, c) on the mesh that there was do; masses are spread alike.
 
         A force on a node is taken for a load on the surface around it (in the volume, if a loaded node is inside),
         linear between nodes: the force over the node's share. On the finer mesh it is the same load, so that meshes of
@@ -70,7 +74,7 @@ class FinerCase:
         """
         mesh = self.case.mesh
         if not forces.any():
-            return np.zeros(mesh.points.shape)
+            return np.zeros((len(mesh.points), forces.shape[1]))
         loaded = forces.any(axis=1)
         if nodes_of(self._coarse.boundary, len(self._coarse.points))[loaded].all():
             coarse, fine = (node_areas(each.points, each.boundary) for each in (self._coarse, mesh))
@@ -84,7 +88,11 @@ class FinerCase:
         """The finer model of what `model_of` makes of the case, with the same elements."""
         plain = self._plain
         shared = [
-            GivenForces(forces=self.spread(load.nodal_forces(model.mesh)), ramp=load.ramp)
+            GivenForces(
+                forces=self.spread(load.nodal_forces(model.mesh)),
+                masses=self.spread(load.nodal_masses(model.mesh)[:, None])[:, 0],
+                ramp=load.ramp,
+            )
             for load in model.loads
             if isinstance(load, NodalForce)
         ]

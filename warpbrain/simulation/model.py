@@ -205,8 +205,11 @@ class Model:
 
     @property
     def node_masses(self) -> Floats:
-        """Lumped mass of each node [kg], shape (n,), positive, before any tissue is taken out little by little."""
-        return self.density * (self.quadratic or self.mesh).node_volumes
+        """Lumped mass of each node [kg], shape (n,), positive, before any tissue is taken out little by little; with
+        what hangs there (`Load.nodal_masses`).
+        """
+        nodes = self.quadratic or self.mesh
+        return self.density * nodes.node_volumes + sum(load.nodal_masses(nodes) for load in self.loads)
 
     @cached_property
     def emptying(self) -> list[Emptying]:

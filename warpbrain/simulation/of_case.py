@@ -41,7 +41,9 @@ def plain_model_of(case: Case) -> Model:
             if boundary.has_history:
                 motions.append(Motion(members, np.array(boundary.times), np.array(boundary.values)))
         elif isinstance(boundary, Forced):
-            loads.append(NodalForce(nodes=boundary.nodes, total=boundary.total, ramp=boundary.ramp))
+            loads.append(
+                NodalForce(nodes=boundary.nodes, total=boundary.total, mass=boundary.mass or 0.0, ramp=boundary.ramp)
+            )
         elif boundary.mechanism is not None:
             mechanisms.append(boundary.mechanism)
     try:

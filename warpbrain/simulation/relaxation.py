@@ -2,7 +2,8 @@
 
 Backward Euler is stable at any step and damps all motion, more the longer the step: it reaches the equilibrium that the
 static solve finds, by another way. That makes it the check on the static solve, and the fall-back where Newton's method
-finds no way.
+finds no way. A body with little damping swings about its rest before; who wants to know how has steps of one length
+until that was seen (`RelaxationOptions.swing`, `warpbrain.simulation.swing`).
 """
 
 from __future__ import annotations
@@ -17,11 +18,16 @@ from warpbrain.errors import SolveError, require_kind
 from warpbrain.kernels.precision import Precision
 from warpbrain.simulation.dynamics import PhaseClock, Simulator
 from warpbrain.simulation.model import require_held
+from warpbrain.simulation.swing import Momentum, Swing
 from warpbrain.simulation.system import System
 
 #: Relative tolerance of the linear solve of a step. Rest is judged by the forces themselves, so a step need not be
 #: exact: the paper's sweep of the phantom needs a third of the CG iterations of 1e-8, and 2 % more steps.
 LINEAR_TOLERANCE = 1e-3
+#: Where a swing is to be seen it is that of any motion.
+_SWING_TOLERANCE = 1e-6
+#: Iterations of a linear solve: of the longest steps as many as of an equilibrium.
+_MAX_CG = 10_000
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,7 @@ class Relaxed:
     residual: float  # relative out-of-balance force
     tolerance: float  # what that was to be in this precision
     history: tuple[RelaxationStep, ...]
+    swing: Swing | None = None  # how it swung, if that was asked for and it did
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,9 @@ class RelaxationOptions:
     #: first time step [s]; doubled after a good step, cut to a quarter when an element would turn inside out
     time_step: float = 0.001
     largest_step: float = 1e4  # [s]
-    max_steps: int = 400  # steps before giving up
+    max_steps: int = 400  # steps that grow before giving up
+    swing: bool = False  # whether to see how the body swings, with steps that do not grow before
+    max_swing_steps: int = 100_000  # steps before giving up a swing
 
 
 def least_residual(tolerance: float, precision: Precision) -> float:
@@ -97,12 +106,15 @@ def relax_to_rest(
     goal = least_residual(options.tolerance, system.precision)
     free = 1.0 - model.constrained
     external = model.external_forces()
-    simulator = Simulator(system, time_step=options.time_step, tolerance=LINEAR_TOLERANCE)
+    tolerance = _SWING_TOLERANCE if options.swing else LINEAR_TOLERANCE
+    simulator = Simulator(system, time_step=options.time_step, tolerance=tolerance, max_cg=_MAX_CG)
     simulator.reset()
     u, v = np.zeros_like(external), np.zeros_like(external)
     history: list[RelaxationStep] = []
+    momentum = Momentum(system.mass.numpy().astype(np.float64))
+    swings, most = options.swing, options.max_swing_steps if options.swing else options.max_steps
     h, moved, share = options.time_step, 0.0, 1.0
-    while len(history) < options.max_steps:
+    while len(history) < most:
         simulator.set_time_step(h)
         simulator.prescribe(min(1.0, moved + share) * model.prescribed)
         start = simulator.time
@@ -119,7 +131,7 @@ def relax_to_rest(
                 raise SolveError(f"the motion does not come to rest: {failure}") from None
             simulator.restore(u, v, start)
             continue
-        moved = min(1.0, moved + share)
+        arrived, moved = moved >= 1.0, min(1.0, moved + share)
         internal = system.internal_forces()
         residual = float(np.linalg.norm(free * (external - internal)))
         scale = float(np.linalg.norm(internal) + np.linalg.norm(external))
@@ -131,9 +143,15 @@ def relax_to_rest(
         # copies: on the CPU these arrays are the live ones
         u, v = system.u.numpy().copy(), simulator.v.numpy().copy()
         if residual <= goal and moved >= 1.0:
-            return Relaxed(u.astype(np.float64), internal, residual, goal, tuple(history))
-        h = min(2.0 * h, options.largest_step)
+            swing = momentum.swing() if options.swing else None
+            return Relaxed(u.astype(np.float64), internal, residual, goal, tuple(history), swing)
+        if swings and arrived:
+            momentum.note(v, h)
+        if swings and momentum.was_seen:
+            swings, most = False, len(history) + options.max_steps
+        if not swings:
+            h = min(2.0 * h, options.largest_step)
     raise SolveError(
-        f"not at rest after {options.max_steps} steps, {history[-1].time:.3g} s: relative out-of-balance force "
+        f"not at rest after {most} steps, {history[-1].time:.3g} s: relative out-of-balance force "
         f"{history[-1].residual:.1e}, goal {goal:.1e}"
     )

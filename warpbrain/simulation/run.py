@@ -31,6 +31,7 @@ from warpbrain.simulation.quasi_static import follow_slowly, growing_times
 from warpbrain.simulation.relaxation import RelaxationOptions, RelaxationStep, relax_to_rest
 from warpbrain.simulation.result import NodalState, Result, nodal_state_of, result_of
 from warpbrain.simulation.specimen import SpecimenRun, SpecimenRunning, not_transmitted, specimen_of
+from warpbrain.simulation.swing import Swing
 from warpbrain.simulation.system import System
 
 #: Steps of slow change where nobody names a number.
@@ -49,6 +50,8 @@ class Course:
     to_rest: bool = False  # follow the damped motion until it is at rest
     until: float | None = None  # follow slow change without inertia until then [s]
     tolerance: float = 1e-8  # out-of-balance force in the end, relative to all nodal forces; see `EquilibriumOptions`
+    #: of a motion to rest: how long steps are until its swing was seen [s]; None: they grow from 1 ms on
+    time_step: float | None = None
 
     def __post_init__(self) -> None:
         if self.steps is not None and (not isinstance(self.steps, int) or self.steps < 1):
@@ -57,6 +60,10 @@ class Course:
             raise InputError(f"until = {self.until:g}: expected a positive number of seconds")
         if not 0.0 < self.tolerance < 1.0:
             raise InputError(f"tolerance = {self.tolerance:g}: expected a number between 0 and 1")
+        if self.time_step is not None and not (math.isfinite(self.time_step) and self.time_step > 0.0):
+            raise InputError(f"time_step = {self.time_step:g}: expected a positive number of seconds")
+        if self.time_step is not None and not self.to_rest:
+            raise InputError("time_step: means nothing without to_rest, whose swing it resolves")
         if self.to_rest and (self.steps is not None or self.until is not None):
             other = "steps" if self.until is None else "until"
             raise InputError(f"to_rest: means nothing with {other}: leave one of them out")
@@ -127,14 +134,30 @@ def _equilibrium(system: System, course: Course, watching: Watching) -> Followed
 def _to_rest(system: System, course: Course, watching: Watching) -> Followed:
     times, on_step = _timed(watching.relaxation)
     clock = PhaseClock(system.device)
-    state = relax_to_rest(system, RelaxationOptions(tolerance=course.tolerance), on_step, clock)
+    options = RelaxationOptions(tolerance=course.tolerance)
+    if course.time_step is not None:
+        options = replace(options, time_step=course.time_step, swing=True)
+    state = relax_to_rest(system, options, on_step, clock)
     solution = {
         "kind": "at rest",
         "tolerance": state.tolerance,
         "relative_residual": state.residual,
+        **({"swing": _described(state.swing)} if options.swing else {}),
         "history": [vars(step) for step in state.history],
     }
     return Followed(solution, None, (*times, time.perf_counter())[0], clock.seconds, clock.counts)
+
+
+def _described(swing: Swing | None) -> dict[str, float] | None:
+    """For `summary.json`; dampings are relative to critical."""
+    if swing is None:
+        return None
+    return {
+        "frequency_Hz": swing.frequency,
+        "damping": swing.damping,
+        "damping_in_steps": swing.damping_in_steps,
+        "time_step_s": swing.time_step,
+    }
 
 
 def _motion(case: Case, system: System, steps: int, watching: Watching) -> Followed:
@@ -318,6 +341,7 @@ def run(
     to_rest: bool = False,
     until: float | None = None,
     tolerance: float = 1e-8,
+    time_step: float | None = None,
     elements: str | None = None,
     device: str | None = None,
     precision: str = "double",
@@ -338,6 +362,8 @@ def run(
         Follow slow change without inertia until then [s], in `steps` steps that grow (20).
     tolerance : float
         Out-of-balance force at the end, relative to all nodal forces.
+    time_step : float, optional
+        With `to_rest`: of the steps until its swing was seen [s]; ``run.followed.solution["swing"]`` says how it swung.
     elements : str, optional
         ``"tet4"``, ``"tet4-averaged"``, ``"tet10"`` or ``"tet10-mixed"``; by default those that the case needs.
     device : str, optional
@@ -364,7 +390,7 @@ def run(
     >>> 1000 * abs(done.u).max()  # mm # doctest: +SKIP
     """
     case = as_case(case, tissue)
-    course = Course(steps, to_rest, until, tolerance)
+    course = Course(steps, to_rest, until, tolerance, time_step)
     if case.specimen is None:
         return Running(case, course, elements, device, precision).run()
     if course != Course(tolerance=tolerance):

@@ -103,6 +103,7 @@ class Words:
     perhaps: Sequence[str]  # clauses of what may act, where nothing can be said
     nothing_acts: float  # posterior probability that no cause acts
     only_physics: bool = True  # whether an error of registration, mesh, loads or the like is unlikely
+    physics_acts: float = 0.0  # posterior probability that physics is missing, with a name or without
     rest: str = ""  # what is known of what has no name: a sentence after a space
 
 
@@ -121,7 +122,13 @@ def verdict_in_words(
         return f"{' '.join(sentences)}{rest if verdict == NAMED_AND_REST else ''}"
     if verdict == NOT_PHYSICS:
         sentences = [sentence for sentence, _ in words.members]
-        return f"It is not physics that is missing ({p}). {' '.join(sentences)} That explains the mismatch better."
+        beside = words.physics_acts > belief("checks.perhaps")
+        told = f", as far as {data} tell" if beside else ""
+        chance = (
+            f"; that physics is missing beside it has a probability of {percent(words.physics_acts)}" if beside else ""
+        )
+        said = " ".join(sentences)
+        return f"It is not physics that is missing{told} ({p}). {said} That explains the mismatch better{chance}."
     if verdict == UNKNOWN:
         return (
             f"Something is missing ({p}) that none of the known mechanisms explains: {words.unnamed} fits better than "

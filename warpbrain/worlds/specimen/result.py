@@ -120,16 +120,18 @@ def sentence_of(diagnosis: SpecimenDiagnosis) -> str:
     """The verdict for people."""
     named, causes, scores = diagnosis.named, diagnosis.decision.causes, diagnosis.scores
     members = [cause for cause in diagnosis.ranking if cause.name in causes and cause.name != UNKNOWN]
-    errors = [pascals(scores[name].heldout or 0.0) for name in ("explained", "refitted") if name in scores]
+    errors = {cause.name for cause in diagnosis.ranking if cause.kind is Kind.NOT_PHYSICS}
+    heldout = [pascals(scores[name].heldout or 0.0) for name in ("explained", "refitted") if name in scores]
     words = Words(
         data="these tests",
         nothing="none of those that were looked for",
         unnamed="a smooth change of single tests",
         named=[specimen_effect_sentence(cause) for cause in named],
-        grounds=grounds([cause.probability for cause in named], "tests", (errors[0], errors[-1])),
+        grounds=grounds([cause.probability for cause in named], "tests", (heldout[0], heldout[-1])),
         members=[(cause.sentence, cause.probability) for cause in members],
         perhaps=[f"{clause(cause.sentence)} ({percent(cause.probability)})" for cause in members],
         nothing_acts=sum(each.probability for each in diagnosis.combinations if not each.causes),
+        physics_acts=sum(each.probability for each in diagnosis.combinations if set(each.causes) - errors),
     )
     sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.alpha, diagnosis.smallest, words)
     return " ".join([sentence, *diagnosis.doubts])
