@@ -1,12 +1,17 @@
 """What a further measurement would tell, against what is known of it beforehand."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from warpbrain.diagnosis.measuring import next_measurements
+from warpbrain.diagnosis.measuring import imitations, next_measurements
 from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.inference import Cause, GaussianModel, Kind, Place
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.words import Measurement
+from warpbrain.worlds.body.causes import BodyCauses
 
 
 def _told(diagnosis: Diagnosis, first: str, second: str) -> tuple[Measurement, ...]:
@@ -36,3 +41,19 @@ def test_weight_turns_back_with_the_head(axis: int) -> None:
     weight = Gravity(direction=(0.0, 0.6, -0.8), density=1000.0)
     back = weight.with_body_turned(rotation.as_matrix()).with_body_turned(rotation.inv().as_matrix())
     np.testing.assert_allclose(back.direction, weight.direction, atol=1e-15)
+
+
+def test_what_another_cause_explains_is_a_projection_however_many_of_its_columns_say_the_same() -> None:
+    random = np.random.default_rng(7)
+    model = GaussianModel(np.eye(60), np.zeros((60, 0)))
+    span, pattern = random.normal(size=(60, 6)), random.normal(size=(60, 1))
+    # 40 columns of rank 6, some of them tiny
+    columns = span @ random.normal(size=(6, 40)) * np.logspace(0.0, -14.0, 40)
+    effects: Any = (SimpleNamespace(proposed=SimpleNamespace(over_time=None)),)
+    causes = (
+        Cause("weight", (Place(pattern),), 0.0),
+        Cause("unknown", (Place(columns), Place(random.normal(size=(60, 1)) * 0.0)), 0.0, kind=Kind.UNKNOWN),
+    )
+    told = imitations(BodyCauses(causes, {"weight": effects}), model).rows["weight"]["unknown"]
+    left = pattern[:, 0] - span @ np.linalg.lstsq(span, pattern[:, 0], rcond=None)[0]
+    assert told == pytest.approx(1.0 - left @ left / (pattern[:, 0] @ pattern[:, 0]), rel=1e-9)

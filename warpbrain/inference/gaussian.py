@@ -52,8 +52,11 @@ class _Spectrum:
         values, vectors = np.linalg.eigh(whitened.T @ whitened)
         self.values, self.directions = np.maximum(values, 0.0), whitened @ vectors
         if np.finfo(np.float64).eps * values.max(initial=0.0) > _ROUNDED:
-            # a column ten million times as long as the noise: its square has no digits left for the others
-            left, sizes, _ = np.linalg.svd(whitened, full_matrices=False)
+            from scipy.linalg import svd
+
+            # a column ten million times as long as the noise: its square has no digits left for the others; by the
+            # driver that always converges
+            left, sizes, _ = svd(whitened, full_matrices=False, lapack_driver="gesvd")
             self.values, self.directions = sizes**2, left * sizes
 
     @cached_property

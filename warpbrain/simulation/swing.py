@@ -110,11 +110,14 @@ def swing_of(series: Floats, time_step: float) -> Swing | None:
 
 def _poles(series: Floats) -> NDArray[np.complex128]:
     """The `z_j` of a series (k,) that is a sum of `a_j z_j^k`, those that fade."""
+    from scipy.linalg import svd
+
     window = len(series) // 2
     if window < 2 or not series.any():
         return np.empty(0, dtype=complex)
     rows = np.lib.stride_tricks.sliding_window_view(series, window + 1)
-    _, sizes, right = np.linalg.svd(rows, full_matrices=False)
+    # of hardly any rank: the driver by divide and conquer may not converge
+    _, sizes, right = svd(rows, full_matrices=False, lapack_driver="gesvd")
     kept = right[sizes > _RANK * sizes[0]]
     shift = np.linalg.lstsq(kept[:, :-1].T, kept[:, 1:].T, rcond=None)[0]
     z = np.linalg.eigvals(shift).astype(complex)
