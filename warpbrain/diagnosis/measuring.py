@@ -96,8 +96,7 @@ def _orthonormal(model: GaussianModel, cause: Cause) -> list[Floats]:
     columns = model.standardised(np.concatenate([place.columns for place in cause.places], axis=1))
     bases = []
     for of_place in np.split(columns, ends, axis=1):
-        # half of the columns of a rough field are none beside the others: singular values by divide and conquer, which
-        # are LAPACK's fastest, have not converged there
+        # a field's columns may have half their number in rank, where NumPy's SVD (LAPACK's gesdd) can fail to converge
         vectors, triangle, _ = qr(of_place, mode="economic", pivoting=True)
         sizes = np.abs(np.diag(triangle))
         bases.append(vectors[:, sizes > 1e-9 * max(float(sizes.max(initial=0.0)), 1e-300)])

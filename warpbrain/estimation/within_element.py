@@ -1,7 +1,7 @@
-"""What a mesh does not show of a recorded row: its change over an element, by a part of which the row may be wrong.
+"""Errors of recorded rows that a mesh of this resolution cannot show: the change of each row over one element.
 
-A finer mesh with the same wall does not show these errors. By what part of an edge a mesh has a place beside where it
-is, `mesh.unresolved` of `priors.toml` says.
+The standard deviation of a row's error is a part of that change, `mesh.unresolved` of `priors.toml`. Elements of half
+the size with the same wall do not reduce it, so it is no part of the discretisation error.
 """
 
 from __future__ import annotations
@@ -56,12 +56,15 @@ def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> 
 
 
 def turn_over_element(points: Floats, faces: NDArray[np.integer]) -> Floats:
-    """By how much the flat faces of a surface leave the smooth one they stand for, were it off by a whole edge.
+    """Change of a surface's distance from its flat faces over an edge: edge length times tilt of the corners' normals.
 
-    A surface that turns by an angle over an edge of length `h` is off by that angle times `h / 8` in the middle of it:
-    of a coarse wall of the ventricles half a millimetre where tracking is to a fifth. Points (n, 3) [m] and triangles
-    (k, 3), oriented outwards. Returns (k, 3): edge times how far the normals of the corners are from that of the face,
-    root mean square of the corners along each axis [m]; zero of a plane.
+    Between its corners a flat face is not on the smooth surface that was meshed. Of a sphere of radius `R` and
+    equilateral faces of edge `h` the corners' normals are tilted by `h / (sqrt(3) R)` from that of the face, and the
+    mean gap is `h^2 / (8 R)`: sqrt(3) / 8 = 0.22 of what is returned.
+
+    `points` (n, 3): of the nodes [m]. `faces` (k, 3): node ids, oriented outwards. Returns (k, 3): mean edge of each
+    face times the root mean square, over its corners, of each component of the corner's normal less the face's [m];
+    zero of a plane.
     """
     normals = feature_normals(points, faces)[0]
     tilt = normals[:, 4:] - normals[:, :1]

@@ -54,8 +54,8 @@ class _Spectrum:
         if np.finfo(np.float64).eps * values.max(initial=0.0) > _ROUNDED:
             from scipy.linalg import svd
 
-            # a column ten million times as long as the noise: its square has no digits left for the others; by the
-            # driver that always converges
+            # a column ten million times as long as the noise: its square has no digits left for the others; gesdd
+            # can fail to converge
             left, sizes, _ = svd(whitened, full_matrices=False, lapack_driver="gesvd")
             self.values, self.directions = sizes**2, left * sizes
 

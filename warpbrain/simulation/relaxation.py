@@ -111,8 +111,8 @@ def relax_to_rest(
     simulator.reset()
     u, v = np.zeros_like(external), np.zeros_like(external)
     history: list[RelaxationStep] = []
-    momentum = Momentum(system.mass.numpy().astype(np.float64))
-    swings, most = options.swing, options.max_swing_steps if options.swing else options.max_steps
+    momentum = Momentum(system.mass.numpy().astype(np.float64)) if options.swing else None
+    most = options.max_steps if momentum is None else options.max_swing_steps
     h, moved, share = options.time_step, 0.0, 1.0
     while len(history) < most:
         simulator.set_time_step(h)
@@ -143,13 +143,14 @@ def relax_to_rest(
         # copies: on the CPU these arrays are the live ones
         u, v = system.u.numpy().copy(), simulator.v.numpy().copy()
         if residual <= goal and moved >= 1.0:
-            swing = momentum.swing() if options.swing else None
+            swing = None if momentum is None else momentum.swing()
             return Relaxed(u.astype(np.float64), internal, residual, goal, tuple(history), swing)
-        if swings and arrived:
+        known = momentum is None or momentum.was_seen
+        if momentum is not None and arrived and not known:
             momentum.note(v, h)
-        if swings and momentum.was_seen:
-            swings, most = False, len(history) + options.max_steps
-        if not swings:
+            if momentum.was_seen:
+                most = len(history) + options.max_steps
+        if momentum is None or momentum.was_seen:
             h = min(2.0 * h, options.largest_step)
     raise SolveError(
         f"not at rest after {most} steps, {history[-1].time:.3g} s: relative out-of-balance force "

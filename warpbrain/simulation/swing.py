@@ -116,7 +116,7 @@ def _poles(series: Floats) -> NDArray[np.complex128]:
     if window < 2 or not series.any():
         return np.empty(0, dtype=complex)
     rows = np.lib.stride_tricks.sliding_window_view(series, window + 1)
-    # of hardly any rank: the driver by divide and conquer may not converge
+    # of low rank, where NumPy's driver (gesdd) can fail to converge
     _, sizes, right = svd(rows, full_matrices=False, lapack_driver="gesvd")
     kept = right[sizes > _RANK * sizes[0]]
     shift = np.linalg.lstsq(kept[:, :-1].T, kept[:, 1:].T, rcond=None)[0]

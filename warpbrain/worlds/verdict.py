@@ -121,14 +121,12 @@ def verdict_in_words(
         rest = f" Something else is left, which this does not explain.{words.rest}"
         return f"{' '.join(sentences)}{rest if verdict == NAMED_AND_REST else ''}"
     if verdict == NOT_PHYSICS:
-        sentences = [sentence for sentence, _ in words.members]
-        beside = words.physics_acts > belief("checks.perhaps")
-        told = f", as far as {data} tell" if beside else ""
-        chance = (
-            f"; that physics is missing beside it has a probability of {percent(words.physics_acts)}" if beside else ""
-        )
-        said = " ".join(sentences)
-        return f"It is not physics that is missing{told} ({p}). {said} That explains the mismatch better{chance}."
+        errors = " ".join(sentence for sentence, _ in words.members)
+        hedge, chance = "", ""
+        if words.physics_acts > belief("checks.perhaps"):
+            hedge = f", as far as {data} tell"
+            chance = f"; that physics is missing beside it has a probability of {percent(words.physics_acts)}"
+        return f"It is not physics that is missing{hedge} ({p}). {errors} That explains the mismatch better{chance}."
     if verdict == UNKNOWN:
         return (
             f"Something is missing ({p}) that none of the known mechanisms explains: {words.unnamed} fits better than "
