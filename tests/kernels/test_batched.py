@@ -161,7 +161,7 @@ def test_the_list_of_those_that_go_on_keeps_its_order(flags: list[int], listed: 
     slots, count, solving, active, active_count = (
         wp.array(values, dtype=int, device=device) for values in (order, [listed], flags, [-1] * 7, [-1])
     )
-    kernel = batched_solve_kernels(DOUBLE).gather_active
+    kernel = batched_solve_kernels(DOUBLE)[1].gather_active
     wp.launch(kernel, 7, inputs=[slots, count, solving, active, active_count], device=device)
     expected = [slot for slot in order[:listed] if flags[slot]]
     assert active_count.numpy()[0] == len(expected)

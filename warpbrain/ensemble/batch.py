@@ -185,7 +185,7 @@ class Batch:
         self._materials = BatchMaterials(system, samples, slots)
         self._kernels = batched_assembly_kernels(system.precision)
         self._motion = batched_motion_kernels(system.precision)
-        self._sums_kernels = batched_solve_kernels(system.precision)
+        _, self._sums_kernels = batched_solve_kernels(system.precision)
         self.shapes = np.zeros((0, system.size, 3)) if shapes is None else shapes
         model, p, n, m, b = system.model, system.precision, system.size, system.elements, slots
         self._u, self._u_start = (self._zeros(n, 3, b, dtype=wp.float64) for _ in range(2))

@@ -53,12 +53,9 @@ class BatchedConjugateGradient:
         parts: Parts | None = None,
     ) -> None:
         n, _, slots = x.shape
-        self._kernels = batched_solve_kernels(precision)
         self._device = device = x.device
-        self._free, self._v, self._x = free, v, x
-        self._tolerance = precision.scalar(tolerance)
-        self._max_iterations = max_iterations
-        self._size, self._slots = n, slots
+        self._tolerance, self._max_iterations = tolerance, max_iterations
+        self._precision, self._size, self._slots = precision, n, slots
         self._chunks, self._groups = stages(n)
 
         def zeros(*shape: int, dtype: Any = precision.scalar) -> wp.array:
@@ -77,18 +74,18 @@ class BatchedConjugateGradient:
             )  # fmt: skip
             return
         self.values = zeros(pattern.stored, 9, slots)
-        self._diagonal = diagonal
-        self._pattern = tuple(
+        made, self._kernels = batched_solve_kernels(precision)
+        self._systems = s = made()
+        s.offsets, s.columns, s.blocks = (
             wp.array(table, dtype=int, device=device) for table in (pattern.offsets, pattern.columns, pattern.pairs)
         )
-        self._active, self._count = zeros(slots, dtype=int), zeros(1, dtype=int)
-        self._z, self._p, self._q = zeros(n, 3, slots), zeros(n, 3, slots), zeros(n, 3, slots)
-        self._inverse = zeros(n, 6, slots)
-        self._shares, self._sums = zeros(3, self._chunks, slots), zeros(3, self._groups, slots)
-        self._alpha, self._beta = zeros(slots), zeros(slots)
-        self._rr, self._rz, self._goal = zeros(slots), zeros(slots), zeros(slots)
-        self._iterations = zeros(slots, dtype=int)
-        self._go_on = zeros(1, dtype=int)
+        s.diagonal, s.free, s.values, s.v, s.x, s.r = diagonal, free, self.values, v, x, self.right_hand_side
+        s.z, s.p, s.q, s.inverse = zeros(n, 3, slots), zeros(n, 3, slots), zeros(n, 3, slots), zeros(n, 6, slots)
+        s.shares, s.sums = zeros(3, self._chunks, slots), zeros(3, self._groups, slots)
+        for name in ("alpha", "beta", "rr", "rz", "goal"):
+            setattr(s, name, zeros(slots))
+        s.iterations, s.solving = zeros(slots, dtype=int), self.solving
+        self._active, self._count, self._go_on = zeros(slots, dtype=int), zeros(1, dtype=int), zeros(1, dtype=int)
 
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
         # small blocks: those whose lanes have all ended make room at once
@@ -98,17 +95,11 @@ class BatchedConjugateGradient:
         """Begin the systems of a list of slots, whose matrices, right-hand sides and guesses have been set."""
         if self._cluster is not None:
             return
-        k, lanes = self._kernels, self._slots
-        self._launch(k.invert_diagonal, (self._size, lanes), slots, count, self._diagonal, self.values, self._inverse)
-        self._launch(
-            k.start, (self._chunks, lanes), slots, count, *self._pattern, self.values, self._inverse, self._v,
-            self._free, self._x, self.right_hand_side, self._z, self._p, self._shares,
-        )  # fmt: skip
-        self._launch(k.add_shares, (3, self._groups, lanes), slots, count, self._shares, self._sums)
-        self._launch(
-            k.finish_start, lanes, slots, count, self._sums, self._tolerance, self._goal, self._rr, self._rz,
-            self._iterations, self.solving,
-        )  # fmt: skip
+        k, s, lanes = self._kernels, self._systems, self._slots
+        self._launch(k.invert_diagonal, (self._size, lanes), slots, count, s)
+        self._launch(k.start, (self._chunks, lanes), slots, count, s)
+        self._launch(k.add_shares, (3, self._groups, lanes), slots, count, s.shares, s.sums)
+        self._launch(k.finish_start, lanes, slots, count, s, self._precision.scalar(self._tolerance))
 
     def iterate(self, slots: wp.array, count: wp.array, linger: wp.array) -> None:
         """Go on with the systems of a list of slots until no more than `linger` (of one number) have not ended.
@@ -133,29 +124,21 @@ class BatchedConjugateGradient:
         wp.capture_while(self._go_on, cycle)
 
     def _iteration(self) -> None:
-        k, lanes, chunks = self._kernels, self._slots, (self._chunks, self._slots)
-        active = (self._active, self._count)
-        self._launch(k.product, chunks, *active, *self._pattern, self.values, self._p, self._q, self._shares)
-        self._launch(k.add_shares, (1, self._groups, lanes), *active, self._shares, self._sums)
-        self._launch(k.finish_product, lanes, *active, self._sums, self._rz, self._alpha)
-        self._launch(
-            k.advance, chunks, *active, self._alpha, self._inverse, self._p, self._q, self._x, self.right_hand_side,
-            self._z, self._shares,
-        )  # fmt: skip
-        self._launch(k.add_shares, (2, self._groups, lanes), *active, self._shares, self._sums)
-        self._launch(
-            k.finish_advance, lanes, *active, self._sums, self._max_iterations, self._goal, self._rr, self._rz,
-            self._beta, self._iterations, self.solving,
-        )  # fmt: skip
-        self._launch(k.turn, chunks, *active, self._beta, self._z, self._p)
+        k, s, lanes, chunks = self._kernels, self._systems, self._slots, (self._chunks, self._slots)
+        active = self._active, self._count
+        self._launch(k.product, chunks, *active, s)
+        self._launch(k.add_shares, (1, self._groups, lanes), *active, s.shares, s.sums)
+        self._launch(k.finish_product, lanes, *active, s)
+        self._launch(k.advance, chunks, *active, s)
+        self._launch(k.add_shares, (2, self._groups, lanes), *active, s.shares, s.sums)
+        self._launch(k.finish_advance, lanes, *active, s, self._max_iterations)
+        self._launch(k.turn, chunks, *active, s)
 
     def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Iterations, residual norms and goals of all slots, once the device has ended."""
         if self._cluster is not None:
             return self._cluster.results()
+        s = self._systems
         with np.errstate(invalid="ignore"):
-            return (
-                self._iterations.numpy().copy(),
-                np.sqrt(self._rr.numpy().astype(np.float64)),
-                np.sqrt(self._goal.numpy().astype(np.float64)),
-            )
+            residual, goal = (np.sqrt(squares.numpy().astype(np.float64)) for squares in (s.rr, s.goal))
+        return s.iterations.numpy().copy(), residual, goal

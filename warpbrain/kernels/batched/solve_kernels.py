@@ -1,6 +1,7 @@
 """Kernels of conjugate gradients for many systems of one pattern, each with scalars, sums and an end of its own."""
 
 from functools import cache
+from typing import Any
 
 import warp as wp
 
@@ -8,7 +9,6 @@ from warpbrain.kernels.batched.layout import (
     ROWS,
     SHARES,
     block_of,
-    row_product,
     store_symmetric,
     store_vector,
     symmetric_of,
@@ -19,45 +19,67 @@ from warpbrain.kernels.precision import Precision
 
 
 @cache
-def batched_solve_kernels(precision: Precision) -> KernelSet:
-    """Make (once) the kernels of batched conjugate gradients in a precision; the last index of each is a lane."""
+def batched_solve_kernels(precision: Precision) -> tuple[Any, KernelSet]:
+    """Make (once) what the kernels of batched conjugate gradients in a precision know, and these.
+
+    The last index of each kernel is a lane.
+    """
     scalar, vec3 = precision.scalar, precision.vec3
     kernels = KernelSet(f"linear_{precision.name}_batched")
     rows = wp.constant(ROWS)
     shares_each = wp.constant(SHARES)
 
+    @wp.struct
+    class Systems:
+        # of the pattern; blocks says where `A_ij`, or for j < i its transpose, is kept
+        offsets: wp.array[int]
+        columns: wp.array[int]
+        blocks: wp.array[int]
+        diagonal: wp.array[int]
+        free: wp.array[vec3]
+        # of each system, see `BatchedConjugateGradient`
+        values: wp.array3d[scalar]
+        v: wp.array3d[scalar]
+        x: wp.array3d[scalar]
+        r: wp.array3d[scalar]
+        z: wp.array3d[scalar]
+        p: wp.array3d[scalar]
+        q: wp.array3d[scalar]
+        inverse: wp.array3d[scalar]
+        # shares of three sums, and what their second stage leaves of these
+        shares: wp.array3d[scalar]
+        sums: wp.array3d[scalar]
+        alpha: wp.array[scalar]
+        beta: wp.array[scalar]
+        rr: wp.array[scalar]
+        rz: wp.array[scalar]
+        goal: wp.array[scalar]
+        iterations: wp.array[int]
+        solving: wp.array[int]
+
+    @wp.func
+    def row_product(s: Systems, x: wp.array3d[scalar], i: int, slot: int):
+        """`sum_j A_ij x_j` of a sample."""
+        y = vec3()
+        for k in range(s.offsets[i], s.offsets[i + 1]):
+            j = s.columns[k]
+            A = block_of(s.values, s.blocks[k], 0, slot)
+            if j < i:
+                A = wp.transpose(A)
+            y += A * vector_of(x, j, slot)
+        return y
+
     @kernels.add
-    def invert_diagonal(
-        slots: wp.array[int],
-        count: wp.array[int],
-        diagonal: wp.array[int],
-        values: wp.array3d[scalar],
-        inverse: wp.array3d[scalar],
-    ):
+    def invert_diagonal(slots: wp.array[int], count: wp.array[int], s: Systems):
         """One thread for a node: the inverse of its diagonal block."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
-        store_symmetric(inverse, i, 0, slot, wp.inverse(block_of(values, diagonal[i], 0, slot)))
+        store_symmetric(s.inverse, i, 0, slot, wp.inverse(block_of(s.values, s.diagonal[i], 0, slot)))
 
     @kernels.add
-    def start(
-        slots: wp.array[int],
-        count: wp.array[int],
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        blocks: wp.array[int],
-        values: wp.array3d[scalar],
-        inverse: wp.array3d[scalar],
-        v: wp.array3d[scalar],
-        free: wp.array[vec3],
-        x: wp.array3d[scalar],
-        r: wp.array3d[scalar],
-        z: wp.array3d[scalar],
-        p: wp.array3d[scalar],
-        shares: wp.array3d[scalar],
-    ):
+    def start(slots: wp.array[int], count: wp.array[int], s: Systems):
         """One thread for `ROWS` nodes: `b - A v` on free components, of `b` in the place of `r`, residual
         `r = b - A v - A x`, `z = D^-1 r`, `p = z`; shares of `|b - A v|^2`, `r . r` and `r . z`."""
         chunk, lane = wp.tid()
@@ -67,93 +89,66 @@ def batched_solve_kernels(precision: Precision) -> KernelSet:
         bb = scalar(0.0)
         rr = scalar(0.0)
         rz = scalar(0.0)
-        for i in range(chunk * rows, wp.min((chunk + 1) * rows, x.shape[0])):
-            Av = row_product(offsets, columns, blocks, values, v, i, slot)
-            b = vector_of(r, i, slot) - wp.cw_mul(free[i], Av)
-            ri = b - row_product(offsets, columns, blocks, values, x, i, slot)
-            zi = symmetric_of(inverse, i, 0, slot) * ri
-            store_vector(r, i, slot, ri)
-            store_vector(z, i, slot, zi)
-            store_vector(p, i, slot, zi)
+        for i in range(chunk * rows, wp.min((chunk + 1) * rows, s.x.shape[0])):
+            Av = row_product(s, s.v, i, slot)
+            b = vector_of(s.r, i, slot) - wp.cw_mul(s.free[i], Av)
+            ri = b - row_product(s, s.x, i, slot)
+            zi = symmetric_of(s.inverse, i, 0, slot) * ri
+            store_vector(s.r, i, slot, ri)
+            store_vector(s.z, i, slot, zi)
+            store_vector(s.p, i, slot, zi)
             bb += wp.dot(b, b)
             rr += wp.dot(ri, ri)
             rz += wp.dot(ri, zi)
-        shares[0, chunk, slot] = bb
-        shares[1, chunk, slot] = rr
-        shares[2, chunk, slot] = rz
+        s.shares[0, chunk, slot] = bb
+        s.shares[1, chunk, slot] = rr
+        s.shares[2, chunk, slot] = rz
 
     @kernels.add
-    def product(
-        slots: wp.array[int],
-        count: wp.array[int],
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        blocks: wp.array[int],
-        values: wp.array3d[scalar],
-        p: wp.array3d[scalar],
-        q: wp.array3d[scalar],
-        shares: wp.array3d[scalar],
-    ):
+    def product(slots: wp.array[int], count: wp.array[int], s: Systems):
         """Likewise: `q = A p`; shares of `p . q`."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
         pq = scalar(0.0)
-        for i in range(chunk * rows, wp.min((chunk + 1) * rows, p.shape[0])):
-            qi = row_product(offsets, columns, blocks, values, p, i, slot)
-            store_vector(q, i, slot, qi)
-            pq += wp.dot(vector_of(p, i, slot), qi)
-        shares[0, chunk, slot] = pq
+        for i in range(chunk * rows, wp.min((chunk + 1) * rows, s.p.shape[0])):
+            qi = row_product(s, s.p, i, slot)
+            store_vector(s.q, i, slot, qi)
+            pq += wp.dot(vector_of(s.p, i, slot), qi)
+        s.shares[0, chunk, slot] = pq
 
     @kernels.add
-    def advance(
-        slots: wp.array[int],
-        count: wp.array[int],
-        alpha: wp.array[scalar],
-        inverse: wp.array3d[scalar],
-        p: wp.array3d[scalar],
-        q: wp.array3d[scalar],
-        x: wp.array3d[scalar],
-        r: wp.array3d[scalar],
-        z: wp.array3d[scalar],
-        shares: wp.array3d[scalar],
-    ):
+    def advance(slots: wp.array[int], count: wp.array[int], s: Systems):
         """Likewise: `x += alpha p`, `r -= alpha q`, `z = D^-1 r`; shares of `r . r` and `r . z`."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
-        a = alpha[slot]
+        a = s.alpha[slot]
         rr = scalar(0.0)
         rz = scalar(0.0)
-        for i in range(chunk * rows, wp.min((chunk + 1) * rows, x.shape[0])):
-            store_vector(x, i, slot, vector_of(x, i, slot) + a * vector_of(p, i, slot))
-            ri = vector_of(r, i, slot) - a * vector_of(q, i, slot)
-            zi = symmetric_of(inverse, i, 0, slot) * ri
-            store_vector(r, i, slot, ri)
-            store_vector(z, i, slot, zi)
+        for i in range(chunk * rows, wp.min((chunk + 1) * rows, s.x.shape[0])):
+            store_vector(s.x, i, slot, vector_of(s.x, i, slot) + a * vector_of(s.p, i, slot))
+            ri = vector_of(s.r, i, slot) - a * vector_of(s.q, i, slot)
+            zi = symmetric_of(s.inverse, i, 0, slot) * ri
+            store_vector(s.r, i, slot, ri)
+            store_vector(s.z, i, slot, zi)
             rr += wp.dot(ri, ri)
             rz += wp.dot(ri, zi)
-        shares[0, chunk, slot] = rr
-        shares[1, chunk, slot] = rz
+        s.shares[0, chunk, slot] = rr
+        s.shares[1, chunk, slot] = rz
 
     @kernels.add
-    def turn(
-        slots: wp.array[int],
-        count: wp.array[int],
-        beta: wp.array[scalar],
-        z: wp.array3d[scalar],
-        p: wp.array3d[scalar],
-    ):
+    def turn(slots: wp.array[int], count: wp.array[int], s: Systems):
         """Likewise: `p = z + beta p`."""
         chunk, lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
-        b = beta[slot]
-        for i in range(chunk * rows, wp.min((chunk + 1) * rows, p.shape[0])):
-            store_vector(p, i, slot, vector_of(z, i, slot) + b * vector_of(p, i, slot))
+        b = s.beta[slot]
+        for i in range(chunk * rows, wp.min((chunk + 1) * rows, s.p.shape[0])):
+            store_vector(s.p, i, slot, vector_of(s.z, i, slot) + b * vector_of(s.p, i, slot))
 
     @kernels.add
     def add_shares(slots: wp.array[int], count: wp.array[int], shares: wp.array3d[scalar], sums: wp.array3d[scalar]):
@@ -175,69 +170,42 @@ def batched_solve_kernels(precision: Precision) -> KernelSet:
         return total
 
     @kernels.add
-    def finish_start(
-        slots: wp.array[int],
-        count: wp.array[int],
-        sums: wp.array3d[scalar],
-        tolerance: scalar,
-        goal: wp.array[scalar],
-        rr: wp.array[scalar],
-        rz: wp.array[scalar],
-        iterations: wp.array[int],
-        solving: wp.array[int],
-    ):
+    def finish_start(slots: wp.array[int], count: wp.array[int], s: Systems, tolerance: scalar):
         """Third stage, one thread for a sample: its scalars, and whether it goes on."""
         lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
-        goal[slot] = tolerance * tolerance * total_of(sums, 0, slot)
-        rr[slot] = total_of(sums, 1, slot)
-        rz[slot] = total_of(sums, 2, slot)
-        iterations[slot] = 0
-        solving[slot] = 0
+        s.goal[slot] = tolerance * tolerance * total_of(s.sums, 0, slot)
+        s.rr[slot] = total_of(s.sums, 1, slot)
+        s.rz[slot] = total_of(s.sums, 2, slot)
+        s.iterations[slot] = 0
+        s.solving[slot] = 0
         # written so that a residual that is not a number is the end
-        if rr[slot] > goal[slot]:
-            solving[slot] = 1
+        if s.rr[slot] > s.goal[slot]:
+            s.solving[slot] = 1
 
     @kernels.add
-    def finish_product(
-        slots: wp.array[int],
-        count: wp.array[int],
-        sums: wp.array3d[scalar],
-        rz: wp.array[scalar],
-        alpha: wp.array[scalar],
-    ):
+    def finish_product(slots: wp.array[int], count: wp.array[int], s: Systems):
         lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
-        alpha[slot] = rz[slot] / total_of(sums, 0, slot)
+        s.alpha[slot] = s.rz[slot] / total_of(s.sums, 0, slot)
 
     @kernels.add
-    def finish_advance(
-        slots: wp.array[int],
-        count: wp.array[int],
-        sums: wp.array3d[scalar],
-        max_iterations: int,
-        goal: wp.array[scalar],
-        rr: wp.array[scalar],
-        rz: wp.array[scalar],
-        beta: wp.array[scalar],
-        iterations: wp.array[int],
-        solving: wp.array[int],
-    ):
+    def finish_advance(slots: wp.array[int], count: wp.array[int], s: Systems, max_iterations: int):
         lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
-        new = total_of(sums, 1, slot)
-        beta[slot] = new / rz[slot]
-        rz[slot] = new
-        rr[slot] = total_of(sums, 0, slot)
-        iterations[slot] = iterations[slot] + 1
-        if not (rr[slot] > goal[slot]) or iterations[slot] >= max_iterations:
-            solving[slot] = 0
+        new = total_of(s.sums, 1, slot)
+        s.beta[slot] = new / s.rz[slot]
+        s.rz[slot] = new
+        s.rr[slot] = total_of(s.sums, 0, slot)
+        s.iterations[slot] = s.iterations[slot] + 1
+        if not (s.rr[slot] > s.goal[slot]) or s.iterations[slot] >= max_iterations:
+            s.solving[slot] = 0
 
     @kernels.add
     def gather_active(
@@ -278,4 +246,4 @@ def batched_solve_kernels(precision: Precision) -> KernelSet:
         if active_count[0] > linger[0]:
             condition[0] = 1
 
-    return kernels
+    return Systems, kernels
