@@ -36,7 +36,7 @@ def test_matrices_of_samples(law: str, device: str, precision: Precision) -> Non
     for where in ("cpu", device):
         batch = Batch(System(model, where, precision.name), samples, slots, tolerance=1e-6)
         batch.place({slot: sample.number for slot, sample in enumerate(samples)})
-        for numbers, values in ((batch._u, u), (batch._k, k), (batch._m, 1e3 * m)):
+        for numbers, values in ((batch._samples.u, u), (batch._samples.k, k), (batch._samples.m, 1e3 * m)):
             numbers.assign(values)
         for listed in (batch._start, batch._fresh):
             listed[0].assign(order)
@@ -46,7 +46,7 @@ def test_matrices_of_samples(law: str, device: str, precision: Precision) -> Non
         batch._begin_steps()
         found[where] = batch._cg.values.numpy().astype(float)
         assert not np.any(found[where][:, :, order[count:]])
-        found[where + " forces"] = batch._internal.numpy().astype(float)
+        found[where + " forces"] = batch._samples.internal.numpy().astype(float)
     expected = found["cpu"]
     scale = np.abs(expected).max(axis=(0, 1))[order[:count]]
     apart = np.abs(found[device] - expected).max(axis=(0, 1))[order[:count]]

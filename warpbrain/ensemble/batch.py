@@ -26,7 +26,7 @@ from warpbrain.errors import InputError
 from warpbrain.kernels.batched.assembly import batched_assembly_kernels
 from warpbrain.kernels.batched.cluster import fitting_parts
 from warpbrain.kernels.batched.elements import batched_element_kernels
-from warpbrain.kernels.batched.layout import TANGENT, stages
+from warpbrain.kernels.batched.layout import TANGENT, samples_struct, stages
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
 from warpbrain.kernels.batched.motion import batched_motion_kernels
 from warpbrain.kernels.batched.parts import Parts, Pattern
@@ -54,10 +54,8 @@ class BatchGroup:
     kernels: KernelSet
     members: NDArray[np.intp]  # elements, and which tissue of the group each is of
     tissues: NDArray[np.intp]
-    elements: wp.array  # the same on the device
-    tissue: wp.array
-    parameters: wp.array  # one row for a tissue and a slot, slots fastest; and in double precision
-    exact: wp.array
+    on_device: Any  # the same for its kernels, with parameters
+    exact: wp.array  # the parameters in double precision
     rows: Floats  # the same on the host, shape (tissues, slots, parameters)
     known: Mapping[int, Floats]  # rows of each sample by its number, shape (tissues, parameters)
 
@@ -99,27 +97,21 @@ class BatchMaterials:
         members = np.flatnonzero(np.isin(tissue, labels))
         tissues = np.searchsorted(labels, tissue[members])
         law = law_type.device_law(formulation)
-
         array = partial(wp.array, device=system.device)
-        return BatchGroup(
-            law,
-            batched_element_kernels(law, p),
-            members,
-            tissues,
-            array(members, dtype=int),
-            array(tissues, dtype=int),
-            array(rows.reshape(-1, rows.shape[2]), dtype=p.scalar),
-            array(rows.reshape(-1, rows.shape[2]), dtype=wp.float64),
-            rows,
-            dict(zip(samples, table, strict=True)),
-        )
+        made, kernels = batched_element_kernels(law, p)
+        group = made()
+        group.elements, group.tissue = array(members, dtype=int), array(tissues, dtype=int)
+        flat = rows.reshape(-1, rows.shape[2])
+        group.parameters, exact = array(flat, dtype=p.scalar), array(flat, dtype=wp.float64)
+        known = dict(zip(samples, table, strict=True))
+        return BatchGroup(law, kernels, members, tissues, group, exact, rows, known)
 
     def place(self, numbers: Mapping[int, int]) -> None:
         """Put samples, by their numbers, into slots."""
         for group in self.groups:
             for slot, number in numbers.items():
                 group.rows[:, slot] = group.known[number]
-            for parameters in (group.parameters, group.exact):
+            for parameters in (group.on_device.parameters, group.exact):
                 parameters.assign(group.rows.reshape(-1, group.rows.shape[2]))
 
 
@@ -188,10 +180,16 @@ class Batch:
         _, self._sums_kernels = batched_solve_kernels(system.precision)
         self.shapes = np.zeros((0, system.size, 3)) if shapes is None else shapes
         model, p, n, m, b = system.model, system.precision, system.size, system.elements, slots
-        self._u, self._u_start = (self._zeros(n, 3, b, dtype=wp.float64) for _ in range(2))
-        self._v, self._v_start, self._dv = (self._zeros(n, 3, b) for _ in range(3))
-        self._prescribed, self._internal = self._zeros(n, 3, b), self._zeros(n, 3, b)
-        self._element_forces, self._element_J = self._zeros(4 * m, 3, b), self._zeros(m, b)
+        self._samples = s = samples_struct(p)()
+        for name in (
+            *("nodes", "inverse_edges", "volume", "mass", "free"),
+            *("corner_first", "corners", "pairs", "pair_first", "contributions"),
+        ):
+            setattr(s, name, getattr(system, name))
+        s.u, s.u_start = (self._zeros(n, 3, b, dtype=wp.float64) for _ in range(2))
+        for name in ("v", "v_start", "dv", "prescribed", "internal"):
+            setattr(s, name, self._zeros(n, 3, b))
+        s.element_forces, s.element_J = self._zeros(4 * m, 3, b), self._zeros(m, b)
         # slots, and how many of them are in the list
         self._all = self._array(np.arange(b), int), self._array([b], int)
         self._fresh = self._zeros(b, dtype=int), self._zeros(1, dtype=int)
@@ -209,15 +207,16 @@ class Batch:
         self.amounts = np.zeros((len(self.shapes), b))
         # no load is one load of nothing: a launch takes no array without rows
         forces = [load.nodal_forces(model.mesh) for load in model.loads] or [np.zeros((n, 3))]
-        self._loads = self._array(np.array(forces), p.vec3)
+        s.loads = self._array(np.array(forces), p.vec3)
         # and of numbers
         self._numbers = numbers = self._zeros(3 + len(forces) + max(1, len(self.shapes)), b)
-        self._h, self._k, self._m = numbers[0], numbers[1], numbers[2]
-        self._factors, self._amounts = numbers[3 : 3 + len(forces)], numbers[3 + len(forces) :]
-        self._final = self._array(model.external_forces(), p.vec3)
-        self._shapes = self._array(self.shapes, p.vec3) if len(self.shapes) else None
+        s.h, s.k, s.m = numbers[0], numbers[1], numbers[2]
+        s.factors, s.amounts = numbers[3 : 3 + len(forces)], numbers[3 + len(forces) :]
+        s.external = self._array(model.external_forces(), p.vec3)
+        if len(self.shapes):
+            s.shapes = self._array(self.shapes, p.vec3)
         self._chunks, self._groups = stages(n)
-        self._shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._groups, b)
+        s.shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._groups, b)
         # and what it tells: two norms, the smallest `J`, and whether these are new
         self._found = self._zeros(4, b)
         self._totals, self._min_J = self._found[:2], self._found[2:3]
@@ -228,18 +227,13 @@ class Batch:
         # on the chip sums are in double precision, and tangents are before they are added up
         roundings = 20.0 if parts is None else 8.0
         self._cg = BatchedConjugateGradient(
-            pattern_of(system),
-            system.free,
-            self._v,
-            self._dv,
-            system.precision,
-            tolerance=finest_tolerance(tolerance, system.precision, roundings),
-            max_iterations=_MAX_CG,
-            parts=parts,
-        )
+            pattern_of(system), system.free, s.v, s.dv, p,
+            tolerance=finest_tolerance(tolerance, p, roundings), max_iterations=_MAX_CG, parts=parts,
+        )  # fmt: skip
+        s.values, s.b, s.solving = self._cg.values, self._cg.right_hand_side, self._cg.solving
         # matrices are made of elements where they are solved for, or of tangents in memory
         self._patches = self._patch_assembly() if self._cg.side_by_side else None
-        self._tangents = self._zeros(0 if self._patches else m, TANGENT, b)
+        s.tangents = self._zeros(0 if self._patches else m, TANGENT, b)
         self._every = self._array(np.arange(n), int)
         self.held = np.flatnonzero(np.any(model.constrained, axis=1))
         self._held = self._array(self.held, int)
@@ -256,7 +250,7 @@ class Batch:
         return PatchAssembly(
             [(group.law, group.members, group.tissues, group.exact) for group in self._materials.groups],
             mesh.points, s.tetrahedra, s.shape_gradients, mesh.volumes, s.pairs.numpy(), s.free.numpy() != 0.0, s.mass,
-            self._u, self._cg.values, self._precision, shared_memory(self._device),
+            self._samples.u, self._cg.values, self._precision, shared_memory(self._device),
         )  # fmt: skip
 
     def _array(self, values: Any, dtype: Any) -> wp.array:
@@ -277,24 +271,21 @@ class Batch:
             return
         self._materials.place(numbers)
         slots = self._array(list(numbers), int)
-        self._launch(self._motion.reset, (self.system.size, len(numbers)), slots, self._u, self._v, self._dv)
+        self._launch(self._motion.reset, (self.system.size, len(numbers)), slots, self._samples)
 
     def restore(self, slots: Sequence[int]) -> None:
         """Back to the state before the last step, to be evaluated in the next pass."""
         if not len(slots):
             return
-        self._launch(
-            self._motion.restore, (self.system.size, len(slots)), self._array(slots, int), self._u_start,
-            self._v_start, self._u, self._v, self._dv,
-        )  # fmt: skip
+        self._launch(self._motion.restore, (self.system.size, len(slots)), self._array(slots, int), self._samples)
 
     def displacements(self, slots: Sequence[int]) -> Floats:
         """`u` of some slots [m], shape (slots, n, 3)."""
-        return self._collect(self._u, slots, self._every, self._room.take(len(slots)))
+        return self._collect(self._samples.u, slots, self._every, self._room.take(len(slots)))
 
     def held_forces(self, slots: Sequence[int]) -> Floats:
         """Internal forces of some slots [N] on the nodes `held`, shape (slots, held, 3)."""
-        return self._collect(self._internal, slots, self._held, np.empty((len(slots), len(self.held), 3)))
+        return self._collect(self._samples.internal, slots, self._held, np.empty((len(slots), len(self.held), 3)))
 
     def _collect(self, values: wp.array, slots: Sequence[int], nodes: wp.array, collected: Floats) -> Floats:
         """Vectors of some slots at some nodes, in an array for them."""
@@ -310,7 +301,7 @@ class Batch:
 
     def element_J(self, slot: int) -> Floats:
         """Volume ratio of each element of a slot, shape (m,)."""
-        return self._element_J[:, slot].contiguous().numpy().astype(np.float64)
+        return self._samples.element_J[:, slot].contiguous().numpy().astype(np.float64)
 
     # -- a pass ---------------------------------------------------------------------------------------------------
 
@@ -330,7 +321,7 @@ class Batch:
         h, damping = self.time_step, self.system.model.damping
         numbers[:3] = h, h * damping.stiffness + h * h, 1.0 + h * damping.mass
         numbers[3 : 3 + len(self.load_factors)] = self.load_factors
-        numbers[3 + self._factors.shape[0] :][: len(self.amounts)] = self.amounts
+        numbers[3 + self._samples.factors.shape[0] :][: len(self.amounts)] = self.amounts
         wp.capture_launch(self._graph)
         if self._states_copied is not None:
             wp.record_event(self._states_copied)
@@ -368,10 +359,7 @@ class Batch:
         wp.copy(self._numbers, numbers)
         self._begin_steps()
         self._cg.iterate(*self._solve, self._linger_count)
-        self._launch(
-            self._motion.update, (self.system.size, self.slots), *self._solve, self._cg.solving,
-            self._u_start, self._v_start, self._dv, self._prescribed, self.system.free, self._h, self._v, self._u,
-        )  # fmt: skip
+        self._launch(self._motion.update, (self.system.size, self.slots), *self._solve, self._samples)
         self._launch(
             self._motion.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready,
             self._found[3],
@@ -381,60 +369,36 @@ class Batch:
         wp.copy(found, self._found)
 
     def _begin_steps(self) -> None:
-        s, lanes, begun = self.system, self.slots, self._start
-        if self._shapes is not None:
-            self._launch(
-                self._motion.prescribe, (s.size, lanes), *begun, self._shapes, self._amounts, s.free, self._h, self._u,
-                self._prescribed,
-            )  # fmt: skip
+        s, nodes, begun = self._samples, (self.system.size, self.slots), self._start
+        if len(self.shapes):
+            self._launch(self._motion.prescribe, nodes, *begun, s)
         if not self._ahead:
             self._assemble(begun)
-        self._launch(
-            self._motion.begin, (s.size, lanes), *begun, self._loads, self._factors, self._internal, s.mass, s.free,
-            self._h, self._u, self._v, self._u_start, self._v_start, self._cg.right_hand_side,
-        )  # fmt: skip
-        if self._shapes is not None:
+        self._launch(self._motion.begin, nodes, *begun, s)
+        if len(self.shapes):
             for group in self._materials.groups:
-                self._launch(
-                    group.kernels.tangents_times, (len(group.elements), lanes), *begun, *self._elements_of(group),
-                    self._u, self._prescribed, self._element_forces,
-                )  # fmt: skip
-            self._launch(
-                self._kernels.constrained_load, (s.size, lanes), *begun, s.corner_first, s.corners,
-                self._element_forces, s.free, self._k, self._cg.right_hand_side,
-            )  # fmt: skip
+                of_elements = len(group.members), self.slots
+                self._launch(group.kernels.tangents_times, of_elements, *begun, group.on_device, s)
+            self._launch(self._kernels.constrained_load, nodes, *begun, s)
         self._cg.start(*begun)
 
     def _assemble(self, listed: tuple[wp.array, wp.array]) -> None:
         """Matrices of a list of slots, whose states have been evaluated."""
-        s = self.system
+        s = self._samples
         if self._patches is not None:
-            self._patches.assemble(*listed, self._k, self._m)
-            return
-        self._launch(
-            self._kernels.gather_matrix, (len(s.pairs), self.slots), *listed, s.pairs, s.pair_first, s.contributions,
-            self._tangents, s.mass, s.free, self._k, self._m, self._cg.values,
-        )  # fmt: skip
-
-    def _elements_of(self, group: BatchGroup) -> tuple[wp.array, ...]:
-        s = self.system
-        return group.elements, group.tissue, s.nodes, s.inverse_edges, s.volume, group.parameters
+            self._patches.assemble(*listed, s.k, s.m)
+        else:
+            self._launch(self._kernels.gather_matrix, (len(s.pairs), self.slots), *listed, s)
 
     def _evaluate(self) -> None:
         """Forces, tangents where they are kept, `J` and balance at the states of the fresh list."""
-        s, lanes, fresh = self.system, self.slots, self._fresh
+        s, lanes, fresh = self._samples, self.slots, self._fresh
         for group in self._materials.groups:
-            of_elements = (len(group.elements), lanes), *fresh, *self._elements_of(group), self._u, self._element_forces
-            if self._patches is not None:
-                self._launch(group.kernels.forces, *of_elements, self._element_J)
-            else:
-                self._launch(group.kernels.forces_and_tangents, *of_elements, self._tangents, self._element_J)
-        self._launch(
-            self._kernels.gather_forces, (self._chunks, lanes), *fresh, s.corner_first, s.corners,
-            self._element_forces, self._final, s.free, self._internal, self._shares,
-        )  # fmt: skip
-        self._launch(self._sums_kernels.add_shares, (2, self._groups, lanes), *fresh, self._shares, self._sums)
+            kernel = group.kernels.forces_and_tangents if self._patches is None else group.kernels.forces
+            self._launch(kernel, (len(group.members), lanes), *fresh, group.on_device, s)
+        self._launch(self._kernels.gather_forces, (self._chunks, lanes), *fresh, s)
+        self._launch(self._sums_kernels.add_shares, (2, self._groups, lanes), *fresh, s.shares, self._sums)
         self._launch(self._sums_kernels.add_sums, (2, lanes), *fresh, self._sums, self._totals)
         shares = self._least_J.shape[0]
-        self._launch(self._kernels.smallest, (shares, lanes), *fresh, self._J_share, self._element_J, self._least_J)
+        self._launch(self._kernels.smallest, (shares, lanes), *fresh, self._J_share, s.element_J, self._least_J)
         self._launch(self._kernels.smallest, (1, lanes), *fresh, shares, self._least_J, self._min_J)

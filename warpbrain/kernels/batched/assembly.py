@@ -7,7 +7,7 @@ from functools import cache
 
 import warp as wp
 
-from warpbrain.kernels.batched.layout import ROWS, store_block, store_vector, tangent_of, vector_of
+from warpbrain.kernels.batched.layout import ROWS, samples_struct, store_block, store_vector, tangent_of, vector_of
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
@@ -16,23 +16,11 @@ from warpbrain.kernels.precision import Precision
 def batched_assembly_kernels(precision: Precision) -> KernelSet:
     """Make (once) the batched assembly kernels of a precision; the last index of each is a lane."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    kernels = KernelSet(f"assembly_{precision.name}_batched")
+    kernels, Samples = KernelSet(f"assembly_{precision.name}_batched"), samples_struct(precision)
     rows = wp.constant(ROWS)
 
     @kernels.add
-    def gather_matrix(
-        slots: wp.array[int],
-        count: wp.array[int],
-        pairs: wp.array[wp.vec2i],
-        first: wp.array[int],
-        contributions: wp.array[int],
-        tangents: wp.array3d[scalar],
-        mass: wp.array[scalar],
-        free: wp.array[vec3],
-        k: wp.array[scalar],
-        m: wp.array[scalar],
-        values: wp.array3d[scalar],
-    ):
+    def gather_matrix(slots: wp.array[int], count: wp.array[int], s: Samples):
         """One thread for a pair of nodes and its block `A_ij = k K_ij + m M_ij`, with `k` and `m` of the sample and the
         rows and columns of constrained components replaced by those of the identity."""
         p, lane = wp.tid()
@@ -40,30 +28,20 @@ def batched_assembly_kernels(precision: Precision) -> KernelSet:
             return
         slot = slots[lane]
         K = mat33()
-        for c in range(first[p], first[p + 1]):
-            K += tangent_of(tangents, contributions[c] / 10, contributions[c] % 10, slot)
-        i = pairs[p][0]
-        j = pairs[p][1]
-        A = wp.cw_mul(k[slot] * K, wp.outer(free[i], free[j]))
+        for c in range(s.pair_first[p], s.pair_first[p + 1]):
+            K += tangent_of(s.tangents, s.contributions[c] / 10, s.contributions[c] % 10, slot)
+        i = s.pairs[p][0]
+        j = s.pairs[p][1]
+        A = wp.cw_mul(s.k[slot] * K, wp.outer(s.free[i], s.free[j]))
         if i == j:
             one = scalar(1.0)
-            inertia = m[slot] * mass[i]
+            inertia = s.m[slot] * s.mass[i]
             for c in range(3):
-                A[c, c] += free[i][c] * inertia + (one - free[i][c])
-        store_block(values, p, 0, slot, A)
+                A[c, c] += s.free[i][c] * inertia + (one - s.free[i][c])
+        store_block(s.values, p, 0, slot, A)
 
     @kernels.add
-    def gather_forces(
-        slots: wp.array[int],
-        count: wp.array[int],
-        first: wp.array[int],
-        corners: wp.array[int],
-        element_forces: wp.array3d[scalar],
-        external: wp.array[vec3],
-        free: wp.array[vec3],
-        internal: wp.array3d[scalar],
-        shares: wp.array3d[scalar],
-    ):
+    def gather_forces(slots: wp.array[int], count: wp.array[int], s: Samples):
         """One thread for `ROWS` nodes: internal forces, and the shares of the squared norms of what is out of balance
         on the free components and of the internal forces."""
         chunk, lane = wp.tid()
@@ -72,16 +50,16 @@ def batched_assembly_kernels(precision: Precision) -> KernelSet:
         slot = slots[lane]
         unbalanced = scalar(0.0)
         size = scalar(0.0)
-        for i in range(chunk * rows, wp.min((chunk + 1) * rows, internal.shape[0])):
+        for i in range(chunk * rows, wp.min((chunk + 1) * rows, s.internal.shape[0])):
             f = vec3()
-            for c in range(first[i], first[i + 1]):
-                f += vector_of(element_forces, corners[c], slot)
-            store_vector(internal, i, slot, f)
-            lack = wp.cw_mul(free[i], external[i] - f)
+            for c in range(s.corner_first[i], s.corner_first[i + 1]):
+                f += vector_of(s.element_forces, s.corners[c], slot)
+            store_vector(s.internal, i, slot, f)
+            lack = wp.cw_mul(s.free[i], s.external[i] - f)
             unbalanced += wp.dot(lack, lack)
             size += wp.dot(f, f)
-        shares[0, chunk, slot] = unbalanced
-        shares[1, chunk, slot] = size
+        s.shares[0, chunk, slot] = unbalanced
+        s.shares[1, chunk, slot] = size
 
     @kernels.add
     def smallest(
@@ -101,24 +79,15 @@ def batched_assembly_kernels(precision: Precision) -> KernelSet:
         least[chunk, slot] = low
 
     @kernels.add
-    def constrained_load(
-        slots: wp.array[int],
-        count: wp.array[int],
-        first: wp.array[int],
-        corners: wp.array[int],
-        element_forces: wp.array3d[scalar],
-        free: wp.array[vec3],
-        k: wp.array[scalar],
-        load: wp.array3d[scalar],
-    ):
+    def constrained_load(slots: wp.array[int], count: wp.array[int], s: Samples):
         """One thread for a node: subtract `k K d`, of elements' forces `K d`, from the right-hand side."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
         f = vec3()
-        for c in range(first[i], first[i + 1]):
-            f += vector_of(element_forces, corners[c], slot)
-        store_vector(load, i, slot, vector_of(load, i, slot) - wp.cw_mul(free[i], k[slot] * f))
+        for c in range(s.corner_first[i], s.corner_first[i + 1]):
+            f += vector_of(s.element_forces, s.corners[c], slot)
+        store_vector(s.b, i, slot, vector_of(s.b, i, slot) - wp.cw_mul(s.free[i], s.k[slot] * f))
 
     return kernels

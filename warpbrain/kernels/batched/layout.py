@@ -1,8 +1,11 @@
-"""Vectors and 3 x 3 blocks of a sample in arrays whose last index is the sample's slot."""
+"""What kernels know of the samples of a batch; vectors and blocks of one, whose slot is the last index of arrays."""
 
+from functools import cache
 from typing import Any
 
 import warp as wp
+
+from warpbrain.kernels.precision import Precision
 
 #: Rows of the mesh that one thread works through; their share of a sum is added up on the way.
 ROWS = 4
@@ -16,6 +19,56 @@ def stages(rows: int) -> tuple[int, int]:
     """How many threads a sum over `rows` takes in its first and in its second stage."""
     chunks = -(-rows // ROWS)
     return chunks, -(-chunks // SHARES)
+
+
+@cache
+def samples_struct(precision: Precision) -> Any:
+    """Make (once) what the kernels of a precision know of the samples of a batch."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+
+    @wp.struct
+    class Samples:
+        # what all of them share, as of `warpbrain.simulation.system.System`
+        nodes: wp.array[wp.vec4i]
+        inverse_edges: wp.array[mat33]
+        volume: wp.array[scalar]
+        mass: wp.array[scalar]
+        free: wp.array[vec3]
+        corner_first: wp.array[int]
+        corners: wp.array[int]
+        pairs: wp.array[wp.vec2i]
+        pair_first: wp.array[int]
+        contributions: wp.array[int]
+        # loads and prescribed displacements at a factor of 1, their factors, and what acts in the end
+        loads: wp.array2d[vec3]
+        shapes: wp.array2d[vec3]
+        factors: wp.array2d[scalar]
+        amounts: wp.array2d[scalar]
+        external: wp.array[vec3]
+        # length of the step of each, and coefficients of stiffness and mass in its matrix
+        h: wp.array[scalar]
+        k: wp.array[scalar]
+        m: wp.array[scalar]
+        # state now and at the start of the step, the change of velocity, and the velocity of constrained components
+        u: wp.array3d[wp.float64]
+        u_start: wp.array3d[wp.float64]
+        v: wp.array3d[scalar]
+        v_start: wp.array3d[scalar]
+        dv: wp.array3d[scalar]
+        prescribed: wp.array3d[scalar]
+        # the force of an element on its corner `a` is in row ``4 e + a``
+        internal: wp.array3d[scalar]
+        element_forces: wp.array3d[scalar]
+        element_J: wp.array2d[scalar]
+        tangents: wp.array3d[scalar]
+        # shares of two squared norms
+        shares: wp.array3d[scalar]
+        # the linear systems, and whether each is being solved
+        values: wp.array3d[scalar]
+        b: wp.array3d[scalar]
+        solving: wp.array[int]
+
+    return Samples
 
 
 @wp.func

@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.batched.layout import narrowed, store_vector, vector_of, widened
+from warpbrain.kernels.batched.layout import narrowed, samples_struct, store_vector, vector_of, widened
 from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.precision import Precision
 
@@ -18,113 +18,70 @@ from warpbrain.kernels.precision import Precision
 def batched_motion_kernels(precision: Precision) -> KernelSet:
     """Make (once) the batched kernels of a time step in a precision, one thread for a node and a lane."""
     scalar, vec3 = precision.scalar, precision.vec3
-    kernels = KernelSet(f"motion_{precision.name}_batched")
+    kernels, Samples = KernelSet(f"motion_{precision.name}_batched"), samples_struct(precision)
 
     @kernels.add
-    def restore(
-        slots: wp.array[int],
-        u_start: wp.array3d[wp.float64],
-        v_start: wp.array3d[scalar],
-        u: wp.array3d[wp.float64],
-        v: wp.array3d[scalar],
-        dv: wp.array3d[scalar],
-    ):
+    def restore(slots: wp.array[int], s: Samples):
         """Back to the start of the step, with no guess for its solution."""
         i, lane = wp.tid()
         slot = slots[lane]
-        store_vector(u, i, slot, vector_of(u_start, i, slot))
-        store_vector(v, i, slot, vector_of(v_start, i, slot))
-        store_vector(dv, i, slot, vec3())
+        store_vector(s.u, i, slot, vector_of(s.u_start, i, slot))
+        store_vector(s.v, i, slot, vector_of(s.v_start, i, slot))
+        store_vector(s.dv, i, slot, vec3())
 
     @kernels.add
-    def reset(slots: wp.array[int], u: wp.array3d[wp.float64], v: wp.array3d[scalar], dv: wp.array3d[scalar]):
+    def reset(slots: wp.array[int], s: Samples):
         """At rest in the reference shape."""
         i, lane = wp.tid()
         slot = slots[lane]
-        store_vector(u, i, slot, wp.vec3d())
-        store_vector(v, i, slot, vec3())
-        store_vector(dv, i, slot, vec3())
+        store_vector(s.u, i, slot, wp.vec3d())
+        store_vector(s.v, i, slot, vec3())
+        store_vector(s.dv, i, slot, vec3())
 
     @kernels.add
-    def prescribe(
-        slots: wp.array[int],
-        count: wp.array[int],
-        shapes: wp.array2d[vec3],
-        amounts: wp.array2d[scalar],
-        free: wp.array[vec3],
-        h: wp.array[scalar],
-        u: wp.array3d[wp.float64],
-        velocity: wp.array3d[scalar],
-    ):
+    def prescribe(slots: wp.array[int], count: wp.array[int], s: Samples):
         """Velocity of the constrained components that takes them to where they must be at the end of the step."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
         goal = vec3()
-        for shape in range(shapes.shape[0]):
-            goal += amounts[shape, slot] * shapes[shape, i]
-        held = vec3(scalar(1.0), scalar(1.0), scalar(1.0)) - free[i]
-        store_vector(
-            velocity, i, slot, wp.cw_mul(held, narrowed(widened(goal) - vector_of(u, i, slot), velocity) / h[slot])
-        )
+        for shape in range(s.shapes.shape[0]):
+            goal += s.amounts[shape, slot] * s.shapes[shape, i]
+        held = vec3(scalar(1.0), scalar(1.0), scalar(1.0)) - s.free[i]
+        way = narrowed(widened(goal) - vector_of(s.u, i, slot), s.prescribed)
+        store_vector(s.prescribed, i, slot, wp.cw_mul(held, way / s.h[slot]))
 
     @kernels.add
-    def begin(
-        slots: wp.array[int],
-        count: wp.array[int],
-        loads: wp.array2d[vec3],
-        factors: wp.array2d[scalar],
-        internal: wp.array3d[scalar],
-        mass: wp.array[scalar],
-        free: wp.array[vec3],
-        h: wp.array[scalar],
-        u: wp.array3d[wp.float64],
-        v: wp.array3d[scalar],
-        u_start: wp.array3d[wp.float64],
-        v_start: wp.array3d[scalar],
-        b: wp.array3d[scalar],
-    ):
+    def begin(slots: wp.array[int], count: wp.array[int], s: Samples):
         """Keeps the state and writes the right-hand side `b = M v + h (f_ext - f_int)` on the free components."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
-        vi = vector_of(v, i, slot)
-        store_vector(u_start, i, slot, vector_of(u, i, slot))
-        store_vector(v_start, i, slot, vi)
+        vi = vector_of(s.v, i, slot)
+        store_vector(s.u_start, i, slot, vector_of(s.u, i, slot))
+        store_vector(s.v_start, i, slot, vi)
         external = vec3()
-        for load in range(loads.shape[0]):
-            external += factors[load, slot] * loads[load, i]
-        step = h[slot] * (external - vector_of(internal, i, slot))
-        store_vector(b, i, slot, wp.cw_mul(free[i], mass[i] * vi + step))
+        for load in range(s.loads.shape[0]):
+            external += s.factors[load, slot] * s.loads[load, i]
+        step = s.h[slot] * (external - vector_of(s.internal, i, slot))
+        store_vector(s.b, i, slot, wp.cw_mul(s.free[i], s.mass[i] * vi + step))
 
     @kernels.add
-    def update(
-        slots: wp.array[int],
-        count: wp.array[int],
-        solving: wp.array[int],
-        u_start: wp.array3d[wp.float64],
-        v_start: wp.array3d[scalar],
-        dv: wp.array3d[scalar],
-        velocity: wp.array3d[scalar],
-        free: wp.array[vec3],
-        h: wp.array[scalar],
-        v: wp.array3d[scalar],
-        u: wp.array3d[wp.float64],
-    ):
+    def update(slots: wp.array[int], count: wp.array[int], s: Samples):
         """Velocity and displacement at the end of the step, of the samples whose linear solve has ended."""
         i, lane = wp.tid()
         if lane >= count[0]:
             return
         slot = slots[lane]
-        if solving[slot] != 0:
+        if s.solving[slot] != 0:
             return
-        prescribed = vector_of(velocity, i, slot)
-        change = vector_of(v_start, i, slot) + vector_of(dv, i, slot) - prescribed
-        w = wp.cw_mul(free[i], change) + prescribed
-        store_vector(v, i, slot, w)
-        store_vector(u, i, slot, vector_of(u_start, i, slot) + widened(h[slot] * w))
+        prescribed = vector_of(s.prescribed, i, slot)
+        change = vector_of(s.v_start, i, slot) + vector_of(s.dv, i, slot) - prescribed
+        w = wp.cw_mul(s.free[i], change) + prescribed
+        store_vector(s.v, i, slot, w)
+        store_vector(s.u, i, slot, vector_of(s.u_start, i, slot) + widened(s.h[slot] * w))
 
     @kernels.add
     def find_ready(
