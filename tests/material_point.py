@@ -57,7 +57,7 @@ class Point:
     def moduli(self) -> Floats:
         """`A_ijkl = dP_ij/dF_kl`, shape (k, 3, 3, 3, 3)."""
         blocks = wp.zeros((self._count, 3, 3), dtype=self._precision.mat33, device=self._device)
-        wp.launch(self._kernels.moduli, (self._count, 3, 3), [*self._inputs, blocks], device=self._device)
+        wp.launch(self._kernels.moduli, self._count, [*self._inputs, blocks], device=self._device)
         return blocks.numpy().astype(float).transpose(0, 3, 1, 4, 2)
 
 

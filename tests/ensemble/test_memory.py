@@ -26,6 +26,8 @@ def held(owner: Batch) -> int:
         elif isinstance(value, list | tuple):
             for item in value:
                 visit(item, depth)
+        elif isinstance(value, wp._src.codegen.StructInstance):
+            visit(list(vars(value).values()), depth)
         elif depth and type(value).__module__.startswith("warpbrain") and hasattr(value, "__dict__"):
             for item in vars(value).values():
                 visit(item, depth - 1)

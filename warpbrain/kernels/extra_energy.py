@@ -6,8 +6,8 @@ A term brings device functions of the elastic deformation gradient and of a row 
     moduli(F_e, g, h, data, e) -> g . dP/dF . h [Pa/m2] for two gradients of shape functions, symmetric in its use
     stress(F_e, data, e) -> P [Pa]
 
-With the growth stretch `s` of an element, `F_e = F/s`, the energy of its reference volume is `s^3 Psi(F/s)`, so
-`P = s^2 P_e` and `dP/dF = s dP_e/dF_e` (as in `warpbrain.physics.laws.device`).
+With the growth stretch `s` of an element, the last of its numbers, `F_e = F/s`, the energy of its reference volume is
+`s^3 Psi(F/s)`, so `P = s^2 P_e` and `dP/dF = s dP_e/dF_e` (as in `warpbrain.physics.laws.device`).
 """
 
 from functools import cache
@@ -15,101 +15,48 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
-from warpbrain.kernels.tetrahedron import Stencil
+from warpbrain.kernels.tetrahedron import Stencil, element_kernels
 
 
 @cache
 def extra_kernels(
     key: str, energy: Any, stress: Any, moduli: Any, precision: Precision, stencil: Stencil
-) -> tuple[Any, Any, Any]:
-    """Make (once) kernels for forces, forces with tangent blocks, and energies, one thread for an element of a list.
+) -> tuple[Any, Any, Any, Any]:
+    """Make (once) what kernels for forces, forces with tangent blocks, and energies know, and these.
 
     `key` is part of the name of the compiled module; `energy`, `stress` and `moduli` are the term's, as above.
     """
-    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    module = compiled_module(f"{key}_{precision.name}{stencil.suffix}", stencil.unroll)
-    nodes_type, points, share = stencil.nodes, stencil.points, wp.constant(scalar(1.0 / stencil.points))
-    gradient_at, directions_of = stencil.gradient, stencil.directions
-    add_forces, add_blocks = stencil.forces, stencil.blocks
+    scalar, mat33 = precision.scalar, precision.mat33
 
-    @wp.kernel(module=module)
-    def forces(
-        elements: wp.array[int],
-        nodes: nodes_type,
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        stretch: wp.array[scalar],
-        data: wp.array2d[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-    ):
-        t = wp.tid()
-        e = elements[t]
-        G = inverse_edges[e]
-        s = stretch[t]
-        V = share * scale[0] * volume[t] * s * s
-        for point in range(points):
-            F = gradient_at(u, nodes, e, point, G) / s
-            add_forces(V * stress(F, data, t), point, G, element_forces, t)
+    @wp.func
+    def stretch_of(data: wp.array2d[scalar], e: int):
+        return data[e, data.shape[1] - 1]
 
-    @wp.kernel(module=module)
-    def tangents(
-        elements: wp.array[int],
-        nodes: nodes_type,
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        stretch: wp.array[scalar],
-        data: wp.array2d[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-        element_blocks: wp.array2d[mat33],
-    ):
-        t = wp.tid()
-        e = elements[t]
-        G = inverse_edges[e]
-        s = stretch[t]
-        V = share * scale[0] * volume[t] * s
-        D = directions_of(G)
+    @wp.func
+    def stress_of(F: mat33, data: wp.array2d[scalar], e: int):
+        s = stretch_of(data, e)
+        return s * s * stress(F / s, data, e)
+
+    @wp.func
+    def energy_of(F: mat33, data: wp.array2d[scalar], e: int):
+        s = stretch_of(data, e)
+        return s * s * s * energy(F / s, data, e)
+
+    @wp.func
+    def tangents_of(F: mat33, D: mat33, V: scalar, data: wp.array2d[scalar], e: int):
+        """`V P`, and `V d_j . dP/dF . d_k` for the rows of `D`, j <= k."""
+        s = stretch_of(data, e)
+        F_e, V_s = F / s, V * s
         a, b, c = D[0], D[1], D[2]
-        for point in range(points):
-            F = gradient_at(u, nodes, e, point, G) / s
-            add_forces(V * s * stress(F, data, t), point, G, element_forces, t)
-            add_blocks(
-                V * moduli(F, a, a, data, t),
-                V * moduli(F, a, b, data, t),
-                V * moduli(F, a, c, data, t),
-                V * moduli(F, b, b, data, t),
-                V * moduli(F, b, c, data, t),
-                V * moduli(F, c, c, data, t),
-                point,
-                G,
-                element_blocks,
-                t,
-            )
+        return (
+            V_s * s * stress(F_e, data, e),
+            V_s * moduli(F_e, a, a, data, e),
+            V_s * moduli(F_e, a, b, data, e),
+            V_s * moduli(F_e, a, c, data, e),
+            V_s * moduli(F_e, b, b, data, e),
+            V_s * moduli(F_e, b, c, data, e),
+            V_s * moduli(F_e, c, c, data, e),
+        )
 
-    @wp.kernel(module=module)
-    def energies(
-        elements: wp.array[int],
-        nodes: nodes_type,
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        stretch: wp.array[scalar],
-        data: wp.array2d[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array[scalar],
-    ):
-        t = wp.tid()
-        e = elements[t]
-        s = stretch[t]
-        total = scalar(0.0)
-        for point in range(points):
-            F = gradient_at(u, nodes, e, point, inverse_edges[e]) / s
-            total += energy(F, data, t)
-        out[t] = share * scale[0] * volume[t] * s * s * s * total
-
-    return forces, tangents, energies
+    return element_kernels(key, stress_of, energy_of, tangents_of, precision, stencil, of_term=True)

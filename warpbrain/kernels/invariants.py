@@ -17,7 +17,6 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import ElementKernels, law_kernels
 
@@ -37,7 +36,6 @@ def invariant_kernels(
     Without `second_invariant` every term of `I2` is left out of the compiled code (`I2` is then passed as zero).
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    pointwise = compiled_module(f"{key}_{precision.name}_pointwise")
 
     @wp.func
     def second_of(cof: mat33):
@@ -133,33 +131,4 @@ def invariant_kernels(
             VP += m2 * S
         return VP, K11, K12, K13, K22, K23, K33
 
-    @wp.kernel(module=pointwise)
-    def moduli(
-        elements: wp.array[int],
-        F: wp.array[mat33],
-        parameters: wp.array2d[scalar],
-        blocks: wp.array3d[mat33],
-    ):
-        t, j, k = wp.tid()
-        e = elements[t]
-        Fe = F[e]
-        cof = cofactor(Fe)
-        J = wp.dot(Fe[0], cof[0])
-        I1 = wp.ddot(Fe, Fe)
-        two = scalar(2.0)
-        d1, d2, dJ, d11, d12, d1J, d22, d2J, dJJ = derivatives(I1, second_of(cof), J, parameters, e)
-        a = vec3()
-        b = vec3()
-        a[j] = scalar(1.0)
-        b[k] = scalar(1.0)
-        fa, fb, ca, cb = Fe * a, Fe * b, cof * a, cof * b
-        K = first_block(fa, fb, ca, cb, two * d1 * wp.dot(a, b), two * two * d11, two * d1J, dJJ, dJ / J)
-        if wp.static(second_invariant):
-            B = Fe * wp.transpose(Fe)
-            S = I1 * Fe - B * Fe
-            K += second_block(
-                fa, fb, ca, cb, S * a, S * b, wp.dot(a, b), I1, B, two * d2, two * two * d12, two * two * d22, two * d2J
-            )
-        blocks[e, j, k] = K
-
-    return law_kernels(key, stress_of, energy_of, tangents_of, moduli, precision)
+    return law_kernels(key, stress_of, energy_of, tangents_of, precision)

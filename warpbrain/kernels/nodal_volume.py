@@ -40,83 +40,91 @@ def _pressure_at(p: wp.array[Any], patches: wp.array2d[int], e: int, point: int,
 
 
 @cache
-def nodal_volume_kernels(precision: Precision) -> KernelSet:
-    """Make (once) the kernels of a precision."""
+def nodal_volume_kernels(precision: Precision) -> tuple[Any, Any, KernelSet]:
+    """Make (once) what the kernels of a precision know of patches and of the couplings in these, and the kernels."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"nodal_volume_{precision.name}", unroll=UNROLL)
     share = wp.constant(scalar(1.0 / POINTS))
     vec4 = wp.types.vector(4, scalar)
 
+    @wp.struct
+    class Volumes:
+        # of each element: its nodes, and the patch at each corner
+        nodes: wp.array2d[int]
+        patches: wp.array2d[int]
+        inverse_edges: wp.array[mat33]
+        volume: wp.array[scalar]
+        moments: wp.array2d[scalar]
+        # of each patch, and the corners of elements in it
+        first: wp.array[int]
+        corners: wp.array[int]
+        volumes: wp.array[scalar]
+        moduli: wp.array[scalar]
+        logarithmic: wp.array[int]
+        ratio: wp.array[scalar]
+        p: wp.array[scalar]
+        c: wp.array[scalar]
+
+    @wp.struct
+    class Couplings:
+        # `g` has a row for each node of each patch, the sum of some parts of elements; `by_node` is in that of nodes
+        part_first: wp.array[int]
+        parts: wp.array[int]
+        g: wp.array[vec3]
+        by_node: wp.array[vec3]
+        # of each patch: its nodes, and how much its pressure changes
+        patch_first: wp.array[int]
+        nodes: wp.array[int]
+        c: wp.array[scalar]
+        change: wp.array[scalar]
+        # of each node: its rows of `g`, and the patch of each
+        node_first: wp.array[int]
+        entries: wp.array[int]
+        patches: wp.array[int]
+        blocks: wp.array2d[mat33]
+
     @kernels.add
-    def moments(
-        nodes: wp.array2d[int],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array2d[scalar],
-    ):
-        """``(nodes, inverse_edges, volume, u) -> moments``, what an element adds to `M_a` of its corners."""
+    def moments(v: Volumes, u: wp.array[vec3]):
+        """One thread for an element: what it adds to `M_a` of its corners."""
         e = wp.tid()
         element_moments = vec4()
         for point in range(POINTS):
-            J = wp.determinant(gradient_at(u, nodes, e, point, inverse_edges[e]))
+            J = wp.determinant(gradient_at(u, v.nodes, e, point, v.inverse_edges[e]))
             for a in range(4):
-                element_moments[a] += _weight(a, point, share * volume[e]) * J
+                element_moments[a] += _weight(a, point, share * v.volume[e]) * J
         for a in range(4):
-            out[e, a] = element_moments[a]
+            v.moments[e, a] = element_moments[a]
 
     @kernels.add
-    def pressures(
-        first: wp.array[int],
-        corners: wp.array[int],
-        moments: wp.array2d[scalar],
-        volumes: wp.array[scalar],
-        moduli: wp.array[scalar],
-        logarithmic: wp.array[int],
-        ratio: wp.array[scalar],
-        p: wp.array[scalar],
-        c: wp.array[scalar],
-    ):
-        """``(first, corners, moments, volumes, moduli, logarithmic) -> ratio, p, c``, one thread for a patch."""
+    def pressures(v: Volumes):
+        """One thread for a patch: its ratio of volumes, `p_a` and `c_a`."""
         a = wp.tid()
         sum = scalar(0.0)
-        for k in range(first[a], first[a + 1]):
-            sum += moments[corners[k] // 4, corners[k] % 4]
-        theta = sum / volumes[a]
+        for k in range(v.first[a], v.first[a + 1]):
+            sum += v.moments[v.corners[k] // 4, v.corners[k] % 4]
+        theta = sum / v.volumes[a]
         one = scalar(1.0)
         slope = theta - one
         curvature = one
-        if logarithmic[a] == 1:
+        if v.logarithmic[a] == 1:
             slope = wp.log(theta) / theta
             curvature = (one - wp.log(theta)) / (theta * theta)
-        ratio[a] = theta
-        p[a] = moduli[a] * slope
-        c[a] = moduli[a] * curvature / volumes[a]
+        v.ratio[a] = theta
+        v.p[a] = v.moduli[a] * slope
+        v.c[a] = v.moduli[a] * curvature / v.volumes[a]
 
     @kernels.add
-    def forces(
-        nodes: wp.array2d[int],
-        patches: wp.array2d[int],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        p: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array2d[vec3],
-    ):
-        """``(nodes, patches, inverse_edges, volume, p, u) -> forces``, one thread for an element."""
+    def forces(v: Volumes, u: wp.array[vec3], out: wp.array2d[vec3]):
+        """One thread for an element: its forces."""
         e = wp.tid()
-        G = inverse_edges[e]
+        G = v.inverse_edges[e]
         for point in range(POINTS):
-            cof = cofactor(gradient_at(u, nodes, e, point, G))
-            add_forces(_pressure_at(p, patches, e, point, share * volume[e]) * cof, point, G, out, e)
+            cof = cofactor(gradient_at(u, v.nodes, e, point, G))
+            add_forces(_pressure_at(v.p, v.patches, e, point, share * v.volume[e]) * cof, point, G, out, e)
 
     @kernels.add
     def tangents(
-        nodes: wp.array2d[int],
-        patches: wp.array2d[int],
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        p: wp.array[scalar],
+        v: Volumes,
         u: wp.array[vec3],
         out: wp.array2d[vec3],
         blocks: wp.array2d[mat33],
@@ -124,12 +132,12 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
     ):
         """The same with blocks, and the parts of an element of `g_ab`."""
         e = wp.tid()
-        G = inverse_edges[e]
-        w = share * volume[e]
+        G = v.inverse_edges[e]
+        w = share * v.volume[e]
         for point in range(POINTS):
-            F = gradient_at(u, nodes, e, point, G)
+            F = gradient_at(u, v.nodes, e, point, G)
             cof = cofactor(F)
-            wp_at = _pressure_at(p, patches, e, point, w)
+            wp_at = _pressure_at(v.p, v.patches, e, point, w)
             for b in range(10):
                 g = shape_gradient(b, point, G)
                 normal = cof * g
@@ -150,59 +158,39 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
                     blocks[e, block] = K
 
     @kernels.add
-    def gather(first: wp.array[int], parts: wp.array[int], of_elements: wp.array[vec3], g: wp.array[vec3]):
-        """``(first, parts, of_elements) -> g``, one thread for a node of a patch."""
-        k = wp.tid()
+    def gather(k: Couplings, of_elements: wp.array[vec3]):
+        """One thread for a node of a patch: `g_ab`."""
+        row = wp.tid()
         total = vec3()
-        for part in range(first[k], first[k + 1]):
-            total += of_elements[parts[part]]
-        g[k] = total
+        for part in range(k.part_first[row], k.part_first[row + 1]):
+            total += of_elements[k.parts[part]]
+        k.g[row] = total
 
     @kernels.add
-    def diagonal(
-        first: wp.array[int],
-        entries: wp.array[int],
-        patches: wp.array[int],
-        c: wp.array[scalar],
-        g: wp.array[vec3],
-        by_node: wp.array[vec3],
-        blocks: wp.array2d[mat33],
-    ):
-        """``(first, entries, patches, c, g) -> g in the order of nodes, blocks``, one thread for a node."""
+    def diagonal(k: Couplings):
+        """One thread for a node: its rows of `g` in its own order, and its diagonal block."""
         b = wp.tid()
         total = mat33()
-        for k in range(first[b], first[b + 1]):
-            g_ab = g[entries[k]]
+        for i in range(k.node_first[b], k.node_first[b + 1]):
+            g_ab = k.g[k.entries[i]]
             # every product with a vector reads this, one after the other
-            by_node[k] = g_ab
-            total += wp.outer(c[patches[k]] * g_ab, g_ab)
-        blocks[b, 0] = total
+            k.by_node[i] = g_ab
+            total += wp.outer(k.c[k.patches[i]] * g_ab, g_ab)
+        k.blocks[b, 0] = total
 
     @kernels.add
-    def taken_up(
-        first: wp.array[int],
-        nodes: wp.array[int],
-        c: wp.array[scalar],
-        g: wp.array[vec3],
-        columns: wp.array[vec3],
-        x: wp.array[vec3],
-        change: wp.array[scalar],
-    ):
-        """``(first, nodes, c, g, columns, x) -> change of p_a``, one thread for a patch."""
+    def taken_up(k: Couplings, columns: wp.array[vec3], x: wp.array[vec3]):
+        """One thread for a patch: the change of `p_a`."""
         a = wp.tid()
         total = scalar(0.0)
-        for k in range(first[a], first[a + 1]):
-            b = nodes[k]
-            total += wp.dot(g[k], wp.cw_mul(columns[b], x[b]))
-        change[a] = c[a] * total
+        for i in range(k.patch_first[a], k.patch_first[a + 1]):
+            b = k.nodes[i]
+            total += wp.dot(k.g[i], wp.cw_mul(columns[b], x[b]))
+        k.change[a] = k.c[a] * total
 
     @kernels.add
     def push(
-        first: wp.array[int],
-        patches: wp.array[int],
-        by_node: wp.array[vec3],
-        change: wp.array[scalar],
-        diagonal_blocks: wp.array2d[mat33],
+        k: Couplings,
         columns: wp.array[vec3],
         rows: wp.array[vec3],
         x: wp.array[vec3],
@@ -210,12 +198,11 @@ def nodal_volume_kernels(precision: Precision) -> KernelSet:
         scale: wp.array[scalar],
         y: wp.array[vec3],
     ):
-        """``(first, patches, g in the order of nodes, change, diagonal, columns, rows, x, factor, scale) -> y``, one
-        thread for a node: without the diagonal blocks, added to `y`."""
+        """One thread for a node: what that does to it without its diagonal block, added to `y`."""
         b = wp.tid()
-        force = -(diagonal_blocks[b, 0] * wp.cw_mul(columns[b], x[b]))
-        for k in range(first[b], first[b + 1]):
-            force += change[patches[k]] * by_node[k]
+        force = -(k.blocks[b, 0] * wp.cw_mul(columns[b], x[b]))
+        for i in range(k.node_first[b], k.node_first[b + 1]):
+            force += k.change[k.patches[i]] * k.by_node[i]
         y[b] += factor * scale[0] * wp.cw_mul(rows[b], force)
 
-    return kernels
+    return Volumes, Couplings, kernels

@@ -25,7 +25,6 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.tetrahedron import ElementKernels, law_kernels
 
@@ -85,7 +84,6 @@ def singular_value_decomposition(F: Any, small: Any):
 def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision: Precision) -> ElementKernels:
     """Make (once) the element kernels of a law in principal stretches; `key` is part of the compiled module's name."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    pointwise = compiled_module(f"{key}_{precision.name}_pointwise")
     small = wp.constant(scalar(precision.epsilon**2))
 
     @wp.func
@@ -145,19 +143,4 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
             block(p3, p3, H, same, swap, U),
         )
 
-    @wp.kernel(module=pointwise)
-    def moduli(
-        elements: wp.array[int],
-        F: wp.array[mat33],
-        parameters: wp.array2d[scalar],
-        blocks: wp.array3d[mat33],
-    ):
-        t, j, k = wp.tid()
-        e = elements[t]
-        U, l, V = singular_value_decomposition(F[e], small)
-        T, H, m = derivatives(l, parameters, e)
-        same, swap = shear_moduli(l, T, m)
-        # row j of V is V^T e_j
-        blocks[e, j, k] = block(V[j], V[k], H, same, swap, U)
-
-    return law_kernels(key, stress_of, energy_of, tangents_of, moduli, precision)
+    return law_kernels(key, stress_of, energy_of, tangents_of, precision)

@@ -130,5 +130,5 @@ def quadratic_kernels(law: DeviceLaw, precision: Precision) -> ElementKernels:
     """
     linear = law.kernels(precision)
     functions = linear.stress_at, linear.energy_at, linear.tangents
-    forces, tangents, energy = element_kernels(law.key, *functions, precision, TEN_NODES)
-    return replace(linear, forces=forces, forces_and_tangents=tangents, energy=energy)
+    group, forces, tangents, energy = element_kernels(law.key, *functions, precision, TEN_NODES)
+    return replace(linear, group=group, forces=forces, forces_and_tangents=tangents, energy=energy)

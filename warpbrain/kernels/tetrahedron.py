@@ -29,12 +29,12 @@ class ElementKernels:
     The last three are device functions, of which kernels of other shapes are made.
     """
 
-    forces: Any  # ``(elements, nodes, inverse_edges, volume, parameters, u) -> element_forces``
+    group: Any  # struct of what the next three know of their elements, see `element_kernels`
+    forces: Any  # ``(group, u) -> element_forces``
     forces_and_tangents: Any  # the same with ``element_blocks`` as a second output
-    energy: Any  # ``(elements, nodes, inverse_edges, volume, parameters, u) -> element_energy [J], element_J``
+    energy: Any  # ``(group, u) -> element_energy [J], element_J``
     stress: Any  # ``(elements, F, parameters) -> energy density [Pa], P [Pa]`` for given deformation gradients
-    #: ``(elements, F, parameters) -> blocks[e, j, l]`` with ``[i, k]`` = ``dP_ij/dF_kl`` [Pa]; over (elements, 3, 3)
-    moduli: Any
+    moduli: Any  # ``(elements, F, parameters) -> blocks[e, j, l]`` with ``[i, k]`` = ``dP_ij/dF_kl`` [Pa]
     tangents: Any  # ``(F, G, V, parameters, row) -> V P, K11, K12, K13, K22, K23, K33``
     stress_at: Any  # ``(F, parameters, row) -> P``
     energy_at: Any  # ``(F, parameters, row) -> energy density``
@@ -137,11 +137,19 @@ FOUR_NODES = Stencil("", 1, wp.array[wp.vec4i], _gradient, _directions, _forces,
 
 
 def element_kernels(
-    key: str, stress_of: Any, energy_of: Any, tangents_of: Any, precision: Precision, stencil: Stencil
-) -> tuple[Any, Any, Any]:
-    """Make the kernels that every law has alike: forces, forces and tangents, and energy of `ElementKernels`.
+    key: str,
+    stress_of: Any,
+    energy_of: Any,
+    tangents_of: Any,
+    precision: Precision,
+    stencil: Stencil,
+    of_term: bool = False,
+) -> tuple[Any, Any, Any, Any]:
+    """Make the kernels that every law has alike: `group`, forces, forces and tangents, and energy of `ElementKernels`.
 
-    `key` is the name of the law; `stress_of`, `energy_of` and `tangents_of` are as there.
+    `key` is the name of the law; `stress_of`, `energy_of` and `tangents_of` are as there. Volumes, parameters and
+    results have a row for each element of the mesh; those `of_term`, of an energy that is added to some elements, one
+    for each of these, and all of it is times `scale`.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"{key}_{precision.name}{stencil.suffix}", stencil.unroll)
@@ -149,81 +157,90 @@ def element_kernels(
     gradient_at, directions_of = stencil.gradient, stencil.directions
     add_forces, add_blocks = stencil.forces, stencil.blocks
 
+    @wp.struct
+    class Group:
+        elements: wp.array[int]
+        nodes: nodes_type
+        inverse_edges: wp.array[mat33]
+        volume: wp.array[scalar]
+        parameters: wp.array2d[scalar]
+        scale: wp.array[scalar]
+
+    @wp.func
+    def row_of(group: Group, t: int):
+        row = t
+        if wp.static(not of_term):
+            row = group.elements[t]
+        return row
+
+    @wp.func
+    def weight_of(group: Group, row: int):
+        """Volume of a quadrature point."""
+        weight = share * group.volume[row]
+        if wp.static(of_term):
+            weight = group.scale[0] * weight
+        return weight
+
     @wp.kernel(module=module)
-    def forces(
-        start: int,
-        elements: wp.array[int],
-        nodes: nodes_type,
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        parameters: wp.array2d[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-    ):
-        e = elements[start + wp.tid()]
-        G = inverse_edges[e]
+    def forces(start: int, group: Group, u: wp.array[vec3], element_forces: wp.array2d[vec3]):
+        t = start + wp.tid()
+        e = group.elements[t]
+        row = row_of(group, t)
+        G = group.inverse_edges[e]
         for point in range(points):
-            F = gradient_at(u, nodes, e, point, G)
-            add_forces(share * volume[e] * stress_of(F, parameters, e), point, G, element_forces, e)
+            F = gradient_at(u, group.nodes, e, point, G)
+            P = stress_of(F, group.parameters, row)
+            add_forces(weight_of(group, row) * P, point, G, element_forces, row)
 
     @wp.kernel(module=module)
     def forces_and_tangents(
-        start: int,
-        elements: wp.array[int],
-        nodes: nodes_type,
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        parameters: wp.array2d[scalar],
-        u: wp.array[vec3],
-        element_forces: wp.array2d[vec3],
-        element_blocks: wp.array2d[mat33],
+        start: int, group: Group, u: wp.array[vec3], element_forces: wp.array2d[vec3], element_blocks: wp.array2d[mat33]
     ):
-        e = elements[start + wp.tid()]
-        G = inverse_edges[e]
+        t = start + wp.tid()
+        e = group.elements[t]
+        row = row_of(group, t)
+        G = group.inverse_edges[e]
         D = directions_of(G)
         for point in range(points):
-            F = gradient_at(u, nodes, e, point, G)
-            VP, K11, K12, K13, K22, K23, K33 = tangents_of(F, D, share * volume[e], parameters, e)
-            add_forces(VP, point, G, element_forces, e)
-            add_blocks(K11, K12, K13, K22, K23, K33, point, G, element_blocks, e)
+            F = gradient_at(u, group.nodes, e, point, G)
+            VP, K11, K12, K13, K22, K23, K33 = tangents_of(F, D, weight_of(group, row), group.parameters, row)
+            add_forces(VP, point, G, element_forces, row)
+            add_blocks(K11, K12, K13, K22, K23, K33, point, G, element_blocks, row)
 
     @wp.kernel(module=module)
     def energy(
         start: int,
-        elements: wp.array[int],
-        nodes: nodes_type,
-        inverse_edges: wp.array[mat33],
-        volume: wp.array[scalar],
-        parameters: wp.array2d[scalar],
+        group: Group,
         u: wp.array[vec3],
         element_energy: wp.array[scalar],
         element_J: wp.array[scalar],
     ):
-        e = elements[start + wp.tid()]
+        t = start + wp.tid()
+        e = group.elements[t]
+        row = row_of(group, t)
         stored = scalar(0.0)
         smallest = scalar(0.0)
         for point in range(points):
-            F = gradient_at(u, nodes, e, point, inverse_edges[e])
+            F = gradient_at(u, group.nodes, e, point, group.inverse_edges[e])
             J = wp.determinant(F)
             # so that a J that is no number counts as smallest
             if point == 0 or not (smallest <= J):
                 smallest = J
             # an inverted element has no energy: the caller rejects the state by its J
             if J > scalar(0.0):  # noqa: SIM300  (a scalar of the device, not a constant)
-                stored += share * volume[e] * energy_of(F, parameters, e)
-        element_energy[e] = stored
-        element_J[e] = smallest
+                stored += weight_of(group, row) * energy_of(F, group.parameters, row)
+        element_energy[row] = stored
+        element_J[row] = smallest
 
-    return forces, forces_and_tangents, energy
+    return Group, forces, forces_and_tangents, energy
 
 
-def law_kernels(
-    key: str, stress_of: Any, energy_of: Any, tangents_of: Any, moduli: Any, precision: Precision
-) -> ElementKernels:
-    """The kernels of a law on linear tetrahedra; those at given `F` are in the module of `moduli`."""
+def law_kernels(key: str, stress_of: Any, energy_of: Any, tangents_of: Any, precision: Precision) -> ElementKernels:
+    """The kernels of a law on linear tetrahedra, and those at given `F`."""
     scalar, mat33 = precision.scalar, precision.mat33
+    pointwise = compiled_module(f"{key}_{precision.name}_pointwise")
 
-    @wp.kernel(module=moduli.module)
+    @wp.kernel(module=pointwise)
     def stress(
         elements: wp.array[int],
         F: wp.array[mat33],
@@ -234,6 +251,21 @@ def law_kernels(
         e = elements[wp.tid()]
         density[e] = energy_of(F[e], parameters, e)
         P[e] = stress_of(F[e], parameters, e)
+
+    @wp.kernel(module=pointwise)
+    def moduli(elements: wp.array[int], F: wp.array[mat33], parameters: wp.array2d[scalar], blocks: wp.array3d[mat33]):
+        e = elements[wp.tid()]
+        axes = wp.identity(n=3, dtype=scalar)
+        _, A00, A01, A02, A11, A12, A22 = tangents_of(F[e], axes, scalar(1.0), parameters, e)
+        blocks[e, 0, 0] = A00
+        blocks[e, 0, 1] = A01
+        blocks[e, 0, 2] = A02
+        blocks[e, 1, 0] = wp.transpose(A01)
+        blocks[e, 1, 1] = A11
+        blocks[e, 1, 2] = A12
+        blocks[e, 2, 0] = wp.transpose(A02)
+        blocks[e, 2, 1] = wp.transpose(A12)
+        blocks[e, 2, 2] = A22
 
     of_elements = element_kernels(key, stress_of, energy_of, tangents_of, precision, FOUR_NODES)
     return ElementKernels(*of_elements, stress, moduli, tangents_of, stress_of, energy_of)

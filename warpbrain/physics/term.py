@@ -322,6 +322,8 @@ class ExtraEnergyTerm(KernelTerm):
     of each element: that on its moduli, or the part of it that is left.
     """
 
+    lasting = ("_group",)
+
     def __init__(
         self,
         body: Body,
@@ -331,24 +333,29 @@ class ExtraEnergyTerm(KernelTerm):
         ramp: Callable[[float], float],
     ) -> None:
         stencil = FOUR_NODES if body.quadratic is None else TEN_NODES
-        kernels = extra_kernels(code.key, code.energy, code.stress, code.moduli, body.precision, stencil)
+        made, *kernels = extra_kernels(code.key, code.energy, code.stress, code.moduli, body.precision, stencil)
         super().__init__(body, body.stencils[elements], kernels, ramp)
-        scalar = body.precision.scalar
         self.elements, self.of_moduli = elements, code.goes_with == "moduli"
-        self._elements = self.array(elements, int)
-        self._volume = self.array(body.mesh.volumes[elements], scalar)
-        self._stretch = self.array(np.ones(len(elements)), scalar)
+        self._numbers = np.asarray(data)
+        self._elements, self._volume = self.array(elements, int), self.zeros(len(elements))
+        self._parameters = self.zeros(len(elements), self._numbers.shape[1] + 1)
+        self._J = self.zeros(len(elements))
         self.take_moduli()
-        self._data = self.array(data, scalar)
+        self._group = made()
+        self._group.nodes, self._group.inverse_edges = body.element_nodes, body.inverse_edges
+        self._group.elements, self._group.volume = self._elements, self._volume
+        self._group.parameters, self._group.scale = self._parameters, self.scale
 
     def take_moduli(self) -> None:
         assert self.elements is not None
         body = self.body
         factor = body.stiffness_factors if self.of_moduli else body.remaining_parts
         self._volume.assign((factor * body.mesh.volumes)[self.elements])
-        self._stretch.assign(body.growth_stretches[self.elements])
+        self._parameters.assign(np.column_stack([self._numbers, body.growth_stretches[self.elements]]))
 
     def _inputs(self) -> list[Any]:
-        body = self.body
-        geometry = [self._elements, body.element_nodes, body.inverse_edges, self._volume, self._stretch]
-        return [*geometry, self._data, self.scale]
+        return [self._group]
+
+    def energy(self, u: wp.array) -> float:
+        self._launch(self._kernels[2], u, self._energies, self._J)
+        return float(np.sum(self._energies.numpy(), dtype=np.float64))

@@ -128,7 +128,7 @@ class AveragedTerm(Term):
     def evaluate_tangents(self, u: wp.array) -> None:
         self.evaluate_forces(u)
         count = len(self.stencils)
-        self.launch(self._law.moduli, (count, 3, 3), self._all, self._F, self._parameters, self._moduli)
+        self.launch(self._law.moduli, count, self._all, self._F, self._parameters, self._moduli)
         geometry = (self._rows, self._columns, self._gradients, self._volume)
         self.launch(self._kernels.tangents, (count, len(self._rows)), *geometry, self._moduli, self.blocks)
 

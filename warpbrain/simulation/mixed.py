@@ -52,28 +52,26 @@ class NodalVolumeTerm(_PatchTerm):
         assert body.quadratic is not None
         super().__init__(body, body.quadratic.elements)
         p, mesh = body.precision, body.mesh
-        self._kernels = nodal_volume_kernels(p)
+        made, _, self._kernels = nodal_volume_kernels(p)
         count, corners = len(mesh.tetrahedra), self.stencils[:, :4]
         keys, patches = np.unique(corners * (kinds.max() + 1) + kinds[:, None], return_inverse=True)
         patches = patches.reshape(count, 4)
         self._patches, self.count = patches, len(keys)
         self._shares = np.repeat(0.25 * mesh.volumes, 4)
         order = np.argsort(patches.ravel(), kind="stable")
-        self._first = self._ints(np.searchsorted(patches.ravel()[order], np.arange(self.count + 1)))
-        self._corners = self._ints(order)
-        self._of_element = self._ints(patches)
         of_patch = np.zeros(self.count, dtype=bool)
         of_patch[patches] = logarithmic[:, None]
-        self._logarithmic, self._logarithmic_on_device = of_patch, self._ints(of_patch)
-        self._nodes = self._ints(self.stencils)
-        self._volume = self.array(mesh.volumes, p.scalar)
+        self._logarithmic = of_patch
         self._volumes, self._moduli = np.ones(self.count), np.zeros(self.count)
-        self._volumes_on_device = self.array(self._volumes, p.scalar)
-        self._moduli_on_device = self.array(self._moduli, p.scalar)
-        self._moments = self.zeros(count, 4)
-        self._ratio, self._p = self.zeros(self.count), self.zeros(self.count)
+        self._on_device = v = made()
+        v.nodes, v.patches = self._ints(self.stencils), self._ints(patches)
+        v.inverse_edges, v.volume = body.inverse_edges, self.array(mesh.volumes, p.scalar)
+        v.first = self._ints(np.searchsorted(patches.ravel()[order], np.arange(self.count + 1)))
+        v.corners, v.logarithmic = self._ints(order), self._ints(of_patch)
+        v.moments = self.zeros(count, 4)
+        v.volumes, v.moduli, v.ratio, v.p = (self.zeros(self.count) for _ in range(4))
         #: `c_a` and what each element adds to `g_ab`, row by row.
-        self.curvature = self.zeros(self.count)
+        self.curvature = v.c = self.zeros(self.count)
         self.of_elements = self.zeros(count, 40, dtype=p.vec3)
 
     @property
@@ -94,29 +92,25 @@ class NodalVolumeTerm(_PatchTerm):
         with np.errstate(divide="ignore"):
             self._moduli = self._volumes / total(growth / (modulus * weight))
         # a captured graph reads these arrays
-        self._volumes_on_device.assign(self._volumes)
-        self._moduli_on_device.assign(self._moduli)
+        self._on_device.volumes.assign(self._volumes)
+        self._on_device.moduli.assign(self._moduli)
 
-    def _evaluate(self, u: wp.array) -> tuple[Any, ...]:
-        """Find the pressures at a displacement; returns what element kernels take."""
-        k, count = self._kernels, len(self.stencils)
-        shape = (self.body.inverse_edges, self._volume)
-        self.launch(k.moments, count, self._nodes, *shape, u, self._moments)
-        self.launch(
-            k.pressures, self.count, self._first, self._corners, self._moments, self._volumes_on_device,
-            self._moduli_on_device, self._logarithmic_on_device, self._ratio, self._p, self.curvature,
-        )  # fmt: skip
-        return count, self._nodes, self._of_element, *shape, self._p, u
+    def _evaluate(self, u: wp.array) -> int:
+        """Find the pressures at a displacement; returns how many elements there are."""
+        self.launch(self._kernels.moments, len(self.stencils), self._on_device, u)
+        self.launch(self._kernels.pressures, self.count, self._on_device)
+        return len(self.stencils)
 
     def evaluate_forces(self, u: wp.array) -> None:
-        self.launch(self._kernels.forces, *self._evaluate(u), self.forces)
+        self.launch(self._kernels.forces, self._evaluate(u), self._on_device, u, self.forces)
 
     def evaluate_tangents(self, u: wp.array) -> None:
-        self.launch(self._kernels.tangents, *self._evaluate(u), self.forces, self.blocks, self.of_elements)
+        outputs = self.forces, self.blocks, self.of_elements
+        self.launch(self._kernels.tangents, self._evaluate(u), self._on_device, u, *outputs)
 
     def energy(self, u: wp.array) -> float:
         self._evaluate(u)
-        ratio = self._ratio.numpy().astype(np.float64)
+        ratio = self._on_device.ratio.numpy().astype(np.float64)
         if not ratio.min() > 0.0:
             return np.inf
         change = np.where(self._logarithmic, np.log(ratio), ratio - 1.0)
@@ -125,7 +119,7 @@ class NodalVolumeTerm(_PatchTerm):
     def pressures(self, u: wp.array) -> Floats:
         """`p` in the middle of each element (m,) [Pa], positive in tension."""
         self._evaluate(u)
-        return np.asarray(self._p.numpy().astype(np.float64)[self._patches].mean(axis=1))
+        return np.asarray(self._on_device.p.numpy().astype(np.float64)[self._patches].mean(axis=1))
 
 
 class PatchStiffnessTerm(_PatchTerm):
@@ -140,7 +134,8 @@ class PatchStiffnessTerm(_PatchTerm):
         size = len(body.quadratic.points)
         super().__init__(body, np.arange(size)[:, None])
         p = body.precision
-        self._volumes, self._kernels = volumes, nodal_volume_kernels(p)
+        _, made, self._kernels = nodal_volume_kernels(p)
+        self._volumes = volumes
         nodes = np.repeat(volumes.stencils.astype(np.int64)[:, None, :], 4, axis=1)
         keys = (volumes.patches[:, :, None] * size + nodes).ravel()
         parts = np.argsort(keys, kind="stable")
@@ -148,48 +143,47 @@ class PatchStiffnessTerm(_PatchTerm):
         patches, nodes = np.divmod(keys[parts][starts], size)
         entries = np.argsort(nodes, kind="stable")
 
-        self._part_first, self._parts = self._ints(np.r_[starts, len(parts)]), self._ints(parts)
-        self._patch_first = self._ints(np.searchsorted(patches, np.arange(volumes.count + 1)))
-        self._node_first = self._ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
-        self._nodes, self._entries, self._patches = self._ints(nodes), self._ints(entries), self._ints(patches[entries])
+        self._on_device = k = made()
+        k.part_first, k.parts = self._ints(np.r_[starts, len(parts)]), self._ints(parts)
+        k.patch_first = self._ints(np.searchsorted(patches, np.arange(volumes.count + 1)))
+        k.node_first = self._ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
+        k.nodes, k.entries, k.patches = self._ints(nodes), self._ints(entries), self._ints(patches[entries])
         # in the order of patches, and in that of nodes
-        self._g, self._by_node = (self.zeros(len(starts), dtype=p.vec3) for _ in range(2))
-        self._change = self.zeros(volumes.count)
+        k.g, k.by_node = (self.zeros(len(starts), dtype=p.vec3) for _ in range(2))
+        k.c, k.change = volumes.curvature, self.zeros(volumes.count)
         self._one = self.array(np.ones(1), p.scalar)
+
+    def place(self, forces: wp.array, blocks: wp.array) -> None:
+        super().place(forces, blocks)
+        self._on_device.blocks = blocks
 
     def evaluate_forces(self, u: wp.array) -> None:
         self.forces.zero_()
 
     def evaluate_tangents(self, u: wp.array) -> None:
         self.forces.zero_()
-        k, size = self._kernels, len(self.stencils)
-        of_elements = self._volumes.of_elements.flatten()
-        self.launch(k.gather, len(self._g), self._part_first, self._parts, of_elements, self._g)
-        self.launch(
-            k.diagonal, size, self._node_first, self._entries, self._patches, self._volumes.curvature, self._g,
-            self._by_node, self.blocks,
-        )  # fmt: skip
+        k = self._on_device
+        self.launch(self._kernels.gather, len(k.g), k, self._volumes.of_elements.flatten())
+        self.launch(self._kernels.diagonal, len(self.stencils), k)
 
     def add_stiffness(
         self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array, scale: wp.array | None = None
     ) -> None:
         """See `Term.add_stiffness`; `scale` (1,) is one more factor, which a captured graph reads."""
-        k, size = self._kernels, len(self.stencils)
-        inputs = (self._patch_first, self._nodes, self._volumes.curvature, self._g, columns, x, self._change)
-        self.launch(k.taken_up, self._volumes.count, *inputs)
-        self.launch(
-            k.push, size, self._node_first, self._patches, self._by_node, self._change, self.blocks, columns, rows, x,
-            self.body.precision.scalar(factor), self._one if scale is None else scale, y,
-        )  # fmt: skip
+        k, scale = self._on_device, self._one if scale is None else scale
+        self.launch(self._kernels.taken_up, self._volumes.count, k, columns, x)
+        inputs = columns, rows, x, self.body.precision.scalar(factor), scale, y
+        self.launch(self._kernels.push, len(self.stencils), k, *inputs)
 
     def stiffness(self) -> Any:
         """What is not in blocks, as a SciPy matrix (3 n, 3 n) [N/m]."""
         from scipy.sparse import block_diag, csr_matrix, diags
 
-        g = self._by_node.numpy().astype(np.float64)
-        columns = 3 * self._nodes.numpy()[self._entries.numpy(), None] + np.arange(3)
+        k = self._on_device
+        g = k.by_node.numpy().astype(np.float64)
+        columns = 3 * k.nodes.numpy()[k.entries.numpy(), None] + np.arange(3)
         shape = (self._volumes.count, 3 * len(self.stencils))
-        G = csr_matrix((g.ravel(), (np.repeat(self._patches.numpy(), 3), columns.ravel())), shape)
+        G = csr_matrix((g.ravel(), (np.repeat(k.patches.numpy(), 3), columns.ravel())), shape)
         diagonal = block_diag(list(self.blocks.numpy()[:, 0].astype(np.float64)))
         return G.T @ diags(self._volumes.curvature.numpy().astype(np.float64)) @ G - diagonal
 

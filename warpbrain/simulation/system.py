@@ -46,9 +46,13 @@ class ElementGroup:
     """Elements that share a law and formulation: one launch, whatever their tissues."""
 
     kernels: ElementKernels
-    elements: wp.array
-    parameters: wp.array
+    on_device: Any  # the struct of its kernels
     averaged: list[AveragedTerm]
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.on_device.elements)
 
 
 class System:
@@ -179,8 +183,11 @@ class System:
             linear = self.quadratic is None
             kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
             averaged = [AveragedTerm(self, patches, kernels) for patches in self._patches(list(materials))]
-            parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
-            groups.append(ElementGroup(kernels, self._array(members, int), parameters, averaged))
+            group = kernels.group()
+            group.elements = self._array(members, int)
+            group.nodes, group.inverse_edges, group.volume = self.element_nodes, self.inverse_edges, self.volume
+            group.parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
+            groups.append(ElementGroup(kernels, group, averaged))
         return groups
 
     def _patches(self, labels: list[int]) -> list[Patches]:
@@ -315,7 +322,7 @@ class System:
     def _write_materials(self) -> None:
         """Let laws and terms have the moduli, factors and growth that elements have now."""
         for group, ((law_type, _), members) in zip(self.groups, self._grouped(self.model).items(), strict=True):
-            group.parameters.assign(self._parameters(law_type, members))
+            group.on_device.parameters.assign(self._parameters(law_type, members))
             for term in group.averaged:
                 term.set_elements(self._parameters(law_type, members, averaged_modulus), self.stiffness_factors)
         if self._volumes_at_nodes is not None:
@@ -361,13 +368,10 @@ class System:
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
         launch(kernel, dim, inputs, self.device)
 
-    def _geometry(self, group: ElementGroup) -> tuple[wp.array, ...]:
-        return (group.elements, self.element_nodes, self.inverse_edges, self.volume, group.parameters)
-
     def evaluate_forces(self) -> None:
         """Element forces at `u`."""
         for g in self.groups:
-            self._launch(g.kernels.forces, len(g.elements), *self._geometry(g), self.u, self.element_forces)
+            self._launch(g.kernels.forces, g.count, g.on_device, self.u, self.element_forces)
         for term in self.terms:
             term.evaluate_forces(self.u)
 
@@ -375,7 +379,7 @@ class System:
         """Element forces and tangent blocks at `u`."""
         for g in self.groups:
             outputs = (self.element_forces, self.element_blocks)
-            self._launch(g.kernels.forces_and_tangents, len(g.elements), *self._geometry(g), self.u, *outputs)
+            self._launch(g.kernels.forces_and_tangents, g.count, g.on_device, self.u, *outputs)
         for term in self.terms:
             term.evaluate_tangents(self.u)
 
@@ -569,9 +573,7 @@ class System:
         Potentials of terms are in it, of those that have one; `J` is that of quadrature points.
         """
         for g in self.groups:
-            self._launch(
-                g.kernels.energy, len(g.elements), *self._geometry(g), self.u, self.element_energy, self.element_J
-            )
+            self._launch(g.kernels.energy, g.count, g.on_device, self.u, self.element_energy, self.element_J)
         stored = float(np.sum(self.element_energy.numpy(), dtype=np.float64))
         stored += sum(term.energy(self.u) for term in self.terms if term.conservative)
         return stored, float(np.min(self.element_J.numpy()))
@@ -700,7 +702,8 @@ class System:
         density = wp.zeros(self.elements, dtype=p.scalar, device=self.device)
         P = wp.zeros(self.elements, dtype=p.mat33, device=self.device)
         for g in self.groups:
-            self._launch(g.kernels.stress, len(g.elements), g.elements, F, g.parameters, density, P)
+            of = g.on_device
+            self._launch(g.kernels.stress, g.count, of.elements, F, of.parameters, density, P)
         total = P.numpy().astype(np.float64)
         if self._averages:
             total *= PART
