@@ -4,6 +4,7 @@ The matrices are symmetric: the blocks `A_ij` with i <= j are kept, one for each
 """
 
 from functools import cache
+from typing import TypeAlias
 
 import warp as wp
 
@@ -16,7 +17,8 @@ from warpbrain.kernels.precision import Precision
 def batched_assembly_kernels(precision: Precision) -> KernelSet:
     """Make (once) the batched assembly kernels of a precision; the last index of each is a lane."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    kernels, Samples = KernelSet(f"assembly_{precision.name}_batched"), samples_struct(precision)
+    kernels = KernelSet(f"assembly_{precision.name}_batched")
+    Samples: TypeAlias = samples_struct(precision)
     rows = wp.constant(ROWS)
 
     @kernels.add

@@ -1,7 +1,7 @@
 """Element kernels of many samples, made of a law's device functions: forces, tangent blocks and `J`."""
 
 from functools import cache, partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import warp as wp
 
@@ -22,7 +22,8 @@ def batched_element_kernels(law: DeviceLaw, precision: Precision) -> tuple[Any, 
     One thread has an element of the group and a lane.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
-    kernels, Samples = KernelSet(f"{law.key}_{precision.name}_batched"), samples_struct(precision)
+    kernels = KernelSet(f"{law.key}_{precision.name}_batched")
+    Samples: TypeAlias = samples_struct(precision)
     tangents_of = law.kernels(precision).tangents
     stress_at = law.kernels(precision).stress_at
 

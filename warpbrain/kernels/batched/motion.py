@@ -5,7 +5,7 @@ that of a body that moves far has no digits to lose to the strain of its element
 """
 
 from functools import cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import warp as wp
 
@@ -18,7 +18,8 @@ from warpbrain.kernels.precision import Precision
 def batched_motion_kernels(precision: Precision) -> KernelSet:
     """Make (once) the batched kernels of a time step in a precision, one thread for a node and a lane."""
     scalar, vec3 = precision.scalar, precision.vec3
-    kernels, Samples = KernelSet(f"motion_{precision.name}_batched"), samples_struct(precision)
+    kernels = KernelSet(f"motion_{precision.name}_batched")
+    Samples: TypeAlias = samples_struct(precision)
 
     @kernels.add
     def restore(slots: wp.array[int], s: Samples):
