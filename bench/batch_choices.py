@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -18,7 +19,7 @@ from choices import DEVICE, milliseconds
 from warpbrain.bench.batches import phantom_job
 from warpbrain.ensemble.batch import Batch, pattern_of
 from warpbrain.ensemble.course import step_batch
-from warpbrain.kernels.linear import linear_kernels
+from warpbrain.kernels.assembly import assembly_kernels
 
 SAMPLES = int(sys.argv[2]) if len(sys.argv) > 2 else (8 if DEVICE == "cpu" else 256)
 TOLERANCE = 1e-6
@@ -29,13 +30,37 @@ def least(work: Callable[[], object], repeats: int = 5) -> float:
     return milliseconds(work, repeats, min)
 
 
+@wp.kernel
+def multiply(
+    offsets: wp.array[int], columns: wp.array[int], values: wp.array[Any], x: wp.array[Any], y: wp.array[Any],
+    z: wp.array[Any], alpha: Any, beta: Any,
+):  # fmt: skip
+    i = wp.tid()
+    s = type(x[0])()
+    for k in range(offsets[i], offsets[i + 1]):
+        s += values[k] * x[columns[k]]
+    s = alpha * s
+    if beta != type(beta)(0.0):
+        s += beta * y[i]
+    z[i] = s
+
+
+@wp.kernel
+def precondition(inverse: wp.array[Any], x: wp.array[Any], y: wp.array[Any], z: wp.array[Any], alpha: Any, beta: Any):
+    i = wp.tid()
+    s = alpha * (inverse[i] * x[i])
+    if beta != type(beta)(0.0):
+        s += beta * y[i]
+    z[i] = s
+
+
 class WarpBatch:
     """The systems of a batch one behind the other in one block-diagonal system, for Warp's CG."""
 
     def __init__(self, batch: Batch, right_hand_side: np.ndarray) -> None:
         system, b = batch.system, batch.slots
         n, nnz, p = system.size, system.matrix.nnz, system.precision
-        self._kernels, self._real, self._size = linear_kernels(p), p, n * b
+        self._real, self._size = p, n * b
         offsets, columns = system.matrix.offsets.numpy()[: n + 1], system.matrix.columns.numpy()[:nnz]
         rows = np.repeat(np.arange(n), np.diff(offsets))
         kept = batch._cg.values.numpy()[pattern_of(system).pairs].reshape(nnz, 3, 3, b)
@@ -49,9 +74,8 @@ class WarpBatch:
         self._values = array(blocks.transpose(3, 0, 1, 2).reshape(-1, 3, 3), p.mat33)
         diagonal = array((system.diagonal.numpy() + nnz * np.arange(b)[:, None]).ravel(), int)
         self._inverse = wp.empty(n * b, dtype=p.mat33, device=DEVICE)
-        wp.launch(
-            self._kernels.invert_diagonal, n * b, inputs=[0, diagonal, self._values, self._inverse], device=DEVICE
-        )
+        inputs = [0, diagonal, self._values, self._inverse]
+        wp.launch(assembly_kernels(p).invert_diagonal, n * b, inputs=inputs, device=DEVICE)
         shape = (3 * n * b, 3 * n * b)
         systems = array(3 * n * np.arange(b + 1), int)
         operator = warp_linear.LinearOperator(shape, p.scalar, wp.get_device(DEVICE), self._product, systems, 3 * n)
@@ -69,13 +93,13 @@ class WarpBatch:
         return wp.array(ptr=x.ptr, shape=(self._size,), dtype=self._real.vec3, device=DEVICE)
 
     def _product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        inputs = [0, self._offsets, self._columns, self._values, *map(self._vectors, (x, y, z))]
+        inputs = [self._offsets, self._columns, self._values, *map(self._vectors, (x, y, z))]
         inputs += [self._real.scalar(alpha), self._real.scalar(beta)]
-        wp.launch(self._kernels.multiply, self._size, inputs=inputs, device=DEVICE)
+        wp.launch(multiply, self._size, inputs=inputs, device=DEVICE)
 
     def _precondition(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        inputs = [0, self._inverse, *map(self._vectors, (x, y, z)), self._real.scalar(alpha), self._real.scalar(beta)]
-        wp.launch(self._kernels.apply_diagonal, self._size, inputs=inputs, device=DEVICE)
+        inputs = [self._inverse, *map(self._vectors, (x, y, z)), self._real.scalar(alpha), self._real.scalar(beta)]
+        wp.launch(precondition, self._size, inputs=inputs, device=DEVICE)
 
     def solve(self) -> None:
         """From zero."""
@@ -95,22 +119,22 @@ def solvers() -> None:
     course.begin(every)
     course.judge(batch.advance(every[:0], every))
     batch.advance(every, every[:0])
-    solution, iterations = batch._dv.numpy().copy(), batch._cg.results()[0]
+    solution, iterations = batch._samples.dv.numpy().copy(), batch._cg.results()[0]
     # at rest the right-hand side of the first step is h f_ext
     right = np.where(system.model.constrained, 0.0, 1e-3 * system.model.external_forces())[:, :, None]
     right = np.repeat(right, SAMPLES, axis=2)
     lists = batch._start
     # the step began at rest
-    batch._v.zero_()
+    batch._samples.v.zero_()
 
     def ours() -> None:
-        batch._dv.zero_()
+        batch._samples.dv.zero_()
         batch._cg.right_hand_side.assign(right)
         batch._cg.start(*lists)
         batch._cg.iterate(*lists, batch._linger_count)
 
     with wp.ScopedCapture(device=DEVICE) as capture:
-        batch._dv.zero_()
+        batch._samples.dv.zero_()
         batch._cg.start(*lists)
         batch._cg.iterate(*lists, batch._linger_count)
 

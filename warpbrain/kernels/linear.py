@@ -1,25 +1,14 @@
 """The one door to linear algebra: preconditioned conjugate gradients on the assembled system.
 
 A solve is one launch, on a GPU by `warpbrain.kernels.persistent`, on the CPU by
-`warpbrain.kernels.multicore_gradients`, unless the preconditioner is ``fsai`` or part of the matrix is in no block. All
-else is Warp's, and nobody else calls `warp.optim.linear`. A solve by Warp is captured once in a graph, with its
-convergence test on the device, and replayed: on CUDA one launch instead of hundreds, on the CPU a loop in C++ instead
-of Python. Facts about Warp 1.19 that are dealt with here and nowhere else:
-
-- on the CPU its CG reduces every tile of a dot product once per absent GPU lane. Naming the one system as a batch of
-  one (`batch_offsets = [0, n]`) takes the code path that does not;
-- its matrix-vector product of 3 x 3 blocks has one thread for a scalar row. Ours has one for a block row, and on a GPU
-  several for a block row;
-- its CG leaves the loop to the device on CUDA only. `_conditional_loop` does the same for a graph of the CPU, where
-  Warp would unroll `max_iterations` of them into it;
-- its kernels are compiled ahead for arrays of scalars only; vectors of three would compile that module three times
-  over. CG therefore sees scalar views of our arrays.
+`warpbrain.kernels.multicore_gradients`, unless the preconditioner is ``fsai`` or part of the matrix is in no block.
+Then it is a loop of launches, with its test on the device, that is captured once in a graph and replayed: on CUDA one
+launch instead of hundreds, on the CPU a loop in C++ instead of Python.
 """
 
 import abc
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Protocol
@@ -66,146 +55,125 @@ class LinearResult:
         return self.curvature <= 0.0
 
 
-#: Rows that one thread sums in the first stage of the curvature's reduction.
-_CHUNK = 64
+#: Rows that one thread sums, and such sums that one thread adds up.
+_ROWS, _SHARES = 16, 64
 
 
 @cache
-def linear_kernels(precision: Precision) -> KernelSet:
-    """Make (once) the kernels that Warp's conjugate gradients call, in a precision."""
+def loop_kernels(precision: Precision) -> KernelSet:
+    """Make (once) the kernels of the loop of conjugate gradients (Hestenes and Stiefel 1952) in a precision.
+
+    `numbers` (7,) are iterations, squares of the norm of the residual and of its goal, the least `p . A p / p . p`,
+    `r . z`, `alpha` and `beta`. Two sums are made at a time, in stages, all in order.
+    """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"linear_{precision.name}")
-    chunk = wp.constant(_CHUNK)
+    rows, shares_each = wp.constant(_ROWS), wp.constant(_SHARES)
 
     @kernels.add
-    def multiply(
+    def dots(
         start: int,
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        values: wp.array[mat33],
-        x: wp.array[vec3],
-        y: wp.array[vec3],
-        z: wp.array[vec3],
-        alpha: scalar,
-        beta: scalar,
+        a: wp.array[vec3],
+        b: wp.array[vec3],
+        c: wp.array[vec3],
+        d: wp.array[vec3],
+        shares: wp.array2d[scalar],
     ):
+        """Shares of `a . b` and `c . d`."""
+        t = start + wp.tid()
+        ab = scalar(0.0)
+        cd = scalar(0.0)
+        for i in range(t * rows, wp.min((t + 1) * rows, a.shape[0])):
+            ab += wp.dot(a[i], b[i])
+            cd += wp.dot(c[i], d[i])
+        shares[t, 0] = ab
+        shares[t, 1] = cd
+
+    @kernels.add
+    def add_shares(start: int, shares: wp.array2d[scalar], sums: wp.array2d[scalar]):
+        g = start + wp.tid()
+        for column in range(2):
+            s = scalar(0.0)
+            for t in range(g * shares_each, wp.min((g + 1) * shares_each, shares.shape[0])):
+                s += shares[t, column]
+            sums[g, column] = s
+
+    @wp.func
+    def total(sums: wp.array2d[scalar], column: int):
+        s = scalar(0.0)
+        for g in range(sums.shape[0]):
+            s += sums[g, column]
+        return s
+
+    @kernels.add
+    def subtract(start: int, b: wp.array[vec3], Ax: wp.array[vec3], r: wp.array[vec3]):
         i = start + wp.tid()
-        s = vec3()
-        for k in range(offsets[i], offsets[i + 1]):
-            s += values[k] * x[columns[k]]
-        s = alpha * s
-        # y may hold anything, NaN included, where beta is zero
-        if beta != scalar(0.0):
-            s += beta * y[i]
-        z[i] = s
+        r[i] = b[i] - Ax[i]
 
     @kernels.add
-    def apply_diagonal(
-        start: int,
-        inverse: wp.array[mat33],
-        x: wp.array[vec3],
-        y: wp.array[vec3],
-        z: wp.array[vec3],
-        alpha: scalar,
-        beta: scalar,
-    ):
+    def begin(sums: wp.array2d[scalar], tolerance: wp.array[scalar], numbers: wp.array[scalar]):
+        """Before the first of all; of `b . b`."""
+        numbers[0] = scalar(-1.0)
+        numbers[2] = tolerance[0] * tolerance[0] * total(sums, 0)
+        numbers[3] = scalar(wp.inf)  # type: ignore[attr-defined]
+        numbers[4] = scalar(wp.inf)  # type: ignore[attr-defined]
+
+    @kernels.add
+    def apply_blocks(start: int, inverse: wp.array[mat33], r: wp.array[vec3], z: wp.array[vec3]):
         i = start + wp.tid()
-        s = alpha * (inverse[i] * x[i])
-        if beta != scalar(0.0):
-            s += beta * y[i]
-        z[i] = s
+        z[i] = inverse[i] * r[i]
 
     @kernels.add
-    def partial_curvature(p: wp.array[vec3], Ap: wp.array[vec3], partial: wp.array2d[scalar]):
-        t = wp.tid()
-        pAp = scalar(0.0)
-        pp = scalar(0.0)
-        for i in range(t * chunk, wp.min((t + 1) * chunk, p.shape[0])):
-            pAp += wp.dot(p[i], Ap[i])
-            pp += wp.dot(p[i], p[i])
-        partial[t, 0] = pAp
-        partial[t, 1] = pp
-
-    @kernels.add
-    def least_curvature(partial: wp.array2d[scalar], least: wp.array[scalar]):
-        pAp = scalar(0.0)
-        pp = scalar(0.0)
-        for t in range(partial.shape[0]):
-            pAp += partial[t, 0]
-            pp += partial[t, 1]
-        # after convergence the directions of a batched CG are zero: they say nothing
-        if pp > scalar(0.0):
-            least[0] = wp.min(least[0], pAp / pp)
-
-    @kernels.add
-    def test_convergence(
-        max_iterations: int,
-        residual_squared: wp.array[scalar],
-        tolerance_squared: wp.array[scalar],
-        least: wp.array[scalar],
-        iterations: wp.array[int],
-        go_on: wp.array[int],
+    def decide(
+        sums: wp.array2d[scalar], max_iterations: int, watch: int, numbers: wp.array[scalar], go_on: wp.array[int]
     ):
-        iterations[0] = iterations[0] + 1
-        go_on[0] = 1
-        # of a matrix that is not positive definite nothing is found, however long it goes on
-        if least[0] <= scalar(0.0):
-            go_on[0] = 0
+        """Of `r . z` and `r . r`."""
+        rz = total(sums, 0)
+        numbers[0] = numbers[0] + scalar(1.0)
+        numbers[1] = total(sums, 1)
+        numbers[6] = rz / numbers[4]
+        numbers[4] = rz
+        go_on[0] = 0
         # written so that a residual that is not a number ends the loop
-        if not (residual_squared[0] > tolerance_squared[0]) or iterations[0] >= max_iterations:
+        if numbers[1] > numbers[2] and numbers[0] < scalar(max_iterations):
+            go_on[0] = 1
+        # of a matrix that is not positive definite nothing is found, however long it goes on
+        if watch != 0 and not (numbers[3] > scalar(0.0)):
             go_on[0] = 0
+
+    @kernels.add
+    def turn(start: int, numbers: wp.array[scalar], z: wp.array[vec3], p: wp.array[vec3]):
+        i = start + wp.tid()
+        p[i] = z[i] + numbers[6] * p[i]
+
+    @kernels.add
+    def measure(sums: wp.array2d[scalar], numbers: wp.array[scalar]):
+        """Of `p . A p` and `p . p`."""
+        pAp = total(sums, 0)
+        numbers[3] = wp.min(numbers[3], pAp / total(sums, 1))
+        numbers[5] = numbers[4] / pAp
+
+    @kernels.add
+    def advance(
+        start: int,
+        numbers: wp.array[scalar],
+        p: wp.array[vec3],
+        Ap: wp.array[vec3],
+        x: wp.array[vec3],
+        r: wp.array[vec3],
+    ):
+        i = start + wp.tid()
+        x[i] = x[i] + numbers[5] * p[i]
+        r[i] = r[i] - numbers[5] * Ap[i]
 
     return kernels
 
 
 def solver_kernels(precision: Precision, device: wp.Device, *, only_blocks: bool = True) -> list[Any]:
     """Of each module that `conjugate_gradient` needs on a device, with its default preconditioner, a kernel."""
-    of_rows = gradients_kernels if device.is_cpu and only_blocks else linear_kernels
-    on_cores = [team_kernels()[0]] if device.is_cpu else []
-    return [of_rows(precision).multiply, assembly_kernels(precision).invert_diagonal, *on_cores]
-
-
-@contextmanager
-def _conditional_loop(test_convergence: Any, least: wp.array) -> Iterator[None]:
-    """While a graph of the CPU is being captured: let Warp's CG loop on the device until it has converged.
-
-    It also ends where the least curvature (1,) is not positive: on an indefinite matrix CG may wander about until
-    `max_iterations`, and who watches the curvature has no use for what it finds there.
-
-    Replaces a function of Warp for that moment, in the whole process: not for captures in several threads at once.
-    """
-    import warp._src.optim.linear as warp_linear_internals
-
-    def loop(
-        do_cycle: Callable[[], None],
-        cur_iter_and_condition: wp.array,
-        r_norm_sq: wp.array,
-        maxiter: int,
-        atol_sq: wp.array,
-        *_args: Any,
-        **_options: Any,
-    ) -> tuple[wp.array, wp.array, wp.array]:
-        iterations, go_on = cur_iter_and_condition[0:1], cur_iter_and_condition[1:2]
-
-        def test() -> None:
-            inputs = [maxiter, r_norm_sq, atol_sq, least, iterations, go_on]
-            wp.launch(test_convergence, dim=1, inputs=inputs, device=atol_sq.device)
-
-        def cycle() -> None:
-            do_cycle()
-            test()
-
-        iterations.fill_(-1)
-        test()
-        wp.capture_while(go_on, cycle)
-        return iterations, r_norm_sq, atol_sq
-
-    original = warp_linear_internals._run_capturable_loop
-    warp_linear_internals._run_capturable_loop = loop
-    try:
-        yield
-    finally:
-        warp_linear_internals._run_capturable_loop = original
+    on_cores = [gradients_kernels(precision).multiply, team_kernels()[0]] if device.is_cpu else []
+    in_loop = [] if only_blocks else [loop_kernels(precision).dots]
+    return [*on_cores, assembly_kernels(precision).invert_diagonal, *in_loop]
 
 
 class LinearSolver(Protocol):
@@ -279,20 +247,16 @@ class ConjugateGradient(abc.ABC):
     def _zeros(self, shape: Any, dtype: Any = None) -> wp.array:
         return wp.zeros(shape, dtype=dtype or self._precision.scalar, device=self._device)
 
-    def _product(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        """`z = alpha A x + beta y`."""
-        A, scalar = self._matrix, self._precision.scalar
-        inputs = [A.offsets, A.columns, A.values, x, y, z, scalar(alpha), scalar(beta)]
+    def multiply(self, x: wp.array, z: wp.array) -> None:
+        """`z = A x`."""
+        A = self._matrix
+        inputs = [A.offsets, A.columns, A.values, x, z]
         if self._device.is_cuda:
             wp.launch(row_product_kernel(self._precision), dim=LANES * self._size, inputs=inputs, device=self._device)
         else:
-            launch(linear_kernels(self._precision).multiply, self._size, inputs, self._device)
+            launch(gradients_kernels(self._precision).multiply, self._size, inputs, self._device)
         if self._beyond is not None:
-            self._beyond(x, alpha, z)
-
-    def multiply(self, x: wp.array, z: wp.array) -> None:
-        """`z = A x`."""
-        self._product(x, z, z, 1.0, 0.0)
+            self._beyond(x, 1.0, z)
 
     def prepare(self) -> None:
         """Renew the preconditioner after the values of the matrix changed; its pattern is kept."""
@@ -308,7 +272,7 @@ class ConjugateGradient(abc.ABC):
         """Run CG from the present content of the solution array.
 
         Within the capture of a graph this only records. A tolerance other than that of the constructor is rounded down
-        to a quarter of a decade, so that few graphs serve all.
+        to a quarter of a decade.
         """
         self._solved = True
         self._run(self._tolerance if tolerance is None else 10.0 ** (math.floor(4.0 * math.log10(tolerance)) / 4.0))
@@ -327,11 +291,11 @@ def conjugate_gradient(
     """Conjugate gradients for a device: as one launch on a GPU, as one kernel on the cores of a CPU.
 
     Both need a matrix that is assembled into 3 x 3 blocks as a whole (`only_blocks`), and precondition by its diagonal
-    blocks. Otherwise, and on GPUs on which blocks of threads cannot wait for each other, it is Warp's loop.
+    blocks. Otherwise, and on GPUs on which blocks of threads cannot wait for each other, it is a loop of launches.
     """
     if not only_blocks or preconditioner == "fsai":
-        return WarpGradient
-    return OneLaunchGradient if blocks_stay(device) else CoresGradient if device.is_cpu else WarpGradient
+        return LoopGradient
+    return OneLaunchGradient if blocks_stay(device) else CoresGradient if device.is_cpu else LoopGradient
 
 
 class OneLaunchGradient(ConjugateGradient):
@@ -465,10 +429,6 @@ class CoresGradient(ConjugateGradient):
         np.copyto(inverse, inverse.T, where=np.tri(12 * k, k=-1, dtype=bool).T)
         self._coarse_inverse.assign(inverse)
 
-    def multiply(self, x: wp.array, z: wp.array) -> None:
-        A = self._matrix
-        launch(self._on_cores.multiply, self._size, [A.offsets, A.columns, A.values, x, z], self._device)
-
     def prepare(self) -> None:
         super().prepare()
         # who solves in another way, and only prepares, does without a copy
@@ -546,74 +506,34 @@ class CoresGradient(ConjugateGradient):
         return iterations, residual**0.5, goal**0.5, curvature
 
 
-class WarpGradient(ConjugateGradient):
-    """Of Warp, captured once in a graph for each tolerance and replayed."""
+class LoopGradient(ConjugateGradient):
+    """As a loop of launches, captured once in a graph and replayed."""
 
     def _begin(self) -> None:
-        # its kernels, which hardly anybody needs, take a tenth of a second to be read
-        import warp.optim.linear as warp_linear
-
-        self._warp = warp_linear
-        self._kernels = linear_kernels(self._precision)
-        self._least = wp.full(1, math.inf, dtype=self._precision.scalar, device=self._device)
-        self._partial = self._zeros(((self._size + _CHUNK - 1) // _CHUNK, 2))
+        self._kernels = loop_kernels(self._precision)
+        self._r, self._z, self._p, self._Ap = (self._zeros(self._size, self._precision.vec3) for _ in range(4))
+        if self._kind == "none":
+            self._z = self._r
+        count = -(-self._size // _ROWS)
+        self._shares, self._sums = self._zeros((count, 2)), self._zeros((-(-count // _SHARES), 2))
+        self._numbers, self._wanted, self._go_on = self._zeros(7), self._zeros(1), self._zeros(1, int)
+        self._graph: Graph | None = None
         self._fsai: Any = None
         self._refused: float | None = None
-        self._views: dict[int, wp.array] = {}
-        batch = wp.array([0, 3 * self._size], dtype=int, device=self._device) if self._device.is_cpu else None
-        of = (3 * self._size, 3 * self._size), self._precision.mat33, self._device
-        self._operator = warp_linear.LinearOperator(*of, self._multiply_scalars, batch_offsets=batch)
-        self._preconditioner: Any = None
-        if self._kind == "block-jacobi":
-            self._preconditioner = warp_linear.LinearOperator(*of, self._precondition_scalars)
-        self._graphs: dict[float, Graph] = {}
-        self._solvers: dict[float, Any] = {}
-        self._outcome: tuple[wp.array, ...] = ()
-        self._outcomes: dict[float, tuple[wp.array, ...]] = {}
-
-    def _solver(self, tolerance: float) -> Any:
-        """Warp's solver for a tolerance, which it keeps for life; made when it is first asked for."""
-        if tolerance not in self._solvers:
-            b, x = (
-                wp.array(ptr=vectors.ptr, shape=(3 * self._size,), dtype=self._precision.scalar, device=self._device)
-                for vectors in (self._b, self._x)
-            )
-            self._solvers[tolerance] = self._warp.CG(
-                self._operator, b, x, tol=tolerance, atol=0.0, maxiter=self._max_iterations, M=self._preconditioner,
-                check_every=0, use_cuda_graph=True,
-            )  # fmt: skip
-        return self._solvers[tolerance]
-
-    def _vectors(self, x: wp.array) -> wp.array:
-        """The vectors of an array of scalars, without a copy; the solver's arrays never move, so views are kept."""
-        view = self._views.get(x.ptr)
-        if view is None:
-            view = wp.array(ptr=x.ptr, shape=(self._size,), dtype=self._precision.vec3, device=self._device)
-            self._views[x.ptr] = view
-        return view
-
-    def _multiply_scalars(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        x, y, z = map(self._vectors, (x, y, z))
-        self._product(x, y, z, alpha, beta)
-        if self._watch and beta == 0.0:
-            launch(self._kernels.partial_curvature, self._partial.shape[0], [x, z, self._partial], self._device)
-            launch(self._kernels.least_curvature, 1, [self._partial, self._least], self._device)
-
-    def _precondition_scalars(self, x: wp.array, y: wp.array, z: wp.array, alpha: float, beta: float) -> None:
-        scalar = self._precision.scalar
-        inputs = [self._inverse, *map(self._vectors, (x, y, z)), scalar(alpha), scalar(beta)]
-        launch(self._kernels.apply_diagonal, self._size, inputs, self._device)
 
     def prepare(self) -> None:
         super().prepare()
         if self._kind != "fsai":
             return
+        # what hardly anybody needs takes a tenth of a second to be read
+        from warp.optim.linear import FSAI
+
         self._refused = None
         if self._fsai is not None:
             self._fsai.update(self._matrix)
             return
         try:
-            self._fsai = self._warp.FSAI(self._matrix, reuse_pattern=True)
+            self._fsai = FSAI(self._matrix, reuse_pattern=True)
         except ValueError:
             # it refuses a diagonal that is not positive, which no positive definite matrix has
             blocks = self._matrix.values.numpy()[self._diagonal.numpy()]
@@ -622,29 +542,59 @@ class WarpGradient(ConjugateGradient):
     def _run(self, tolerance: float) -> None:
         if self._refused is not None:
             return
+        self._wanted.fill_(tolerance)
         if self._device.is_capturing:
-            self._record(tolerance)
+            self._record()
             return
-        if tolerance not in self._graphs:
-            self._graphs[tolerance] = graph = Graph(self._device)
-            with graph.capture():
-                self._record(tolerance)
-        self._graphs[tolerance].launch()
-        self._outcome = self._outcomes[tolerance]
+        if self._graph is None:
+            self._graph = Graph(self._device)
+            with self._graph.capture():
+                self._record()
+        self._graph.launch()
 
-    def _record(self, tolerance: float) -> None:
-        solver = self._solver(tolerance)
-        if self._watch:
-            self._least.fill_(float("inf"))
-        on_cpu = self._device.is_cpu
-        with _conditional_loop(self._kernels.test_convergence, self._least) if on_cpu else nullcontext():
-            self._outcome = solver(M=self._fsai)
-        self._outcomes[tolerance] = self._outcome
+    def _launch(self, kernel: Any, count: int, *inputs: Any) -> None:
+        launch(kernel, count, inputs, self._device)
+
+    def _sum(self, a: wp.array, b: wp.array, c: wp.array, d: wp.array) -> None:
+        """`a . b` and `c . d`."""
+        launch(self._kernels.dots, len(self._shares), [a, b, c, d, self._shares], self._device, least=32)
+        self._launch(self._kernels.add_shares, len(self._sums), self._shares, self._sums)
+
+    def _record(self) -> None:
+        k, size = self._kernels, self._size
+        self._sum(self._b, self._b, self._b, self._b)
+        self._launch(k.begin, 1, self._sums, self._wanted, self._numbers)
+        self._p.zero_()
+        self.multiply(self._x, self._Ap)
+        self._launch(k.subtract, size, self._b, self._Ap, self._r)
+        self._end_iteration()
+        wp.capture_while(self._go_on, self._iterate)
+
+    def _end_iteration(self) -> None:
+        self._precondition()
+        self._sum(self._r, self._z, self._r, self._r)
+        watch = int(self._watch)
+        self._launch(self._kernels.decide, 1, self._sums, self._max_iterations, watch, self._numbers, self._go_on)
+
+    def _iterate(self) -> None:
+        k, numbers, size = self._kernels, self._numbers, self._size
+        self._launch(k.turn, size, numbers, self._z, self._p)
+        self.multiply(self._p, self._Ap)
+        self._sum(self._p, self._Ap, self._p, self._p)
+        self._launch(k.measure, 1, self._sums, numbers)
+        self._launch(k.advance, size, numbers, self._p, self._Ap, self._x, self._r)
+        self._end_iteration()
+
+    def _precondition(self) -> None:
+        """`z` of the residual; without a preconditioner they are one array."""
+        if self._kind == "fsai":
+            self._fsai.matvec(self._r, self._z, self._z, 1.0, 0.0)
+        elif self._kind == "block-jacobi":
+            self._launch(self._kernels.apply_blocks, self._size, self._inverse, self._r, self._z)
 
     def result(self) -> LinearResult:
         return super().result() if self._refused is None else LinearResult(0, math.nan, 0.0, self._refused)
 
     def _ended(self) -> tuple[float, float, float, float]:
-        outcome = (*self._outcome, self._least)
-        iterations, residual, goal, curvature = (float(values.numpy().ravel()[0]) for values in outcome)
+        iterations, residual, goal, curvature = self._numbers.numpy()[:4].tolist()
         return iterations, residual**0.5, goal**0.5, curvature

@@ -25,20 +25,15 @@ for (int d = LANES / 2; d > 0; d /= 2)
     for (int c = 0; c < 3; ++c)
         s[c] += __shfl_xor_sync(mask, s[c], d);
 if (sub == 0)
-    for (int c = 0; c < 3; ++c) {
-        REAL t = alpha * s[c];
-        // y may hold anything, NaN included, where beta is zero
-        if (beta != REAL(0))
-            t += beta * ((const REAL *)y.data)[3 * row + c];
-        ((REAL *)z.data)[3 * row + c] = t;
-    }
+    for (int c = 0; c < 3; ++c)
+        ((REAL *)z.data)[3 * row + c] = s[c];
 """
 
 
 @cache
 def row_product_kernel(precision: Precision) -> Any:
-    """Make (once) the kernel of ``z = alpha A x + beta y``, launched over `LANES` threads a row."""
-    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    """Make (once) the kernel of ``z = A x``, launched over `LANES` threads a row."""
+    vec3, mat33 = precision.vec3, precision.mat33
     module = compiled_module(f"row_product_{precision.name}")
     real = {"double": "double", "single": "float"}[precision.name]
 
@@ -49,23 +44,13 @@ def row_product_kernel(precision: Precision) -> Any:
         columns: wp.array[int],
         values: wp.array[mat33],
         x: wp.array[vec3],
-        y: wp.array[vec3],
         z: wp.array[vec3],
-        alpha: scalar,
-        beta: scalar,
     ): ...
 
     @wp.kernel(module=module, grid_stride=False)
     def multiply(
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        values: wp.array[mat33],
-        x: wp.array[vec3],
-        y: wp.array[vec3],
-        z: wp.array[vec3],
-        alpha: scalar,
-        beta: scalar,
+        offsets: wp.array[int], columns: wp.array[int], values: wp.array[mat33], x: wp.array[vec3], z: wp.array[vec3]
     ):
-        row_product(wp.tid(), offsets, columns, values, x, y, z, alpha, beta)
+        row_product(wp.tid(), offsets, columns, values, x, z)
 
     return multiply
