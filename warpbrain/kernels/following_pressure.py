@@ -11,7 +11,7 @@ degree 1 or 4: the rules are exact.
 """
 
 from functools import cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import warp as wp
@@ -23,6 +23,21 @@ from warpbrain.kernels.ten_nodes import UNROLL
 
 
 @cache
+def triangles_struct(precision: Precision) -> Any:
+    """Make (once) what kernels of a precision know of triangles, those of `warpbrain.physics.term.TriangleTerm`."""
+    scalar, vec3 = precision.scalar, precision.vec3
+
+    @wp.struct
+    class Triangles:
+        nodes: wp.array2d[int]
+        points: wp.array[vec3]  # of all nodes of the body
+        data: wp.array2d[scalar]
+        scale: wp.array[scalar]
+
+    return Triangles
+
+
+@cache
 def pressure_kernels(precision: Precision, nodes: int, rule: tuple[tuple[float, ...], ...]) -> tuple[Any, Any, Any]:
     """Make (once) kernels for forces, tangent blocks and energies, with one thread for a triangle of so many nodes.
 
@@ -30,6 +45,7 @@ def pressure_kernels(precision: Precision, nodes: int, rule: tuple[tuple[float, 
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     module = compiled_module(f"pressure_{nodes}_{precision.name}", unroll=UNROLL)
+    Triangles: TypeAlias = triangles_struct(precision)
     points, last = len(rule), 2 * nodes - 1
     table = wp.types.matrix((points, nodes), scalar)
     values, along_r, along_s = _linear(rule) if nodes == 3 else _quadratic(rule)
@@ -39,47 +55,33 @@ def pressure_kernels(precision: Precision, nodes: int, rule: tuple[tuple[float, 
     w = wp.constant(wp.types.vector(points, scalar)(*(0.5 * np.array(rule)[:, 3])))
 
     @wp.func
-    def place(i: wp.array2d[int], points_at: wp.array[vec3], u: wp.array[vec3], t: int, q: int, shapes: table):
+    def place(s: Triangles, u: wp.array[vec3], t: int, q: int, shapes: table):
         """Sum of deformed positions, weighted by row q of a table."""
         x = vec3()
         for a in range(nodes):
-            x += shapes[q, a] * (points_at[i[t, a]] + u[i[t, a]])
+            x += shapes[q, a] * (s.points[s.nodes[t, a]] + u[s.nodes[t, a]])
         return x
 
     @wp.kernel(module=module)
-    def forces(
-        members: wp.array2d[int],
-        points_at: wp.array[vec3],
-        value: wp.array[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array2d[vec3],
-    ):
+    def forces(s: Triangles, u: wp.array[vec3], out: wp.array2d[vec3]):
         t = wp.tid()
-        p = value[t] * scale[0]
+        p = s.data[t, 0] * s.scale[0]
         for a in range(nodes):
             out[t, a] = vec3()
         for q in range(points):
-            normal = wp.cross(place(members, points_at, u, t, q, Nr), place(members, points_at, u, t, q, Ns))
+            normal = wp.cross(place(s, u, t, q, Nr), place(s, u, t, q, Ns))
             for a in range(nodes):
                 out[t, a] = out[t, a] + (p * w[q] * N[q, a]) * normal
 
     @wp.kernel(module=module)
-    def tangents(
-        members: wp.array2d[int],
-        points_at: wp.array[vec3],
-        value: wp.array[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array2d[mat33],
-    ):
+    def tangents(s: Triangles, u: wp.array[vec3], out: wp.array2d[mat33]):
         t = wp.tid()
-        p = scalar(0.5) * value[t] * scale[0]
+        p = scalar(0.5) * s.data[t, 0] * s.scale[0]
         for block in range(out.shape[1]):
             out[t, block] = mat33()
         for q in range(points):
-            x_r = place(members, points_at, u, t, q, Nr)
-            x_s = place(members, points_at, u, t, q, Ns)
+            x_r = place(s, u, t, q, Nr)
+            x_s = place(s, u, t, q, Ns)
             for a in range(nodes):
                 for b in range(a, nodes):
                     d = (N[q, b] * Nr[q, a] - N[q, a] * Nr[q, b]) * x_s
@@ -88,20 +90,13 @@ def pressure_kernels(precision: Precision, nodes: int, rule: tuple[tuple[float, 
                     out[t, block] = out[t, block] + wp.skew(p * w[q] * d)
 
     @wp.kernel(module=module)
-    def energies(
-        members: wp.array2d[int],
-        points_at: wp.array[vec3],
-        value: wp.array[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array[scalar],
-    ):
+    def energies(s: Triangles, u: wp.array[vec3], out: wp.array[scalar]):
         t = wp.tid()
         enclosed = scalar(0.0)
         for q in range(points):
-            normal = wp.cross(place(members, points_at, u, t, q, Nr), place(members, points_at, u, t, q, Ns))
-            enclosed += w[q] * wp.dot(place(members, points_at, u, t, q, N), normal)
-        out[t] = value[t] * scale[0] / scalar(3.0) * enclosed
+            normal = wp.cross(place(s, u, t, q, Nr), place(s, u, t, q, Ns))
+            enclosed += w[q] * wp.dot(place(s, u, t, q, N), normal)
+        out[t] = s.data[t, 0] * s.scale[0] / scalar(3.0) * enclosed
 
     return forces, tangents, energies
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats, Int32s
 from warpbrain.kernels.extra_energy import extra_kernels
+from warpbrain.kernels.following_pressure import triangles_struct
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.ten_nodes import TEN_NODES
@@ -268,9 +269,11 @@ class TriangleTerm(KernelTerm):
     """Forces, tangent blocks and energies of triangles (k, 3) or (k, 6): ids that ascend, of six the corners first.
 
     `points` (n, 3) are reference positions of the body's nodes [m], from any origin, `data` (k,) or (k, c) numbers of
-    each triangle. The three kernels are ``(nodes, points, data, scale, u) -> forces``, ``-> blocks`` and
-    ``-> energies``, with a thread for each triangle. The ramp is a factor over time [s].
+    each triangle. The three kernels are ``(triangles, u) -> forces``, ``-> blocks`` and ``-> energies``, with a thread
+    for each triangle. The ramp is a factor over time [s].
     """
+
+    lasting = ("_triangles",)
 
     def __init__(
         self,
@@ -284,10 +287,13 @@ class TriangleTerm(KernelTerm):
         super().__init__(body, triangles, kernels, ramp)
         self._nodes = self.array(self.stencils, int)
         self._points = self.array(points, body.precision.vec3)
-        self._data = self.array(data, body.precision.scalar)
+        self._data = self.array(data.reshape(len(triangles), -1), body.precision.scalar)
+        self._triangles = triangles_struct(body.precision)()
+        self._triangles.nodes, self._triangles.points = self._nodes, self._points
+        self._triangles.data, self._triangles.scale = self._data, self.scale
 
     def _inputs(self) -> list[Any]:
-        return [self._nodes, self._points, self._data, self.scale]
+        return [self._triangles]
 
     def evaluate_tangents(self, u: wp.array) -> None:
         self.evaluate_forces(u)

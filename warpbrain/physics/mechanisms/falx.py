@@ -10,12 +10,13 @@ modulus `mu`, the incompressible neo-Hookean membrane (Bonet and Wood, Nonlinear
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpbrain.kernels.following_pressure import triangles_struct
 from warpbrain.kernels.module import compiled_module
 from warpbrain.kernels.precision import Precision
 from warpbrain.mesh import TetMesh
@@ -119,17 +120,18 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     vec2, mat22 = wp.types.vector(2, scalar), wp.types.matrix((2, 2), scalar)
     module = compiled_module(f"falx_{precision.name}")
+    Triangles: TypeAlias = triangles_struct(precision)
 
     @wp.func
-    def columns(points: wp.array[vec3], u: wp.array[vec3], nodes: wp.array2d[int], data: wp.array2d[scalar], t: int):
+    def columns(s: Triangles, u: wp.array[vec3], t: int):
         """The two columns of `F`; of displacements, so that small strains keep their digits."""
-        g1 = vec2(data[t, 1], data[t, 2])
-        g2 = vec2(data[t, 3], data[t, 4])
-        a = nodes[t, 0]
-        b = nodes[t, 1]
-        c = nodes[t, 2]
-        e1 = points[b] - points[a] + (u[b] - u[a])
-        e2 = points[c] - points[a] + (u[c] - u[a])
+        g1 = vec2(s.data[t, 1], s.data[t, 2])
+        g2 = vec2(s.data[t, 3], s.data[t, 4])
+        a = s.nodes[t, 0]
+        b = s.nodes[t, 1]
+        c = s.nodes[t, 2]
+        e1 = s.points[b] - s.points[a] + (u[b] - u[a])
+        e2 = s.points[c] - s.points[a] + (u[c] - u[a])
         return g1[0] * e1 + g2[0] * e2, g1[1] * e1 + g2[1] * e2
 
     @wp.func
@@ -137,22 +139,15 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         return mat22(wp.dot(F1, F1), wp.dot(F1, F2), wp.dot(F1, F2), wp.dot(F2, F2))
 
     @wp.kernel(module=module)
-    def forces(
-        nodes: wp.array2d[int],
-        points: wp.array[vec3],
-        data: wp.array2d[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array2d[vec3],
-    ):
+    def forces(s: Triangles, u: wp.array[vec3], out: wp.array2d[vec3]):
         t = wp.tid()
-        F1, F2 = columns(points, u, nodes, data, t)
+        F1, F2 = columns(s, u, t)
         C = metric(F1, F2)
-        S = scale[0] * data[t, 0] * (wp.identity(n=2, dtype=scalar) - wp.inverse(C) / wp.determinant(C))
+        S = s.scale[0] * s.data[t, 0] * (wp.identity(n=2, dtype=scalar) - wp.inverse(C) / wp.determinant(C))
         P1 = S[0, 0] * F1 + S[1, 0] * F2
         P2 = S[0, 1] * F1 + S[1, 1] * F2
-        f1 = data[t, 1] * P1 + data[t, 2] * P2
-        f2 = data[t, 3] * P1 + data[t, 4] * P2
+        f1 = s.data[t, 1] * P1 + s.data[t, 2] * P2
+        f2 = s.data[t, 3] * P1 + s.data[t, 4] * P2
         out[t, 0] = -(f1 + f2)
         out[t, 1] = f1
         out[t, 2] = f2
@@ -177,22 +172,15 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         return K
 
     @wp.kernel(module=module)
-    def tangents(
-        nodes: wp.array2d[int],
-        points: wp.array[vec3],
-        data: wp.array2d[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array2d[mat33],
-    ):
+    def tangents(s: Triangles, u: wp.array[vec3], out: wp.array2d[mat33]):
         t = wp.tid()
-        F1, F2 = columns(points, u, nodes, data, t)
+        F1, F2 = columns(s, u, t)
         C = metric(F1, F2)
         inverse = wp.inverse(C)
-        over = scale[0] * data[t, 0] / wp.determinant(C)
-        S = scale[0] * data[t, 0] * wp.identity(n=2, dtype=scalar) - over * inverse
-        g1 = vec2(data[t, 1], data[t, 2])
-        g2 = vec2(data[t, 3], data[t, 4])
+        over = s.scale[0] * s.data[t, 0] / wp.determinant(C)
+        S = s.scale[0] * s.data[t, 0] * wp.identity(n=2, dtype=scalar) - over * inverse
+        g1 = vec2(s.data[t, 1], s.data[t, 2])
+        g2 = vec2(s.data[t, 3], s.data[t, 4])
         K11 = block(F1, F2, S, inverse, over, g1, g1)
         K12 = block(F1, F2, S, inverse, over, g1, g2)
         K22 = block(F1, F2, S, inverse, over, g2, g2)
@@ -206,19 +194,12 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         out[t, 5] = K22
 
     @wp.kernel(module=module)
-    def energies(
-        nodes: wp.array2d[int],
-        points: wp.array[vec3],
-        data: wp.array2d[scalar],
-        scale: wp.array[scalar],
-        u: wp.array[vec3],
-        out: wp.array[scalar],
-    ):
+    def energies(s: Triangles, u: wp.array[vec3], out: wp.array[scalar]):
         t = wp.tid()
-        F1, F2 = columns(points, u, nodes, data, t)
+        F1, F2 = columns(s, u, t)
         C = metric(F1, F2)
         unit = scalar(1.0)
         W = wp.trace(C) + unit / wp.determinant(C) - scalar(3.0)
-        out[t] = scalar(0.5) * scale[0] * data[t, 0] * W
+        out[t] = scalar(0.5) * s.scale[0] * s.data[t, 0] * W
 
     return forces, tangents, energies
