@@ -26,19 +26,22 @@ constexpr word PATIENCE = 2000000000ull;
 
 extern __shared__ char dynamic_smem_base[];
 
+const auto offsets = given.offsets, columns = given.columns, diagonal = given.diagonal;
+const int max_iterations = given.max_iterations;
+const bool watch = given.watch, jacobi = given.jacobi;
 const int tid = threadIdx.x, lane = tid % 32, warp = tid / 32, sub = lane % LANES;
 const bool adds_up = warp == WARPS;
 const int grid = gridDim.x, me = blockIdx.x;
-const int row0 = starts.data[me], rows = starts.data[me + 1] - row0;
+const int row0 = given.starts.data[me], rows = given.starts.data[me + 1] - row0;
 const int block0 = offsets.data[row0], blocks = offsets.data[row0 + rows] - block0;
-const int nodes = x.shape[0];
-const REAL *const all_values = (const REAL *)values.data;
-const REAL *const b_of = (const REAL *)b.data;
-REAL *const x_of = (REAL *)x.data;
-int *const state = control.data;
-word *const mailbox = (word *)messages.data;
+const int nodes = given.x.shape[0];
+const REAL *const all_values = (const REAL *)given.values.data;
+const REAL *const b_of = (const REAL *)given.b.data;
+REAL *const x_of = (REAL *)given.x.data;
+int *const state = given.control.data;
+word *const mailbox = (word *)given.messages.data;
 // two places that take turns, by the number of the phase, and one for the solution
-word *const places = (word *)exchange.data, *const solution = places + 8 * size_t(nodes);
+word *const places = (word *)given.exchange.data, *const solution = places + 8 * size_t(nodes);
 // number k of the block in a place of these rows
 auto entry = [&](int place, int k) -> REAL { return all_values[9 * (size_t(block0) + place) + k]; };
 
@@ -57,7 +60,7 @@ if (VECTORS * length * 8 <= left) {
     room += VECTORS * length * 8;
     left -= VECTORS * length * 8;
 } else {
-    vectors = scratch.data + size_t(VECTORS) * 3 * row0;
+    vectors = given.scratch.data + size_t(VECTORS) * 3 * row0;
 }
 int *first = (int *)room;
 const int offset_bytes = (4 * (rows + 1) + 7) / 8 * 8;
@@ -480,10 +483,10 @@ while (phase < END) {
 for (int i = tid; i < length; i += THREADS)
     x_of[3 * size_t(row0) + i] = REAL(vectors[X * length + i]);
 if (me == 0 && adds_up && lane == 0) {
-    outcome.data[0] = double(iteration);
-    outcome.data[1] = sqrt(rr);
-    outcome.data[2] = sqrt(goal);
-    outcome.data[3] = least;
+    given.outcome.data[0] = double(iteration);
+    given.outcome.data[1] = sqrt(rr);
+    given.outcome.data[2] = sqrt(goal);
+    given.outcome.data[3] = least;
 }
 if (me == 0 && tid == 0)
     state[0] = (int)epoch;

@@ -59,60 +59,41 @@ def native_code(precision: Precision, shared_bytes: int, lanes: int, messages: i
 
 
 @cache
-def persistent_kernel(precision: Precision, shared_bytes: int, lanes: int, messages: int) -> Any:
-    """Make (once) the kernel of what `native_code` is for."""
+def persistent_kernel(precision: Precision, shared_bytes: int, lanes: int, messages: int) -> tuple[Any, Any]:
+    """Make (once) what the kernel of what `native_code` is for knows of a solve, and this kernel."""
     vec3, mat33 = precision.vec3, precision.mat33
     module = compiled_module(f"persistent_{precision.name}_{shared_bytes}_{lanes}_{messages}")
     module.options["block_dim"] = THREADS
     numbers = wp.constant(shared_bytes // 8)
 
+    @wp.struct
+    class Solve:
+        offsets: wp.array[int]
+        columns: wp.array[int]
+        values: wp.array[mat33]
+        diagonal: wp.array[int]
+        starts: wp.array[int]
+        b: wp.array[vec3]
+        x: wp.array[vec3]
+        max_iterations: int
+        watch: int
+        jacobi: int
+        exchange: wp.array[wp.float64]
+        messages: wp.array[wp.uint64]
+        scratch: wp.array[wp.float64]
+        control: wp.array[int]
+        outcome: wp.array[wp.float64]
+
     @wp.func_native(native_code(precision, shared_bytes, lanes, messages))
-    def solve(
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        values: wp.array[mat33],
-        diagonal: wp.array[int],
-        starts: wp.array[int],
-        b: wp.array[vec3],
-        x: wp.array[vec3],
-        tolerance: wp.float64,
-        max_iterations: int,
-        watch: int,
-        jacobi: int,
-        exchange: wp.array[wp.float64],
-        messages: wp.array[wp.uint64],
-        scratch: wp.array[wp.float64],
-        control: wp.array[int],
-        outcome: wp.array[wp.float64],
-    ): ...
+    def solve(given: Solve, tolerance: wp.float64): ...
 
     @wp.kernel(module=module, launch_bounds=(THREADS, 1), grid_stride=False)
-    def conjugate_gradients(
-        offsets: wp.array[int],
-        columns: wp.array[int],
-        values: wp.array[mat33],
-        diagonal: wp.array[int],
-        starts: wp.array[int],
-        b: wp.array[vec3],
-        x: wp.array[vec3],
-        tolerance: wp.float64,
-        max_iterations: int,
-        watch: int,
-        jacobi: int,
-        exchange: wp.array[wp.float64],
-        messages: wp.array[wp.uint64],
-        scratch: wp.array[wp.float64],
-        control: wp.array[int],
-        outcome: wp.array[wp.float64],
-    ):
+    def conjugate_gradients(given: Solve, tolerance: wp.float64):
         # all of the shared memory: the native code knows where it begins
         wp.tile_empty(shape=numbers, dtype=wp.float64, storage="shared")
-        solve(
-            offsets, columns, values, diagonal, starts, b, x, tolerance, max_iterations, watch, jacobi, exchange,
-            messages, scratch, control, outcome,
-        )  # fmt: skip
+        solve(given, tolerance)
 
-    return conjugate_gradients
+    return Solve, conjugate_gradients
 
 
 def blocks_stay(device: wp.Device) -> bool:
@@ -186,15 +167,14 @@ class PersistentSolve:
         device, n = b.device, b.shape[0]
         self._blocks = max(1, min(device.sm_count, _MOST_BLOCKS, n // _LEAST_ROWS))
         starts, lanes, messages = share_rows(matrix.offsets.numpy(), self._blocks)
-        self._kernel = persistent_kernel(precision, shared_memory(device), lanes, messages)
+        made, self._kernel = persistent_kernel(precision, shared_memory(device), lanes, messages)
         self._meetings = m = Meetings(n, self._blocks, device)
-        self._outcome = wp.zeros(4, dtype=wp.float64, device=device)
-        self._before = [
-            matrix.offsets, matrix.columns, matrix.values, diagonal, wp.array(starts, dtype=int, device=device), b, x,
-        ]  # fmt: skip
-        self._after = [
-            max_iterations, int(watch), int(jacobi), m.exchange, m.messages, m.scratch, m.control, self._outcome,
-        ]  # fmt: skip
+        self._solve = s = made()
+        s.offsets, s.columns, s.values, s.diagonal = matrix.offsets, matrix.columns, matrix.values, diagonal
+        s.starts, s.b, s.x = wp.array(starts, dtype=int, device=device), b, x
+        s.max_iterations, s.watch, s.jacobi = max_iterations, int(watch), int(jacobi)
+        s.exchange, s.messages, s.scratch, s.control = m.exchange, m.messages, m.scratch, m.control
+        s.outcome = wp.zeros(4, dtype=wp.float64, device=device)
         self._device = device
 
     def launch(self, tolerance: float) -> None:
@@ -202,7 +182,7 @@ class PersistentSolve:
         wp.launch(
             self._kernel,
             dim=self._blocks * THREADS,
-            inputs=[*self._before, wp.float64(tolerance), *self._after],
+            inputs=[self._solve, wp.float64(tolerance)],
             device=self._device,
             block_dim=THREADS,
         )
@@ -213,5 +193,5 @@ class PersistentSolve:
         `SolveError` if a block did not hear from another.
         """
         self._meetings.check()
-        iterations, residual, goal, curvature = self._outcome.numpy()
+        iterations, residual, goal, curvature = self._solve.outcome.numpy()
         return int(iterations), float(residual), float(goal), float(curvature)

@@ -15,10 +15,10 @@ const int tid = threadIdx.x, lane = tid % 32, warp = tid / 32;
 const int me = blockIdx.x % CLUSTER, system = blockIdx.x / CLUSTER;
 if (system >= count.data[0])
     return;
-const size_t slot = slots.data[system], stride = x.shape[2];
-const int row0 = parts.starts.data[me], rows = parts.starts.data[me + 1] - row0;
-const int outer0 = parts.outer_starts.data[me], outer = parts.outer_starts.data[me + 1] - outer0;
-const REAL *const matrix = (const REAL *)values.data + slot * 9 * pair_count;
+const size_t slot = slots.data[system], stride = given.x.shape[2];
+const int row0 = given.parts.starts.data[me], rows = given.parts.starts.data[me + 1] - row0;
+const int outer0 = given.parts.outer_starts.data[me], outer = given.parts.outer_starts.data[me + 1] - outer0;
+const REAL *const matrix = (const REAL *)given.values.data + slot * 9 * given.pair_count;
 
 // -- shared memory
 extern __shared__ char dynamic_smem_base[];
@@ -88,7 +88,7 @@ auto each_outer = [&](auto &&work) {
         if (turn * THREADS + THREADS - 1 - tid < outer)
             work(turn, turn * THREADS + THREADS - 1 - tid);
 };
-const int segment0 = parts.segment_starts.data[me * THREADS + tid];
+const int segment0 = given.parts.segment_starts.data[me * THREADS + tid];
 // A p, of which each thread leaves the sums of its runs of a row in `segments`
 auto multiply = [&]() {
     __syncthreads();
@@ -151,7 +151,7 @@ auto precondition = [&](int i) {
 };
 
 // -- load
-const int *const pairs = parts.pairs.data + size_t(me) * PLACES * THREADS;
+const int *const pairs = given.parts.pairs.data + size_t(me) * PLACES * THREADS;
 auto fetch = [&](int from, int to) {
     const int wide = to - from;
 #pragma unroll 9
@@ -183,15 +183,15 @@ for (int from = 0; from < IN_REGISTERS; from += IN_SHARED) {
 }
 fetch(IN_REGISTERS, PLACES);
 for (int i = tid; i < PLACES * THREADS; i += THREADS)
-    column[i] = (unsigned short)parts.columns.data[size_t(me) * PLACES * THREADS + i];
+    column[i] = (unsigned short)given.parts.columns.data[size_t(me) * PLACES * THREADS + i];
 for (int i = tid; i <= rows; i += THREADS)
-    first[i] = (unsigned short)parts.row_segments.data[row0 + me + i];
-const REAL *const b_of = (const REAL *)b.data, *const v_of = (const REAL *)v.data, *const free_of = (const REAL *)free.data;
-REAL *const x_of = (REAL *)x.data;
+    first[i] = (unsigned short)given.parts.row_segments.data[row0 + me + i];
+const REAL *const b_of = (const REAL *)given.b.data, *const v_of = (const REAL *)given.v.data, *const free_of = (const REAL *)given.free.data;
+REAL *const x_of = (REAL *)given.x.data;
 auto at = [&](int node, int c) -> size_t { return (3 * size_t(node) + c) * stride + slot; };
 each_row([&](int, int i) {
-    const int node = parts.nodes.data[row0 + i];
-    const REAL *const d = matrix + 9 * size_t(diagonal.data[node]);
+    const int node = given.parts.nodes.data[row0 + i];
+    const REAL *const d = matrix + 9 * size_t(given.diagonal.data[node]);
     const double a = d[0], b = d[1], c = d[2], e = d[4], f = d[5], g = d[8];
     const double A = e * g - f * f, B = c * f - b * g, C = b * f - c * e, per = 1.0 / (a * A + b * B + c * C);
     REAL *const to = inverse + 6 * i;
@@ -204,16 +204,16 @@ each_row([&](int, int i) {
     }
 });
 each_outer([&](int turn, int k) {
-    const int where = parts.outer_places.data[outer0 + k];
+    const int where = given.parts.outer_places.data[outer0 + k];
     elsewhere[turn] = address_in(z + 3 * (where & 0xffff), where >> 16);
     for (int c = 0; c < 3; ++c)
-        p[3 * (rows + k) + c] = v_of[at(parts.outer_nodes.data[outer0 + k], c)];
+        p[3 * (rows + k) + c] = v_of[at(given.parts.outer_nodes.data[outer0 + k], c)];
 });
 asm volatile("cp.async.wait_all;" ::: "memory");
 // the matrix of the system that is next here is on its way to the second-level cache meanwhile
-if (warp == WARPS - 1 && system + ahead < count.data[0]) {
-    const size_t bytes = 9 * sizeof(REAL) * size_t(pair_count), part = bytes / (32 * CLUSTER);
-    const char *const next = (const char *)values.data + slots.data[system + ahead] * bytes + (32 * me + lane) * part;
+if (warp == WARPS - 1 && system + given.ahead < count.data[0]) {
+    const size_t bytes = 9 * sizeof(REAL) * size_t(given.pair_count), part = bytes / (32 * CLUSTER);
+    const char *const next = (const char *)given.values.data + slots.data[system + given.ahead] * bytes + (32 * me + lane) * part;
     asm volatile("cp.async.bulk.prefetch.L2.global [%0], %1;" ::"l"((size_t)next & ~size_t(15)),
                  "r"((unsigned)part & ~15u)
                  : "memory");
@@ -226,7 +226,7 @@ each_row([&](int, int i) {
     REAL y[3];
     product_of(i, y);
     for (int c = 0; c < 3; ++c) {
-        const REAL now = r[3 * i + c] - free_of[3 * size_t(parts.nodes.data[row0 + i]) + c] * y[c];
+        const REAL now = r[3 * i + c] - free_of[3 * size_t(given.parts.nodes.data[row0 + i]) + c] * y[c];
         r[3 * i + c] = now;
         bb += double(now) * now;
     }
@@ -255,7 +255,7 @@ rr = hear(1), rz = hear(2);
 // -- iterations: what is not a number ends them
 REAL beta = REAL(0);
 int iteration = 0;
-for (; rr > goal && iteration < max_iterations; ++iteration) {
+for (; rr > goal && iteration < given.max_iterations; ++iteration) {
     turn_to(beta);
     multiply();
     double pq = 0.0;
@@ -285,10 +285,10 @@ for (; rr > goal && iteration < max_iterations; ++iteration) {
 
 each_row([&](int turn, int i) {
     for (int c = 0; c < 3; ++c)
-        x_of[at(parts.nodes.data[row0 + i], c)] = own_x[turn][c];
+        x_of[at(given.parts.nodes.data[row0 + i], c)] = own_x[turn][c];
 });
 if (me == 0 && tid == 0) {
-    outcome.data[3 * slot] = double(iteration);
-    outcome.data[3 * slot + 1] = sqrt(rr);
-    outcome.data[3 * slot + 2] = sqrt(goal);
+    given.outcome.data[3 * slot] = double(iteration);
+    given.outcome.data[3 * slot + 1] = sqrt(rr);
+    given.outcome.data[3 * slot + 2] = sqrt(goal);
 }

@@ -124,56 +124,38 @@ def native_code(precision: Precision, sizes: Sizes) -> str:
 
 
 @cache
-def cluster_kernel(precision: Precision, sizes: Sizes) -> Any:
-    """Make (once) the kernel of what `native_code` is for."""
+def cluster_kernel(precision: Precision, sizes: Sizes) -> tuple[Any, Any]:
+    """Make (once) what the kernel of what `native_code` is for knows of systems, and this kernel."""
     scalar, vec3 = precision.scalar, precision.vec3
     name = "_".join(str(size) for size in vars(sizes).values())
     module = compiled_module(f"cluster_{precision.name}_{name}")
     module.options["block_dim"] = THREADS
     numbers = wp.constant(-(-sizes.shared_bytes(precision.numpy.itemsize) // 8))
 
+    @wp.struct
+    class Systems:
+        ahead: int  # about as many are under way at a time
+        parts: Tables
+        diagonal: wp.array[int]
+        pair_count: int
+        values: wp.array3d[scalar]
+        b: wp.array3d[scalar]
+        v: wp.array3d[scalar]
+        free: wp.array[vec3]
+        x: wp.array3d[scalar]
+        max_iterations: int
+        outcome: wp.array2d[wp.float64]
+
     @wp.func_native(native_code(precision, sizes))
-    def solve(
-        slots: wp.array[int],
-        count: wp.array[int],
-        ahead: int,
-        parts: Tables,
-        diagonal: wp.array[int],
-        pair_count: int,
-        values: wp.array3d[scalar],
-        b: wp.array3d[scalar],
-        v: wp.array3d[scalar],
-        free: wp.array[vec3],
-        x: wp.array3d[scalar],
-        tolerance: wp.float64,
-        max_iterations: int,
-        outcome: wp.array2d[wp.float64],
-    ): ...
+    def solve(slots: wp.array[int], count: wp.array[int], given: Systems, tolerance: wp.float64): ...
 
     @wp.kernel(module=module, launch_bounds=(THREADS, 1), cluster_dim=sizes.cluster, grid_stride=False)
-    def conjugate_gradients(
-        slots: wp.array[int],
-        count: wp.array[int],
-        ahead: int,
-        parts: Tables,
-        diagonal: wp.array[int],
-        pair_count: int,
-        values: wp.array3d[scalar],
-        b: wp.array3d[scalar],
-        v: wp.array3d[scalar],
-        free: wp.array[vec3],
-        x: wp.array3d[scalar],
-        tolerance: wp.float64,
-        max_iterations: int,
-        outcome: wp.array2d[wp.float64],
-    ):
+    def conjugate_gradients(slots: wp.array[int], count: wp.array[int], given: Systems, tolerance: wp.float64):
         # all of the shared memory: the native code knows where it begins
         wp.tile_empty(shape=numbers, dtype=wp.float64, storage="shared")
-        solve(
-            slots, count, ahead, parts, diagonal, pair_count, values, b, v, free, x, tolerance, max_iterations, outcome,
-        )  # fmt: skip
+        solve(slots, count, given, tolerance)
 
-    return conjugate_gradients
+    return Systems, conjugate_gradients
 
 
 class ClusterSolve:
@@ -198,26 +180,25 @@ class ClusterSolve:
     ) -> None:
         self._device = device = x.device
         self._clusters = x.shape[2]
-        self._kernel = cluster_kernel(precision, sizes_of(parts, precision.numpy.itemsize))
-        self._block_count = self._clusters * parts.blocks
-        self._outcome = wp.zeros((self._clusters, 3), dtype=wp.float64, device=device)
+        made, self._kernel = cluster_kernel(precision, sizes_of(parts, precision.numpy.itemsize))
+        self._block_count, self._tolerance = self._clusters * parts.blocks, wp.float64(tolerance)
+        self._systems = s = made()
+        s.ahead, s.parts = device.sm_count // parts.blocks, on_device(Tables, vars(parts), device)
+        s.diagonal, s.pair_count, s.values = diagonal, values.shape[0], values
+        s.b, s.v, s.free, s.x, s.max_iterations = b, v, free, x, max_iterations
+        s.outcome = wp.zeros((self._clusters, 3), dtype=wp.float64, device=device)
         self._told = wp.zeros((self._clusters, 3), dtype=wp.float64, device="cpu", pinned=True)
-        self._inputs = [
-            # about as many are under way at a time
-            device.sm_count // parts.blocks, on_device(Tables, vars(parts), device), diagonal, values.shape[0], values,
-            b, v, free, x, wp.float64(tolerance), max_iterations, self._outcome,
-        ]  # fmt: skip
 
     def solve(self, slots: wp.array, count: wp.array) -> None:
         """Solve the systems of a list of slots."""
         wp.launch(
             self._kernel,
             dim=self._block_count * THREADS,
-            inputs=[slots, count, *self._inputs],
+            inputs=[slots, count, self._systems, self._tolerance],
             device=self._device,
             block_dim=THREADS,
         )
-        wp.copy(self._told, self._outcome)
+        wp.copy(self._told, self._systems.outcome)
 
     def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Iterations, residual norms and goals of the last system of each slot, once the device has ended."""

@@ -81,14 +81,7 @@ def patch_kernel(law: DeviceLaw, precision: Precision, shared_bytes: int) -> Any
     numbers = wp.constant(block_bytes(shared_bytes) // 8)
 
     @wp.func_native(native["enter"])
-    def enter(
-        patch: int,
-        slot: int,
-        front: int,
-        edges: int,
-        tables: Tables,
-        u: wp.array3d[wp.float64],
-    ): ...
+    def enter(patch: int, slot: int, front: int, edges: int, tables: Tables, u: wp.array3d[wp.float64]): ...
 
     @wp.func_native(native["edge"])
     def edge(from_: int, to: int) -> wp.vec3d: ...  # type: ignore[empty-body]
