@@ -9,8 +9,8 @@ from bodies import matrix_of, model_of
 from shapes import box, distorted
 
 from warpbrain.ensemble.batch import parts_of_clusters, pattern_of
-from warpbrain.kernels.batched.assembly import batched_assembly_kernels
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
+from warpbrain.kernels.batched.motion import batched_motion_kernels
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
 from warpbrain.kernels.precision import DOUBLE
 from warpbrain.physics.laws import NeoHookean
@@ -173,7 +173,7 @@ def test_the_smallest_value_of_each_sample(bad: int | None, device: str, precisi
     values = np.random.default_rng(2).normal(size=(30, SLOTS)).astype(precision.numpy)
     if bad is not None:
         values[bad, 3] = np.nan
-    kernel = batched_assembly_kernels(precision).smallest
+    kernel = batched_motion_kernels(precision).smallest
     slots, count = wp.array(np.arange(SLOTS), dtype=int, device=device), wp.array([SLOTS], dtype=int, device=device)
     parts = wp.zeros((3, SLOTS), dtype=precision.scalar, device=device)
     least = wp.zeros((1, SLOTS), dtype=precision.scalar, device=device)

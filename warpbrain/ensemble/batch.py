@@ -23,7 +23,6 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.ensemble.room import ResultRoom
 from warpbrain.ensemble.sample import Sample
 from warpbrain.errors import InputError
-from warpbrain.kernels.batched.assembly import batched_assembly_kernels
 from warpbrain.kernels.batched.cluster import fitting_parts
 from warpbrain.kernels.batched.elements import batched_element_kernels
 from warpbrain.kernels.batched.layout import TANGENT, samples_struct, stages
@@ -175,8 +174,7 @@ class Batch:
         self._linger = linger
         self._device, self._precision = system.device, system.precision
         self._materials = BatchMaterials(system, samples, slots)
-        self._kernels = batched_assembly_kernels(system.precision)
-        self._motion = batched_motion_kernels(system.precision)
+        self._kernels = batched_motion_kernels(system.precision)
         _, self._sums_kernels = batched_solve_kernels(system.precision)
         self.shapes = np.zeros((0, system.size, 3)) if shapes is None else shapes
         model, p, n, m, b = system.model, system.precision, system.size, system.elements, slots
@@ -271,13 +269,13 @@ class Batch:
             return
         self._materials.place(numbers)
         slots = self._array(list(numbers), int)
-        self._launch(self._motion.reset, (self.system.size, len(numbers)), slots, self._samples)
+        self._launch(self._kernels.reset, (self.system.size, len(numbers)), slots, self._samples)
 
     def restore(self, slots: Sequence[int]) -> None:
         """Back to the state before the last step, to be evaluated in the next pass."""
         if not len(slots):
             return
-        self._launch(self._motion.restore, (self.system.size, len(slots)), self._array(slots, int), self._samples)
+        self._launch(self._kernels.restore, (self.system.size, len(slots)), self._array(slots, int), self._samples)
 
     def displacements(self, slots: Sequence[int]) -> Floats:
         """`u` of some slots [m], shape (slots, n, 3)."""
@@ -293,7 +291,7 @@ class Batch:
         for first in range(0, len(slots) if len(nodes) else 0, some):
             listed = self._array(slots[first : first + some], int)
             count = len(listed) * len(nodes)
-            self._launch(self._motion.collect, (len(listed), len(nodes)), listed, nodes, values, self._collected)
+            self._launch(self._kernels.collect, (len(listed), len(nodes)), listed, nodes, values, self._collected)
             wp.copy(self._staging, self._collected, count=count)
             wp.synchronize_device(self._device)
             collected[first : first + some] = self._staging.numpy()[:count].reshape(len(listed), -1, 3)
@@ -359,9 +357,9 @@ class Batch:
         wp.copy(self._numbers, numbers)
         self._begin_steps()
         self._cg.iterate(*self._solve, self._linger_count)
-        self._launch(self._motion.update, (self.system.size, self.slots), *self._solve, self._samples)
+        self._launch(self._kernels.update, (self.system.size, self.slots), *self._solve, self._samples)
         self._launch(
-            self._motion.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready,
+            self._kernels.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready,
             self._found[3],
         )  # fmt: skip
         self._launch(self._sums_kernels.gather_active, self.slots, *self._all, self._ready, *self._fresh)
@@ -371,10 +369,10 @@ class Batch:
     def _begin_steps(self) -> None:
         s, nodes, begun = self._samples, (self.system.size, self.slots), self._start
         if len(self.shapes):
-            self._launch(self._motion.prescribe, nodes, *begun, s)
+            self._launch(self._kernels.prescribe, nodes, *begun, s)
         if not self._ahead:
             self._assemble(begun)
-        self._launch(self._motion.begin, nodes, *begun, s)
+        self._launch(self._kernels.begin, nodes, *begun, s)
         if len(self.shapes):
             for group in self._materials.groups:
                 of_elements = len(group.members), self.slots
