@@ -84,16 +84,7 @@ def add_forces(VP: Any, point: int, G: Any, element_forces: wp.array2d[Any], t: 
 
 @wp.func
 def add_blocks(
-    A00: Any,
-    A01: Any,
-    A02: Any,
-    A11: Any,
-    A12: Any,
-    A22: Any,
-    point: int,
-    G: Any,
-    element_blocks: wp.array2d[Any],
-    t: int,
+    A00: Any, A01: Any, A02: Any, A11: Any, A12: Any, A22: Any, point: int, G: Any, out: wp.array2d[Any], t: int
 ):
     """Add a point's share of the 55 blocks of row `t`; `Ajk` is `w e_j . dP/dF . e_k`."""
     A10 = wp.transpose(A01)
@@ -109,8 +100,8 @@ def add_blocks(
             block = a * (19 - a) // 2 + b
             K = h[0] * K0 + h[1] * K1 + h[2] * K2
             if point > 0:
-                K += element_blocks[t, block]
-            element_blocks[t, block] = K
+                K += out[t, block]
+            out[t, block] = K
 
 
 @wp.func
