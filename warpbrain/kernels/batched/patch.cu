@@ -21,12 +21,12 @@ double *const displacements = (double *)dynamic_smem_base;
 REAL *const sums = (REAL *)(displacements + front);
 for (int i = threadIdx.x; i < 9 * (edges + 1); i += THREADS)
     sums[i] = REAL(0);
-const int first = tables.node_starts.data[patch], count = tables.node_starts.data[patch + 1] - first;
+const int first = of.tables.node_starts.data[patch], count = of.tables.node_starts.data[patch + 1] - first;
 in_turns(3 * count, [&](auto each) {
     int node[AHEAD];
     double v[AHEAD];
-    each([&](int k, int i) { node[k] = tables.nodes.data[first + i / 3]; });
-    each([&](int k, int i) { v[k] = u.data[(3 * size_t(node[k]) + i % 3) * u.shape[2] + slot]; });
+    each([&](int k, int i) { node[k] = of.tables.nodes.data[first + i / 3]; });
+    each([&](int k, int i) { v[k] = of.u.data[(3 * size_t(node[k]) + i % 3) * of.u.shape[2] + slot]; });
     each([&](int k, int i) { displacements[i] = v[k]; });
 });
 __syncthreads();
@@ -61,26 +61,26 @@ for (int turn = 0; turn < THREADS / WIDTH; ++turn) {
 //// leave
 // spokes take the place of the displacements
 const REAL *const sums = (const REAL *)((const double *)dynamic_smem_base + front);
-const int row0 = tables.row_starts.data[patch];
-const int first = tables.node_starts.data[patch], count = tables.node_starts.data[patch + 1] - first;
-const int spoke0 = tables.spoke_starts.data[first], spoke_count = tables.spoke_starts.data[first + count] - spoke0;
+const int row0 = of.tables.row_starts.data[patch];
+const int first = of.tables.node_starts.data[patch], count = of.tables.node_starts.data[patch + 1] - first;
+const int spoke0 = of.tables.spoke_starts.data[first], spoke_count = of.tables.spoke_starts.data[first + count] - spoke0;
 unsigned short *const spoke = (unsigned short *)dynamic_smem_base, *const spoke_start = spoke + spoke_count;
 in_turns(spoke_count, [&](auto each) {
     int found[AHEAD];
-    each([&](int k, int i) { found[k] = tables.spokes.data[spoke0 + i]; });
+    each([&](int k, int i) { found[k] = of.tables.spokes.data[spoke0 + i]; });
     each([&](int k, int i) { spoke[i] = found[k] < 0 ? SECOND | (-1 - found[k]) : found[k]; });
 });
 in_turns(count + 1, [&](auto each) {
-    each([&](int, int i) { spoke_start[i] = tables.spoke_starts.data[first + i] - spoke0; });
+    each([&](int, int i) { spoke_start[i] = of.tables.spoke_starts.data[first + i] - spoke0; });
 });
-REAL *const own = (REAL *)values.data + slot * 9 * size_t(values.shape[0]);
-REAL *const extra = (REAL *)extras.data + slot * 9 * size_t(extras.shape[0]);
+REAL *const own = (REAL *)of.values.data + slot * 9 * size_t(of.values.shape[0]);
+REAL *const extra = (REAL *)of.extras.data + slot * 9 * size_t(of.extras.shape[0]);
 auto at = [&](int row, int e) -> REAL & {
-    return row < values.shape[0] ? own[9 * size_t(row) + e] : extra[9 * size_t(row - values.shape[0]) + e];
+    return row < of.values.shape[0] ? own[9 * size_t(row) + e] : extra[9 * size_t(row - of.values.shape[0]) + e];
 };
 in_turns(9 * edges, [&](auto each) {
     int row[AHEAD];
-    each([&](int k, int i) { row[k] = tables.rows.data[row0 + i / 9]; });
+    each([&](int k, int i) { row[k] = of.tables.rows.data[row0 + i / 9]; });
     each([&](int k, int i) { at(row[k] >> BITS, i % 9) = row[k] >> i % 9 & 1 ? stiffness * sums[i] : REAL(0); });
 });
 __syncthreads();
@@ -88,8 +88,8 @@ in_turns(9 * count, [&](auto each) {
     int row[AHEAD];
     REAL own_mass[AHEAD];
     each([&](int k, int i) {
-        row[k] = tables.rows.data[row0 + edges + i / 9];
-        own_mass[k] = mass.data[tables.nodes.data[first + i / 9]];
+        row[k] = of.tables.rows.data[row0 + edges + i / 9];
+        own_mass[k] = of.mass.data[of.tables.nodes.data[first + i / 9]];
     });
     each([&](int k, int i) {
         const int node = i / 9, e = i % 9, turned = 3 * (e % 3) + e / 3;

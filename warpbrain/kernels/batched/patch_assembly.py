@@ -63,15 +63,17 @@ class PatchAssembly:
         geometry = np.column_stack([shape_gradients.reshape(-1, 9), volumes])
         self._launches = []
         for (law, elements, tissue, parameters), of in zip(groups, patches, strict=True):
-            kernel, tissues = patch_kernel(law, precision, shared_bytes), np.zeros(len(tetrahedra), dtype=np.int32)
+            made, kernel = patch_kernel(law, precision, shared_bytes)
+            tissues = np.zeros(len(tetrahedra), dtype=np.int32)
             tissues[elements] = tissue
             starts, places, shapes = self._batches(of, tissues, geometry)
             tables = {**vars(of), "batch_starts": starts, "places": places, "rows": of.rows << BITS | of.kept}
-            inputs = [
-                on_device(Tables, tables, self._device), wp.array(shapes, dtype=wp.float64, device=self._device),
-                parameters, u, mass, values, self._extras,
-            ]  # fmt: skip
-            self._launches.append((kernel, len(of.edge_counts), inputs))
+            patched = made()
+            patched.tables = on_device(Tables, tables, self._device)
+            patched.geometry = wp.array(shapes, dtype=wp.float64, device=self._device)
+            patched.parameters, patched.u, patched.mass = parameters, u, mass
+            patched.values, patched.extras = values, self._extras
+            self._launches.append((kernel, len(of.edge_counts), patched))
 
     def _batches(self, of: Patches, tissues: Ints, geometry: Floats) -> tuple[Any, Any, Any]:
         """Where those of each patch begin in batches of as many elements as a block has threads; two corners or edges
@@ -92,9 +94,9 @@ class PatchAssembly:
 
     def assemble(self, slots: wp.array, count: wp.array, k: wp.array, m: wp.array) -> None:
         """Make the matrices of a list of slots, with `k` and `m` of each slot."""
-        for kernel, patches, inputs in self._launches:
+        for kernel, patches, patched in self._launches:
             wp.launch(
-                kernel, dim=(self._slots, patches, THREADS), inputs=[slots, count, k, m, *inputs],
+                kernel, dim=(self._slots, patches, THREADS), inputs=[slots, count, k, m, patched],
                 device=self._device, block_dim=THREADS,
             )  # fmt: skip
         if len(self._sums[0]):

@@ -72,16 +72,26 @@ def native_code(precision: Precision) -> dict[str, str]:
 
 
 @cache
-def patch_kernel(law: DeviceLaw, precision: Precision, shared_bytes: int) -> Any:
-    """Make (once) the kernel of a law."""
+def patch_kernel(law: DeviceLaw, precision: Precision, shared_bytes: int) -> tuple[Any, Any]:
+    """Make (once) what the kernel of a law knows, and this kernel."""
     scalar = precision.scalar
     module = compiled_module(f"{law.key}_{precision.name}_patches_{shared_bytes}")
     module.options["block_dim"] = THREADS
     tangents_of, native = law.kernels(DOUBLE).tangents, native_code(precision)
     numbers = wp.constant(block_bytes(shared_bytes) // 8)
 
+    @wp.struct
+    class Patched:
+        tables: Tables
+        geometry: wp.array3d[wp.float64]
+        parameters: wp.array2d[wp.float64]
+        u: wp.array3d[wp.float64]
+        mass: wp.array[scalar]
+        values: wp.array3d[scalar]
+        extras: wp.array3d[scalar]
+
     @wp.func_native(native["enter"])
-    def enter(patch: int, slot: int, front: int, edges: int, tables: Tables, u: wp.array3d[wp.float64]): ...
+    def enter(patch: int, slot: int, front: int, edges: int, of: Patched): ...
 
     @wp.func_native(native["edge"])
     def edge(from_: int, to: int) -> wp.vec3d: ...  # type: ignore[empty-body]
@@ -101,33 +111,10 @@ def patch_kernel(law: DeviceLaw, precision: Precision, shared_bytes: int) -> Any
     ): ...
 
     @wp.func_native(native["leave"])
-    def leave(
-        patch: int,
-        slot: int,
-        front: int,
-        edges: int,
-        tables: Tables,
-        mass: wp.array[scalar],
-        stiffness: scalar,
-        inertia: scalar,
-        values: wp.array3d[scalar],
-        extras: wp.array3d[scalar],
-    ): ...
+    def leave(patch: int, slot: int, front: int, edges: int, of: Patched, stiffness: scalar, inertia: scalar): ...
 
     @wp.kernel(module=module, launch_bounds=(THREADS, TOGETHER), grid_stride=False)
-    def assemble(
-        slots: wp.array[int],
-        count: wp.array[int],
-        k: wp.array[scalar],
-        m: wp.array[scalar],
-        tables: Tables,
-        geometry: wp.array3d[wp.float64],
-        parameters: wp.array2d[wp.float64],
-        u: wp.array3d[wp.float64],
-        mass: wp.array[scalar],
-        values: wp.array3d[scalar],
-        extras: wp.array3d[scalar],
-    ):
+    def assemble(slots: wp.array[int], count: wp.array[int], k: wp.array[scalar], m: wp.array[scalar], of: Patched):
         """One block for a lane and a patch; see `PatchAssembly`."""
         # all of the shared memory: the native code knows where it begins
         wp.tile_empty(shape=numbers, dtype=wp.float64, storage="shared")
@@ -135,34 +122,34 @@ def patch_kernel(law: DeviceLaw, precision: Precision, shared_bytes: int) -> Any
         if lane >= count[0]:
             return
         slot = slots[lane]
-        edges = tables.edge_counts[patch]
-        front = front_of(edges, tables.node_starts[patch + 1] - tables.node_starts[patch])
-        enter(patch, slot, front, edges, tables, u)
-        for batch in range(tables.batch_starts[patch], tables.batch_starts[patch + 1]):
-            ab = tables.places[batch, 0, t]
-            cd = tables.places[batch, 1, t]
-            tissue = tables.places[batch, 5, t]
+        edges = of.tables.edge_counts[patch]
+        front = front_of(edges, of.tables.node_starts[patch + 1] - of.tables.node_starts[patch])
+        enter(patch, slot, front, edges, of)
+        for batch in range(of.tables.batch_starts[patch], of.tables.batch_starts[patch + 1]):
+            ab = of.tables.places[batch, 0, t]
+            cd = of.tables.places[batch, 1, t]
+            tissue = of.tables.places[batch, 5, t]
             G = wp.mat33d(
-                geometry[batch, 0, t], geometry[batch, 1, t], geometry[batch, 2, t],
-                geometry[batch, 3, t], geometry[batch, 4, t], geometry[batch, 5, t],
-                geometry[batch, 6, t], geometry[batch, 7, t], geometry[batch, 8, t],
+                of.geometry[batch, 0, t], of.geometry[batch, 1, t], of.geometry[batch, 2, t],
+                of.geometry[batch, 3, t], of.geometry[batch, 4, t], of.geometry[batch, 5, t],
+                of.geometry[batch, 6, t], of.geometry[batch, 7, t], of.geometry[batch, 8, t],
             )  # fmt: skip
-            V = geometry[batch, 9, t]
+            V = of.geometry[batch, 9, t]
             a = ab & 0xFFFF
             E = wp.matrix_from_cols(edge(a, ab >> 16), edge(a, cd & 0xFFFF), edge(a, cd >> 16))
             F = E * G + wp.identity(n=3, dtype=wp.float64)
-            _, K11, K12, K13, K22, K23, K33 = tangents_of(F, G, V, parameters, tissue * u.shape[2] + slot)
+            _, K11, K12, K13, K22, K23, K33 = tangents_of(F, G, V, of.parameters, tissue * of.u.shape[2] + slot)
             # each row of blocks sums to zero
             K01 = -(K11 + wp.transpose(K12) + wp.transpose(K13))
             K02 = -(K12 + K22 + wp.transpose(K23))
             K03 = -(K13 + K23 + K33)
             add(
-                front, tables.places[batch, 2, t], tables.places[batch, 3, t], tables.places[batch, 4, t],
+                front, of.tables.places[batch, 2, t], of.tables.places[batch, 3, t], of.tables.places[batch, 4, t],
                 K01, K02, K03, K12, K13, K23,
             )  # fmt: skip
-        leave(patch, slot, front, edges, tables, mass, k[slot], m[slot], values, extras)
+        leave(patch, slot, front, edges, of, k[slot], m[slot])
 
-    return assemble
+    return Patched, assemble
 
 
 @cache
