@@ -73,6 +73,11 @@ def test_physics_that_may_act_beside_an_error_does_not_hide_it():
     assert instead.verdict == CANNOT_SAY
 
 
+def test_an_error_that_does_not_act_is_a_false_name_and_silence_about_physics():
+    wrong = loss(Decision(NOT_PHYSICS, ("mesh",)), Truth.of(hypothesis("traction")), LOSSES)
+    assert wrong == LOSSES["false name"] + LOSSES["nothing for something"]
+
+
 @pytest.mark.parametrize("causes", [(), ("traction",), ("traction", "unknown"), ("unknown",), ("mesh",)])
 def test_nothing_costs_less_than_the_truth(causes):
     truth = Truth.of(hypothesis(*causes))

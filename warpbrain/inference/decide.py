@@ -106,10 +106,9 @@ def loss(decision: Decision, truth: Truth, losses: Mapping[str, float]) -> float
         return losses["nothing for something"] * (truth.physical or bool(truth.not_physics))
     if decision.verdict == NOT_PHYSICS:
         if truth.physical:
-            # the error that is named does act: what is wrong is to be silent about the physics beside it, as
-            # "nothing missing" is
+            # silent about the physics, as "nothing missing" is; and a false name where the error does not act
             acts = decision.causes[0] in truth.not_physics
-            return losses["nothing for something" if acts else "not physics for physics"]
+            return losses["nothing for something"] + losses["false name"] * (not acts)
         # where no physics is missing to take nothing for an error costs what the reverse does
         wrong = losses["name left out"] * (decision.causes[0] not in truth.not_physics)
         return wrong if truth.not_physics else losses["nothing for something"]
