@@ -19,7 +19,7 @@ from warpbrain.ensemble.batch import Batch, States
 from warpbrain.ensemble.sample import Outcome, Sample, failure
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.kernels.precision import Precision
-from warpbrain.simulation.dynamics import fault_of_step
+from warpbrain.simulation.dynamics import STEP_TOLERANCE, fault_of_step
 from warpbrain.simulation.model import Model, require_held
 from warpbrain.simulation.relaxation import LINEAR_TOLERANCE, RelaxationOptions, least_residual
 from warpbrain.simulation.system import System
@@ -133,7 +133,7 @@ class Moving(Course):
 
     even = True
 
-    def __init__(self, model: Model, steps: int, time_step: float = 0.001, tolerance: float = 1e-6) -> None:
+    def __init__(self, model: Model, steps: int, time_step: float = 0.001, tolerance: float = STEP_TOLERANCE) -> None:
         super().__init__(model)
         self._count, self._h, self.tolerance = steps, time_step, tolerance
 

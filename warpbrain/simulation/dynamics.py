@@ -30,6 +30,8 @@ from warpbrain.simulation.system import System
 
 #: The paper's phases of a step, in order, by their names in its Table 3.
 PHASES = ("internal forces", "assemble system", "solve system", "time integration")
+#: Relative tolerance of the linear solve of a step.
+STEP_TOLERANCE = 1e-6
 
 
 def finest_tolerance(tolerance: float, precision: Precision, roundings: float = 20.0) -> float:
@@ -105,7 +107,7 @@ class Simulator:
         system: System,
         *,
         time_step: float = 0.001,
-        tolerance: float = 1e-6,
+        tolerance: float = STEP_TOLERANCE,
         max_cg: int = 2000,
         newton: int = 1,
         preconditioner: str = "block-jacobi",

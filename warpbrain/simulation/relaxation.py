@@ -16,7 +16,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError, require_kind
 from warpbrain.kernels.precision import Precision
-from warpbrain.simulation.dynamics import PhaseClock, Simulator
+from warpbrain.simulation.dynamics import STEP_TOLERANCE, PhaseClock, Simulator
 from warpbrain.simulation.model import require_held
 from warpbrain.simulation.swing import Momentum, Swing
 from warpbrain.simulation.system import System
@@ -24,8 +24,6 @@ from warpbrain.simulation.system import System
 #: Relative tolerance of the linear solve of a step. Rest is judged by the forces themselves, so a step need not be
 #: exact: the paper's sweep of the phantom needs a third of the CG iterations of 1e-8, and 2 % more steps.
 LINEAR_TOLERANCE = 1e-3
-#: Where a swing is to be seen it is that of any motion.
-_SWING_TOLERANCE = 1e-6
 #: Iterations of a linear solve: of the longest steps as many as of an equilibrium.
 _MAX_CG = 10_000
 
@@ -106,7 +104,8 @@ def relax_to_rest(
     goal = least_residual(options.tolerance, system.precision)
     free = 1.0 - model.constrained
     external = model.external_forces()
-    tolerance = _SWING_TOLERANCE if options.swing else LINEAR_TOLERANCE
+    # where a swing is to be seen it is that of any motion
+    tolerance = STEP_TOLERANCE if options.swing else LINEAR_TOLERANCE
     simulator = Simulator(system, time_step=options.time_step, tolerance=tolerance, max_cg=_MAX_CG)
     simulator.reset()
     u, v = np.zeros_like(external), np.zeros_like(external)
