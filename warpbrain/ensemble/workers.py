@@ -17,7 +17,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -201,7 +201,7 @@ class Processes:
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
         """See `Workers`; `SolveError` if a process is ended from outside."""
-        context = get_context("spawn")
+        context, others = get_context("spawn"), active_children()
         pool = ProcessPoolExecutor(self._count, context, _live_with, (os.getpid(),))
         try:
             parts = parts_of(job, self._count, self._batch or ENOUGH["cpu"])
@@ -213,10 +213,10 @@ class Processes:
         finally:
             # `kill_workers` of Python 3.14. What they compute is wanted no more, and the interpreter would wait for it;
             # one that is still starting would print that this process is gone
-            processes = list((pool._processes or {}).values())
+            workers = [process for process in active_children() if process not in others]
             pool.shutdown(wait=False, cancel_futures=True)
-            for process in processes:
-                process.kill()
+            for worker in workers:
+                worker.kill()
 
 
 def kind_of(device: str | None) -> str:
