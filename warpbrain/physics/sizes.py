@@ -8,9 +8,6 @@ from collections.abc import Sequence
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import Smallest, Value, measured, number
 
-#: An effect that is seen only so many standard deviations out of what is looked for, where hardly any is (1e-4), is no
-#: effect that is seen.
-FARTHEST = 3.72
 #: How many times as large as it can be nothing is.
 _WHOLE = 3.0
 
@@ -35,7 +32,7 @@ def smallest_in_words(kind: str, smallest: Smallest) -> str:
     if smallest.unit == "of being there":
         return "would have been seen" if size <= 1.0 else "would not have been seen"
     farthest = _WHOLE if smallest.name == "share" else math.inf
-    if not math.isfinite(size) or size > farthest or smallest.deviations > FARTHEST:
+    if not math.isfinite(size) or size > farthest or not smallest.plausible:
         return "would not have been seen, whatever its size"
     if smallest.name == "share":
         return f"from {number(100.0 * size)} % of its full size"

@@ -36,7 +36,7 @@ class Smallest:
     unit: str
     name: str  # of the parameter
     named: float = float("inf")  # the size of which half would be named; infinite if none would
-    deviations: float = 0.0  # how large it is, in standard deviations of the sizes that are looked for
+    plausible: bool = True  # whether an effect is looked for that is as large
 
 
 @dataclass(frozen=True)

@@ -57,8 +57,6 @@ _MATTERS = 0.3
 _ROUNDS = 8
 #: After how many in succession it ends, too, that reach nothing better and leave no less: some go back and forth.
 _WORSE = 2
-#: How many times what is expected may be gained of the log evidence.
-_TRUST = 2.0
 #: Gain that is expected of a step of which none comes, where that may be rounding.
 _ROUNDING = 0.1
 #: Part of what these have changed of the log posterior density to which the next search is exact.
@@ -551,7 +549,7 @@ class Fitter:
             better = best is None or fit.log_evidence > best.log_evidence
             worse = 0 if better or gain < least else worse + 1
             best, least = fit if better else best, min(gain, least)
-            if worse == _WORSE or fit.marginal.log_evidence + _TRUST * gain < wanted:
+            if worse == _WORSE or fit.marginal.log_evidence + belief("fits.trust") * gain < wanted:
                 break
             enough = min(max(_ENOUGH, _PART * expected), _ROUGHLY)
         assert best is not None

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.inference.beliefs import belief
 from warpbrain.physics.mechanism import Mechanism
-from warpbrain.physics.sizes import FARTHEST
 from warpbrain.physics.words import Smallest, Value
 from warpbrain.worlds.body.effects import Effect
 
@@ -101,7 +101,8 @@ def smallest_of(effect: Effect, whitened_length: float, seen: float, named: floa
     if name == "share":
         # of what acts in full or not at all: a part of it is far from either
         return Smallest(size, unit, name, named_from)
-    return Smallest(size, unit, name, named_from if part_named <= FARTHEST else math.inf, part)
+    farthest = belief("checks.farthest")
+    return Smallest(size, unit, name, named_from if part_named <= farthest else math.inf, part <= farthest)
 
 
 def _size_at(effect: Effect, factor: float) -> tuple[float, str, str]:

@@ -45,7 +45,8 @@ from warpbrain.worlds.body.surfaces import with_free_surfaces
 TOLERANCE = 1e-6
 #: Short steps after a load has come, as parts of the first time that counts.
 _SHORT = (1e-3, 0.1, 0.4)
-#: Newton iterations of a state beside a known one: at once, and along the path from that; shortest step of the path.
+#: Newton iterations of a state beside a known one: at once, where steps of a fit are short and Newton's method has come
+#: to it or gone astray; and along the path from that, of 64 steps at most, so that a trial of no state ends soon.
 _AT_ONCE, _ALONG, _SHORTEST = 15, 60, 1.0 / 64.0
 #: Most places at which modes are computed.
 _SITES = 400

@@ -218,7 +218,8 @@ def smallest_of(about: Linear) -> dict[str, Smallest]:
         part = belief("specimen.seen") / max(seen[best], 1e-12)
         there = variant.nothing + part * (trial[0] - variant.nothing)
         size = abs(variant.values(there)[0] - variant.values(variant.nothing)[0])
-        smallest[effect.name] = Smallest(size, effect.units[0], effect.names[0], deviations=part)
+        plausible = part <= belief("checks.farthest")
+        smallest[effect.name] = Smallest(size, effect.units[0], effect.names[0], plausible=plausible)
     return smallest
 
 
