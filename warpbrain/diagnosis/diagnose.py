@@ -133,10 +133,9 @@ class Diagnosing:
             where = map_of_search(search, options.draws, random, options.alpha)
             unknown, base, model = None, search.base, best.marginal.model
             if checked.decision.verdict in (UNKNOWN, NAMED_AND_REST):
-                unknown = replace(
-                    traits_of(base.at, model, best.residual, base.typical_noise, search.spacing, where.centre),
-                    resistance=search.likely_unknown(best) == RESISTANCE,
-                )
+                resists = search.likely_unknown(best) == RESISTANCE
+                noise, centre = base.typical_noise, where.centre
+                unknown = traits_of(base.at, model, best.residual, noise, search.spacing, centre, resists)
         with self.seconds.of("what would be seen"):
             confusion = imitations(search.causes, nothing.marginal.model)
             seen = smallest(search.causes, nothing.marginal.model, confusion)

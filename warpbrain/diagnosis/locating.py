@@ -172,7 +172,7 @@ class Traits:
     hidden: bool  # whether there seems to be a net force, which what holds the body may carry: it cannot be told
     surface_nats: float  # log Bayes factor of a force on the surface alone over one within the body alone
     centre: Floats  # (3,), where it is [m]
-    resistance: bool = False  # whether it is more like tissue whose resistance changes in time than a force or a strain
+    resistance: bool  # whether it is more like tissue whose resistance changes in time than a force or a strain
 
     @property
     def size(self) -> tuple[float, float]:
@@ -183,7 +183,13 @@ class Traits:
 
 
 def traits_of(
-    at: Linearisation, model: GaussianModel, residual: Floats, noise: float, length: float, centre: Floats
+    at: Linearisation,
+    model: GaussianModel,
+    residual: Floats,
+    noise: float,
+    length: float,
+    centre: Floats,
+    resistance: bool = False,
 ) -> Traits:
     """Traits of what residuals (n,) show beside noise and nuisances.
 
@@ -192,6 +198,7 @@ def traits_of(
     `noise`: typical noise of displacements [m].
     `length`: of patches [m].
     `centre` (3,): about which moments are taken [m].
+    `resistance`: see `Traits`.
     """
     sites, answers = force_patches(at, length)
     # patches on held nodes have no effect
@@ -217,6 +224,7 @@ def traits_of(
         plain.is_significant(force) and not outside,
         _surface_nats(at, sites, answers, model, plain.size * unit, residual, length),
         centre,
+        resistance,
     )
 
 
