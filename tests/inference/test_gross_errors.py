@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from drawn_rows import draws
 from scipy import stats
 from scipy.special import logsumexp
 
@@ -51,7 +52,7 @@ def sum_written_out(one: GaussianModel, residual: np.ndarray, prior: Outliers) -
 def test_density_and_odds_are_those_of_the_sum_written_out(bad: tuple[int, ...], prior: Outliers) -> None:
     random = np.random.default_rng(len(bad))
     one = model(random)
-    residual = one.draws(1, random)[:, 0]
+    residual = draws(one, 1, random)[:, 0]
     for point in bad:
         residual[POINTS[point]] += 40.0 * random.normal(size=3)
     found = with_gross_errors(one, residual, POINTS, prior)
@@ -85,7 +86,7 @@ def test_what_a_cause_explains_is_no_gross_error() -> None:
     one = model(random)
     columns = np.zeros((18, 3))
     columns[3:6], columns[6:9] = np.eye(3), 0.8 * np.eye(3)
-    residual = one.draws(1, random)[:, 0] + columns @ [20.0, -14.0, 9.0]
+    residual = draws(one, 1, random)[:, 0] + columns @ [20.0, -14.0, 9.0]
     alone = with_gross_errors(one, residual, POINTS, PRIOR)
     together = with_gross_errors(one.with_columns(20.0 * columns), residual, POINTS, PRIOR)
     assert (alone.log_odds > 0.0).sum() == 2
@@ -101,7 +102,7 @@ def test_points_of_three_rows_and_of_one_against_covariances_written_out() -> No
         0.2 * np.exp(-0.2 * np.abs(np.subtract.outer(np.arange(50), np.arange(50)))) + np.eye(50)
     )
     one = GaussianModel(noise, random.normal(size=(50, 6)), 0.9)
-    residual = one.draws(1, random)[:, 0]
+    residual = draws(one, 1, random)[:, 0]
     for point in random.choice(26, 9, replace=False).tolist():
         residual[points[point]] += 12.0 * random.normal(size=len(points[point]))
     found = with_gross_errors(one, residual, points, PRIOR)
@@ -131,7 +132,7 @@ def test_points_of_three_rows_and_of_one_against_covariances_written_out() -> No
 def test_begun_with_gross_errors_of_a_similar_hypothesis_it_ends_at_the_same(prior: Outliers) -> None:
     random = np.random.default_rng(11)
     one = model(random)
-    residual = one.draws(1, random)[:, 0]
+    residual = draws(one, 1, random)[:, 0]
     residual[POINTS[1]] += 40.0 * random.normal(size=3)
     cold = with_gross_errors(one, residual, POINTS, prior)
     for sound in (cold.inflation, np.where(np.arange(6) == 3, prior.inflation, 1.0)):
@@ -143,7 +144,7 @@ def test_begun_with_gross_errors_of_a_similar_hypothesis_it_ends_at_the_same(pri
 def test_several_causes_are_weighed_as_each_by_itself() -> None:
     random = np.random.default_rng(12)
     one = model(random)
-    residual = one.draws(1, random)[:, 0]
+    residual = draws(one, 1, random)[:, 0]
     residual[POINTS[1]] += 40.0 * random.normal(size=3)
     tried = [(random.normal(size=18), random.normal(size=(18, count))) for count in (1, 3)]
     found = log_densities_of(one, residual, POINTS, tried)

@@ -1,6 +1,7 @@
 """Evidence with gross errors and an unknown scale, against the sum over scales written out."""
 
 import numpy as np
+from drawn_rows import draws
 
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import Marginal, RowsAtScales, marginal_of, with_gross_errors
@@ -12,7 +13,7 @@ POINTS = tuple(np.arange(3 * k, 3 * k + 3) for k in range(N // 3))
 
 def drawn(random: np.random.Generator, bad: tuple[int, ...]) -> tuple[GaussianModel, np.ndarray]:
     model = GaussianModel(np.diag(random.uniform(0.5, 1.5, N)), random.normal(size=(N, 3)))
-    residual = model.draws(1, random)[:, 0]
+    residual = draws(model, 1, random)[:, 0]
     for point in bad:
         residual[POINTS[point]] += 12.0
     return model, residual

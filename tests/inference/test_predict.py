@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from drawn_rows import draws
 from scipy.stats import binom, multivariate_normal
 
 from warpbrain.inference.gaussian import GaussianModel
@@ -19,7 +20,7 @@ def model() -> GaussianModel:
 
 def test_blocks_are_predicted_as_conditioning_says(model, verify):
     random = np.random.default_rng(1)
-    residual, blocks = model.draws(1, random)[:, 0], random.integers(5, size=N)
+    residual, blocks = draws(model, 1, random)[:, 0], random.integers(5, size=N)
     prediction = predict(model, residual, blocks)
     worst, S = 0.0, model.covariance
     for number, block in enumerate(np.unique(blocks)):
@@ -34,7 +35,7 @@ def test_blocks_are_predicted_as_conditioning_says(model, verify):
 
 def test_fields_are_weighed_as_their_densities(model):
     random = np.random.default_rng(2)
-    residuals, sizes = model.draws(3, random), np.array([0.3, 2.0])
+    residuals, sizes = draws(model, 3, random), np.array([0.3, 2.0])
     fields = [random.normal(size=(N, 5)), random.normal(size=(N, 2))]
     logs = [
         model.with_columns(size * field).log_density(residuals) - model.log_density(residuals)
@@ -48,7 +49,7 @@ def test_fields_are_weighed_as_their_densities(model):
 def test_the_null_rate_is_what_it_says(model, verify):
     random = np.random.default_rng(3)
     fields, sizes, cases = [random.normal(size=(N, 5))], np.array([0.5, 2.0]), 400
-    drawn = model.draws(cases, random)
+    drawn = draws(model, cases, random)
     alarms = sum(predictive_p(model, fields, sizes, row, 99, random) <= 0.05 for row in drawn.T)
     low, high = binom.interval(0.999, cases, 0.05)
     off = max(low - alarms, alarms - high, 0.0)
@@ -60,7 +61,7 @@ def test_random_draws_do_not_depend_on_axes_or_order(model, doubled):
     """Rows that are mixed by an orthogonal matrix, among them rows in another order, or each twice at twice the
     variance, and fields mixed likewise."""
     random = np.random.default_rng(4)
-    fields, residual = [random.normal(size=(N, 5)), random.normal(size=(N, 2))], model.draws(1, random)[:, 0]
+    fields, residual = [random.normal(size=(N, 5)), random.normal(size=(N, 2))], draws(model, 1, random)[:, 0]
     mixed = np.linalg.qr(random.normal(size=(N, N)))[0]
     covariance, columns = model.noise_factor @ model.noise_factor.T, model.columns
     others = [field @ np.linalg.qr(random.normal(size=(field.shape[1],) * 2))[0] for field in fields]

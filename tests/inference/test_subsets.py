@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from drawn_rows import draws
 from scipy import stats
 from scipy.special import logsumexp, softmax
 
@@ -64,7 +65,7 @@ def by_hand(one: GaussianModel, residual: np.ndarray, causes: list[Cause], membe
 def test_evidence_is_the_sum_of_the_densities_written_out() -> None:
     random = np.random.default_rng(0)
     one, causes = model(random), some_causes(random)
-    residual = one.draws(1, random)[:, 0] + 2.0 * causes[0].places[1].columns @ [1.0, 0.3, -0.5]
+    residual = draws(one, 1, random)[:, 0] + 2.0 * causes[0].places[1].columns @ [1.0, 0.3, -0.5]
     found = {hypothesis.causes: hypothesis for hypothesis in posterior(one, residual, causes, SCALES)}
     for count in range(3):
         for members in combinations(range(4), count):
@@ -81,7 +82,7 @@ def test_evidence_is_the_sum_of_the_densities_written_out() -> None:
 def test_a_place_has_its_share_of_the_evidence() -> None:
     random = np.random.default_rng(6)
     one, causes = model(random), some_causes(random)
-    residual = one.draws(1, random)[:, 0] + 0.5 * causes[0].places[2].columns @ [1.0, -0.4, 0.2]
+    residual = draws(one, 1, random)[:, 0] + 0.5 * causes[0].places[2].columns @ [1.0, -0.4, 0.2]
     for hypothesis in posterior(one, residual, causes, SCALES):
         if len(hypothesis.causes) != 1:
             assert hypothesis.best.log_share == 0.0
@@ -97,7 +98,7 @@ def test_a_place_has_its_share_of_the_evidence() -> None:
 def test_best_configuration_has_the_greatest_density() -> None:
     random = np.random.default_rng(1)
     one, causes = model(random), some_causes(random)
-    residual = one.draws(1, random)[:, 0] + 4.0 * causes[0].places[2].columns @ [1.0, 1.0, -0.5]
+    residual = draws(one, 1, random)[:, 0] + 4.0 * causes[0].places[2].columns @ [1.0, 1.0, -0.5]
     best = posterior(one, residual, causes, SCALES)[0]
     assert "patch" in best.causes
     assert next(member.place for member in best.best.members if member.cause == 0) == 2
@@ -114,7 +115,7 @@ def test_probabilities_are_calibrated_over_draws_of_the_model(verify) -> None:
     search = Search(np.ones(1), np.zeros(1), beam=0)
     for _ in range(150):
         members = sets[random.choice(len(sets), p=prior)]
-        rows = one.draws(1, random)[:, 0]
+        rows = draws(one, 1, random)[:, 0]
         for c in members:
             place = causes[c].places[random.choice(len(causes[c].places))]
             size = random.choice(causes[c].sizes)
@@ -159,7 +160,7 @@ def test_likely_places_are_those_of_the_greatest_density():
 def test_a_single_cause_keeps_its_next_best_places():
     random = np.random.default_rng(3)
     given, causes = model(random), some_causes(random)
-    residual = given.draws(1, random)[:, 0] + causes[0].places[2].columns @ random.normal(size=3)
+    residual = draws(given, 1, random)[:, 0] + causes[0].places[2].columns @ random.normal(size=3)
     found = posterior(given, residual, causes, Search(SCALES.scales, SCALES.log_scale_prior, elsewhere=2))
     for hypothesis in found:
         if len(hypothesis.causes) != 1:

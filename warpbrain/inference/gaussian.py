@@ -223,11 +223,6 @@ class GaussianModel:
         covariance: Floats = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
         return covariance @ (W.T @ self._by_noise(rows)) / self.scale, covariance
 
-    def draws(self, count: int, random: np.random.Generator) -> Floats:
-        """Rows (n, count) drawn from the model."""
-        noise = self.noise_factor @ random.normal(size=(len(self), count))
-        return np.asarray(self.scale * noise + self.columns @ random.normal(size=(self.columns.shape[1], count)))
-
     def log_marginal(self, rows: Floats, scales: Floats, log_prior: Floats) -> float:
         """Log density of rows (n,), summed over factors on the noise (k,) with the log of their prior probability."""
         return float(np.logaddexp.reduce(self._log_densities_at(rows, scales) + log_prior))

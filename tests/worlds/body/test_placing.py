@@ -1,6 +1,7 @@
 """A local cause between the places of a scan, which moves points far."""
 
 import numpy as np
+from drawn_rows import draws
 
 from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.inference.noise import outliers
@@ -20,7 +21,7 @@ def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_
     [true] = base.effects.of([near])
     rng = np.random.default_rng(0)
     # so large that in the wrong place some points are far off
-    residual = 20.0 * true.columns[:, 0] + base.model.draws(1, rng)[:, 0]
+    residual = 20.0 * true.columns[:, 0] + draws(base.model, 1, rng)[:, 0]
     size = 20.0
     start = scaled(effect, size)
     without = base.model
