@@ -341,9 +341,7 @@ class EquilibriumSolver:
     def _out_of_balance(self, u: Floats, external: Floats) -> Floats:
         """What a displacement (n, 3) [m] leaves out of balance on free components (n, 3) [N]."""
         self.system.u.assign(u)
-        self.system.evaluate_forces()
-        self.system.gather_forces()
-        r = self._free * (external - self.system.internal.numpy().astype(np.float64))
+        r = self._free * (external - self.system.internal_forces())
         if not np.isfinite(r).all():
             raise _StepFailed("the out-of-balance force of the start is not finite")
         return r

@@ -19,7 +19,7 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.model import substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
-from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState, States
@@ -144,35 +144,30 @@ class Effects:
         smooth proposals do at their start is taken for nothing.
         """
         bases = [proposal if proposal.over_time is None else proposal.over_time.base for proposal in proposals]
-        # of each state: effects there, its rows among all, with which sign, and their times
-        parts: list[tuple[Effects, Any, float, Floats]] = []
+        each_once, by_moment = list({id(base): base for base in bases}.values()), []
         for moment in self.at.moments:
-            here = Effects(moment.at, self._switches, self.mesh_errors, moment.number)
-            parts.append((here, moment.rows, moment.sign, np.full(len(moment.rows), moment.time)))
-        parts = parts or [(self, slice(None), 1.0, self.at.sensors.times)]
-        each_once = list({id(base): base for base in bases}.values())
-        by_part = [(here._at_one_time(each_once, present, columns_alone), *where) for here, *where in parts]
+            at = moment.at
+            here = self if at is self.at else Effects(at, self._switches, self.mesh_errors, moment.number)
+            by_moment.append(here._at_one_time(each_once, present, columns_alone))
         return [
-            self._over_time(proposal, [(effects[id(base)], *where) for effects, *where in by_part])
+            self._over_time(proposal, [effects[id(base)] for effects in by_moment])
             for proposal, base in zip(proposals, bases, strict=True)
         ]
 
-    def _over_time(self, proposal: Proposal, parts: Sequence[tuple[Effect, Any, float, Floats]]) -> Effect:
+    def _over_time(self, proposal: Proposal, by_moment: Sequence[Effect]) -> Effect:
         """The effect over all rows: of each state at its time, less at that from which it is counted."""
-        varying = proposal.over_time
-        effect = parts[0][0]
-        if varying is None and not self.at.moments:
+        varying, effect = proposal.over_time, by_moment[0]
+        if varying is None and len(by_moment) == 1:
             return effect
 
         def total(of: Callable[[Effect], Floats], expanded: bool = False) -> Floats:
-            changes = [
-                _expanded(of(effect), varying, times) if expanded and varying is not None else of(effect)
-                for effect, _, _, times in parts
-            ]
-            summed = np.zeros((len(self.at.sensors), *changes[0].shape[1:]))
-            for (_, rows, sign, _), change in zip(parts, changes, strict=True):
-                summed[rows] += sign * change
-            return summed
+            effects = iter(by_moment)
+
+            def change(moment: Moment) -> Floats:
+                values = of(next(effects))
+                return _expanded(values, varying, moment.times) if expanded and varying is not None else values
+
+            return self.at.summed_in_time(change)
 
         columns_at = None
         if effect.columns_at is not None:
@@ -373,18 +368,13 @@ def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats, mesh_err
     varying = proposal.over_time
     assert varying is not None
 
-    def about(state: Linearisation, time: float) -> Floats:
-        here = varying.at(c, time)
+    def about(moment: Moment) -> Floats:
+        here = varying.at(c, moment.time)
         smooth = replace(varying.base, follows="smooth", start=here, sd=_sd_of(proposal, varying))
-        return Effects(state, mesh_errors=mesh_errors).of([smooth], varying.base.make(here))[0].columns
+        [effect] = Effects(moment.at, mesh_errors=mesh_errors).of([smooth], varying.base.make(here))
+        return _expanded(effect.columns, varying, moment.times)
 
-    if not at.moments:
-        return _expanded(about(at, float(varying.times[-1])), varying, at.sensors.times)
-    columns = np.zeros((len(at.sensors), len(c)))
-    for moment in at.moments:
-        times = np.full(len(moment.rows), moment.time)
-        columns[moment.rows] += moment.sign * _expanded(about(moment.at, moment.time), varying, times)
-    return columns
+    return at.summed_in_time(about)
 
 
 def _sd_of(proposal: Proposal, varying: Varying) -> Floats:

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -164,10 +165,11 @@ class _Grown(Mechanism):
 class Moment:
     """Rows that are compared with, or counted from, the state of one time."""
 
-    number: int  # of the time
-    time: float  # [s]
+    number: int  # of the time; -1 of the only state
+    time: float  # of the state [s]; infinite of the only one, the end
     at: Linearisation  # about that state, of these rows
     rows: Ints  # (k,)
+    times: Floats  # (k,), of these rows [s]
     sign: float  # -1 if they are counted from it
 
 
@@ -201,12 +203,19 @@ class Linearisation:
         """
         other = copy.copy(self)
         other._states = tuple(states)
-        other.__dict__.pop("moments", None)
+        other.__dict__.pop("_moments", None)
         return other
 
-    @cached_property
+    @property
     def moments(self) -> tuple[Moment, ...]:
-        """By the time of the state; none where all rows are of one state, counted from rest."""
+        """By the time of the state; one where all rows are of one state, counted from rest."""
+        sensors = self.sensors
+        # not kept: a model that knows itself would keep its factors
+        return self._moments or (Moment(-1, math.inf, self, np.arange(len(sensors)), sensors.times, 1.0),)
+
+    @cached_property
+    def _moments(self) -> tuple[Moment, ...]:
+        """Where there are several states; else none."""
         sensors, moments = self.sensors, []
         for number, (time, about, share) in enumerate(self._states):
             last = number == len(self._states) - 1
@@ -214,7 +223,8 @@ class Linearisation:
                 rows = np.flatnonzero((of_rows == number) | (last and sign > 0.0 and of_rows < 0))
                 if len(rows):
                     model = about.with_sensors(replace(sensors.of_rows(rows, time), share=share))
-                    moments.append(Moment(number, time, model.in_time(()), rows, sign))
+                    times = np.full(len(rows), time)
+                    moments.append(Moment(number, time, model.in_time(()), rows, times, sign))
         return tuple(moments)
 
     def summed(self, answer: Callable[[Linearisation], Floats]) -> Floats:
@@ -222,18 +232,14 @@ class Linearisation:
 
         `answer`: from the linear model about one state to what it changes of the rows of that.
         """
-        return self.summed_in_time(lambda state, _: answer(state))
+        return self.summed_in_time(lambda moment: answer(moment.at))
 
-    def summed_in_time(self, answer: Callable[[Linearisation, Floats], Floats]) -> Floats:
-        """The same of what depends on time: `answer` has the times (m,) [s] of the rows of that state, too."""
-        if not self.moments:
-            return answer(self, self.sensors.times)
-        total: Floats | None = None
-        for moment in self.moments:
-            change = answer(moment.at, np.full(len(moment.rows), moment.time))
-            total = np.zeros((len(self.sensors), *change.shape[1:])) if total is None else total
+    def summed_in_time(self, answer: Callable[[Moment], Floats]) -> Floats:
+        """The same of what depends on time."""
+        changes = [(moment, answer(moment)) for moment in self.moments]
+        total = np.zeros((len(self.sensors), *changes[0][1].shape[1:]))
+        for moment, change in changes:
             total[moment.rows] += moment.sign * change
-        assert total is not None
         return total
 
     def _factorise(self) -> None:
@@ -254,7 +260,7 @@ class Linearisation:
         other = copy.copy(self)
         other.sensors = sensors
         other._surface_responses, other._equilibria = {}, 0
-        for name in ("compliance", "_rows", "moments"):
+        for name in ("compliance", "_rows", "_moments"):
             other.__dict__.pop(name, None)
         return other
 
@@ -400,9 +406,7 @@ class Linearisation:
         """Internal forces (N, 3) [N] at the state, of this system or of another with the same nodes."""
         other = self.system if system is None else system
         other.u.assign(self.u)
-        other.evaluate_forces()
-        other.gather_forces()
-        return np.asarray(other.internal.numpy().astype(np.float64))
+        return other.internal_forces()
 
 
 def _element_forces(system: System, u: Floats, weights: Floats, of_moduli: bool = False) -> Any:

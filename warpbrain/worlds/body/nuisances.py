@@ -258,11 +258,8 @@ def _displacement(at: Linearisation) -> Floats:
         return np.zeros(len(sensors))
     nearest = np.zeros(len(sensors), dtype=np.int64)
     nearest[rows] = cKDTree(at.system.model.mesh.points).query(sensors.positions[rows])[1]
-    if at.moments:
-        for moment in at.moments:
-            moved[moment.rows] += moment.sign * moment.at.u[nearest[moment.rows]]
-    else:
-        moved = at.u[nearest]
+    for moment in at.moments:
+        moved[moment.rows] += moment.sign * moment.at.u[nearest[moment.rows]]
     return np.where(rows, np.linalg.norm(moved, axis=1), 0.0)
 
 

@@ -20,7 +20,7 @@ from warpbrain.physics.proposal import Proposal, modes_between
 from warpbrain.physics.words import number
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.effects import Effects
-from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.time_courses import finite_times, modes_of, modes_of_rows, with_courses
 
@@ -158,9 +158,9 @@ def resistances(at: Linearisation, times: Sequence[float], volume: Proposal, smo
     tissues = (mesh.tissue[:, None] == np.array(mesh.labels)).astype(np.float64)
     ends, modes = finite_times(np.array(times)), modes_of(len(times))
 
-    def about(state: Linearisation, seconds: Floats) -> Floats:
-        """`seconds` (m,): of the rows (m) of that state."""
-        courses = modes_between(ends, modes, finite_times(np.concatenate([times, seconds]))[len(times) :])
+    def about(moment: Moment) -> Floats:
+        state = moment.at
+        courses = modes_between(ends, modes, finite_times(np.concatenate([times, moment.times]))[len(times) :])
         [bulk] = Effects(state).of([volume])
         columns = np.column_stack([state.answers_of_elements(state.element_forces, tissues), bulk.columns / volume.sd])
         return with_courses(columns, courses)
