@@ -129,13 +129,14 @@ class Course(abc.ABC):
 
 
 class Moving(Course):
-    """So many equal steps [s] of backward Euler; the tolerance of linear solves is relative."""
+    """So many equal steps [s] of backward Euler."""
 
     even = True
+    tolerance = STEP_TOLERANCE
 
-    def __init__(self, model: Model, steps: int, time_step: float = 0.001, tolerance: float = STEP_TOLERANCE) -> None:
+    def __init__(self, model: Model, steps: int, time_step: float = 0.001) -> None:
         super().__init__(model)
-        self._count, self._h, self.tolerance = steps, time_step, tolerance
+        self._count, self._h = steps, time_step
 
     def shapes(self) -> Floats:
         """The displacements without a history; and for each history, the three directions at its nodes."""

@@ -72,9 +72,9 @@ def decide(
     return min(expected, key=lambda decision: expected[decision]), expected
 
 
-def decisions(truths: Sequence[Truth], probabilities: Floats, most: int = 4) -> list[Decision]:
+def decisions(truths: Sequence[Truth], probabilities: Floats) -> list[Decision]:
     """Verdicts worth comparing: about mechanisms that are in probable sets."""
-    names = _most_probable([truth.mechanisms for truth in truths], probabilities)[:most]
+    names = _most_probable([truth.mechanisms for truth in truths], probabilities)[:4]
     errors = _most_probable([truth.not_physics for truth in truths], probabilities)[:2]
     verdicts = [Decision(NOTHING), Decision(CANNOT_SAY), Decision(UNKNOWN)]
     verdicts += [Decision(NOT_PHYSICS, (name,)) for name in errors]

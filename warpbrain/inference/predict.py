@@ -16,6 +16,8 @@ from warpbrain.inference.gaussian import GaussianModel
 
 #: Standard errors between a p-value and a level it is compared with, and by how much draws may be multiplied for that.
 _DEVIATIONS, _MOST_DRAWS = 3.0, 16
+#: Draws of the bootstrap of an improvement.
+_BOOTSTRAPS = 2000
 #: Rows that are compared with all fields at a time.
 _TOGETHER = 256
 
@@ -28,14 +30,12 @@ class Prediction:
     blocks: Ints  # (n,)
     log_densities: Floats  # (b,), of each block given the others
 
-    def improvement(
-        self, over: Prediction, rows: Bools, random: np.random.Generator, draws: int = 2000
-    ) -> tuple[float, float, float]:
+    def improvement(self, over: Prediction, rows: Bools, random: np.random.Generator) -> tuple[float, float, float]:
         """Part of another's root mean square error that is removed, and its 95 % interval by bootstrap over blocks."""
         names = np.unique(self.blocks[rows])
         squares = np.array([np.sum(self.errors[rows & (self.blocks == b)] ** 2) for b in names])
         squares_over = np.array([np.sum(over.errors[rows & (self.blocks == b)] ** 2) for b in names])
-        chosen = random.integers(len(names), size=(draws, len(names)))
+        chosen = random.integers(len(names), size=(_BOOTSTRAPS, len(names)))
         parts = 1.0 - np.sqrt(squares[chosen].sum(axis=1) / np.maximum(squares_over[chosen].sum(axis=1), 1e-300))
         low, high = np.quantile(parts, [0.025, 0.975])
         return float(1.0 - np.sqrt(squares.sum() / max(squares_over.sum(), 1e-300))), float(low), float(high)

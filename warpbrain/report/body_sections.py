@@ -152,12 +152,12 @@ def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float
     return inlined(draw, "Three cuts with the deviation.", words)
 
 
-def window(state: SavedState, exaggeration: float | None, off_screen: bool = False) -> Any:
+def window(state: SavedState, exaggeration: float | None) -> Any:
     """A plotter of PyVista that shows a body, before it is shown; `exaggeration` is chosen if it is None."""
     # a graphics library is asked for here only
     from warpbrain.report.rendering.drawing import interactive
 
-    return interactive(scene_of(state.mesh, state.mesh, state.u, {}, _NO_POINTS), exaggeration, off_screen)
+    return interactive(scene_of(state.mesh, state.mesh, state.u, {}, _NO_POINTS), exaggeration)
 
 
 def write_view_page(path: Path, state: SavedState, exaggeration: float | None) -> None:

@@ -67,11 +67,11 @@ def entitle(figure: Any, title: str, fontsize: float = 12.0, **options: Any) -> 
     figure.suptitle(title, parse_math=False, fontsize=fontsize, **options)
 
 
-def lay_out(figure: Any, dpi: float = _DPI) -> None:
+def lay_out(figure: Any) -> None:
     """Place all of a figure once and for all, before what its panels show is known, if it is as large."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    figure.set_dpi(dpi)
+    figure.set_dpi(_DPI)
     FigureCanvasAgg(figure)
     figure.get_layout_engine().execute(figure)
     figure.set_layout_engine("none")

@@ -31,32 +31,26 @@ from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, ModelOf, ParameterStencil, lengths
 
-#: Iterations of a linear solve.
-_MAX_CG = 10_000
+#: Iterations of a linear solve, and what it may leave of what a parameter puts out of balance in a step.
+_MAX_CG, _TOLERANCE = 10_000, 1e-10
 
 
 class MotionSensitivity:
     """Steps a simulator, and the derivatives of its motion with it.
 
     As the simulator is now is where all begins: its state does not depend on the parameters `theta` (p,), with whose
-    model it goes on. `models` and `scales` are those of `warpbrain.simulation.sensitivity`; the tolerance is relative,
-    of what a parameter puts out of balance in a step.
+    model it goes on. `models` and `scales` are those of `warpbrain.simulation.sensitivity`.
 
     `u` and `v` (p, n, 3) are the derivatives of displacement [m per unit of the parameter] and velocity [m/s per unit];
     zero on constrained components, which move as they are told to whatever the parameters are.
     """
 
     def __init__(
-        self,
-        simulator: Simulator,
-        models: ModelOf,
-        theta: ArrayLike,
-        scales: ArrayLike | None = None,
-        tolerance: float = 1e-10,
+        self, simulator: Simulator, models: ModelOf, theta: ArrayLike, scales: ArrayLike | None = None
     ) -> None:
         self.simulator = simulator
         system = simulator.system
-        self._tolerance = max(tolerance, 20.0 * system.precision.epsilon)
+        self._tolerance = max(_TOLERANCE, 20.0 * system.precision.epsilon)
         # a step that was taken stands: terms keep what they need of it
         simulator.set_time_step(simulator.time_step)
         self._stencil = ParameterStencil(system, models, theta, scales)

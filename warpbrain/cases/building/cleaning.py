@@ -95,9 +95,9 @@ def _in_one_piece(points: Floats, tetrahedra: Ints, region: Bools, notes: list[s
     return region & ~dropped
 
 
-def first_pass(cells: Cells, edge: float = FIRST_EDGE) -> Cells:
-    """Take out the needles that the cutting left, with a largest edge [mm]."""
-    made = remesh(cells, edge)
+def first_pass(cells: Cells) -> Cells:
+    """Take out the needles that the cutting left."""
+    made = remesh(cells, FIRST_EDGE)
     if made is None:
         raise BuildError("MMG could not mesh the cut lattice")
     return made

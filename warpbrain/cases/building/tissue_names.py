@@ -23,6 +23,8 @@ MOST_UNNAMED = 8
 MOST_TISSUES = 40
 #: Name of tissue that was or is to be taken out.
 RESECTION = "resection"
+#: Labels that a message lists.
+_LISTED = 60
 _USUAL = dict.fromkeys(("grey", "gray", "grey matter", "gray matter"), "grey matter")
 _USUAL |= {**dict.fromkeys(("white", "white matter"), "white matter"), RESECTION: RESECTION}
 #: Names that the literature or other programs use; one that is nearly one of them was meant for it.
@@ -139,9 +141,9 @@ def _listed(labels: Iterable[int]) -> str:
     return ", ".join(str(label) for label in labels)
 
 
-def _with_volumes(volumes: Mapping[int, float], labels: Sequence[int], most: int = 60) -> str:
-    shown = ", ".join(f"{label} ({volumes[label] / 1000:.3g} cm3)" for label in labels[:most])
-    return shown + (f" and {len(labels) - most} more" if len(labels) > most else "")
+def _with_volumes(volumes: Mapping[int, float], labels: Sequence[int]) -> str:
+    shown = ", ".join(f"{label} ({volumes[label] / 1000:.3g} cm3)" for label in labels[:_LISTED])
+    return shown + (f" and {len(labels) - _LISTED} more" if len(labels) > _LISTED else "")
 
 
 def _example(volumes: Mapping[int, float], labels: Sequence[int]) -> str:

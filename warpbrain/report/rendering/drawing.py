@@ -206,10 +206,10 @@ def _thinned(points: Floats, width: float) -> Any:
     return np.sort(order[first])
 
 
-def interactive(scene: Scene, exaggeration: float | None, off_screen: bool) -> Any:
+def interactive(scene: Scene, exaggeration: float | None) -> Any:
     """A window with the body after, a slider for how far it moves, a scale and the directions of the patient."""
     at_first = scene.exaggeration if exaggeration is None else exaggeration
-    plotter = pyvista.Plotter(off_screen=off_screen, window_size=(1200, 900))
+    plotter = pyvista.Plotter(window_size=(1200, 900))
     shown: list[Any] = []
 
     def show(factor: float) -> None:
