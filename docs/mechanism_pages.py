@@ -228,12 +228,12 @@ def derivatives(mechanism: type[Mechanism]) -> list[str]:
     """How a state is differentiated by its parameters: by differences along the way, or not, where one switches."""
     lines = []
     parameters = mechanism.parameters().items()
-    numbers = [f"`{key}`" for key, says in parameters if says.kind in NUMBERS and not says.method]
+    numbers = [f"`{key}`" for key, spec in parameters if spec.kind in NUMBERS and not spec.method]
     if numbers:
         lines.append(f"[Derivatives](../solvers.md#derivatives) by {', '.join(numbers)}.")
-    for key, says in mechanism.parameters().items():
-        if says.choices:
-            lines.append(f"`{key}` is one of {', '.join(says.choices)}: a secant, not a derivative.")
+    for key, spec in mechanism.parameters().items():
+        if spec.choices:
+            lines.append(f"`{key}` is one of {', '.join(spec.choices)}: a secant, not a derivative.")
     if mechanism.switches:
         lines.append("It is there or not: a secant, not a derivative.")
     return lines
@@ -241,15 +241,15 @@ def derivatives(mechanism: type[Mechanism]) -> list[str]:
 
 def _parameters(mechanism: type[Mechanism]) -> list[str]:
     lines = []
-    for name, says in mechanism.parameters().items():
-        unit = "`units`" if says.kind == "position" else says.unit
+    for name, spec in mechanism.parameters().items():
+        unit = "`units`" if spec.kind == "position" else spec.unit
         parts = [f"- `{name}`{f' [{unit}]' if unit else ''}: {mechanism.described(name)}"]
-        if says.expectation is not None:
-            parts.append(f"Expected: {says.expectation}.")
-        if says.typical:
-            parts.append(f"Typical: {says.typical}.")
-        if says.source:
-            parts.append(f"Source: {says.source}.")
+        if spec.expectation is not None:
+            parts.append(f"Expected: {spec.expectation}.")
+        if spec.typical:
+            parts.append(f"Typical: {spec.typical}.")
+        if spec.source:
+            parts.append(f"Source: {spec.source}.")
         lines.append(" ".join(parts))
     return lines
 

@@ -1,8 +1,8 @@
 """Numbers that a mechanism can be differentiated by, each by its place, and the same mechanism with other ones.
 
 A `parameter` of a mechanism is one such number if its kind is a number, and several if it is a position, a vector or
-numbers. A number that is none (no ball, so no radius) is left out, and so is a setting of the method (`Says.method`).
-What switches from one thing to another has no derivative.
+numbers. A number that is none (no ball, so no radius) is left out, and so is a setting of the method
+(`ParameterSpec.method`). What switches from one thing to another has no derivative.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
-from warpbrain.physics.mechanism import NUMBERS, Mechanism, Says
+from warpbrain.physics.mechanism import NUMBERS, Mechanism, ParameterSpec
 
 #: Over what length [m] something changes that depends on where it is, at most.
 _LENGTH = 0.01
@@ -33,14 +33,14 @@ class Continuous:
     kind: str  # of the mechanism
     key: str  # name of the parameter
     component: int | None  # of a position, a vector or numbers
-    says: Says
+    spec: ParameterSpec
 
     @property
     def name(self) -> str:
         """For people: mechanism, parameter and component."""
         if self.component is None:
             return f"{self.kind} {self.key}"
-        part = f"{self.component + 1}" if self.says.kind == "numbers" else _AXES[self.component]
+        part = f"{self.component + 1}" if self.spec.kind == "numbers" else _AXES[self.component]
         return f"{self.kind} {self.key} {part}"
 
     def value(self, mechanism: Mechanism) -> float:
@@ -56,22 +56,22 @@ class Continuous:
         regions, patches and fluid levels are as smooth as; and no more than the distance to a limit.
         A limit that a value may lie on is written a little beyond it, and formulas go on there.
         """
-        says, value = self.says, self.value(mechanism)
+        spec, value = self.spec, self.value(mechanism)
         whole = getattr(mechanism, self.key)
-        length = says.kind == "position" or says.unit == "mm"
-        if says.kind == "position":
+        length = spec.kind == "position" or spec.unit == "mm"
+        if spec.kind == "position":
             return _LENGTH
         size = abs(value)
-        if says.kind == "vector":
-            size = (1.0 if says.unit else _TURN) * float(np.linalg.norm(whole))
-        expected = says.expectation
+        if spec.kind == "vector":
+            size = (1.0 if spec.unit else _TURN) * float(np.linalg.norm(whole))
+        expected = spec.expectation
         if size == 0.0 and expected is not None:
-            size = 0.5 * abs(expected.quantile(0.84) - expected.quantile(0.16)) * says.si
-        size = size or says.size * says.si
+            size = 0.5 * abs(expected.quantile(0.84) - expected.quantile(0.16)) * spec.si
+        size = size or spec.size * spec.si
         if length:
             size = min(size, _LENGTH)
-        for limit in (says.above, says.below):
-            distance = abs(value - limit * says.si)
+        for limit in (spec.above, spec.below):
+            distance = abs(value - limit * spec.si)
             if math.isfinite(limit) and distance > 1e-9 * size:
                 size = min(size, distance)
         return size
@@ -80,14 +80,14 @@ class Continuous:
 def continuous(mechanism: Mechanism) -> tuple[Continuous, ...]:
     """Every number that a mechanism can be differentiated by, in the order of its fields."""
     places: list[Continuous] = []
-    for key, says in mechanism.parameters().items():
+    for key, spec in mechanism.parameters().items():
         value: Any = getattr(mechanism, key)
-        if value is None or says.method or says.kind not in NUMBERS:
+        if value is None or spec.method or spec.kind not in NUMBERS:
             continue
-        if says.kind == "number":
-            places.append(Continuous(mechanism.kind, key, None, says))
+        if spec.kind == "number":
+            places.append(Continuous(mechanism.kind, key, None, spec))
         else:
-            places += [Continuous(mechanism.kind, key, component, says) for component in range(len(value))]
+            places += [Continuous(mechanism.kind, key, component, spec) for component in range(len(value))]
     return tuple(places)
 
 

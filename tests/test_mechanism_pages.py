@@ -103,8 +103,8 @@ def test_every_mechanism_has_its_five_faces(kind):
     assert hasattr(mechanism, "example"), f"{kind}: say an example of it on {BASE}"
     assert set(mechanism.confused_with) <= {*mechanisms(), "drainage"}
     assert set(mechanism.together) <= set(mechanisms())
-    for name, says in mechanism.parameters().items():
-        assert says.doc.endswith("."), name
+    for name, spec in mechanism.parameters().items():
+        assert spec.doc.endswith("."), name
     assert assume(find_case(BASE), mechanism.example).mechanisms[-1].kind == kind
 
 

@@ -48,22 +48,22 @@ def drawn(kind: type[Mechanism], case, rng) -> Mechanism:
 
 
 def value(kind, name, case, rng):
-    says = kind.parameters()[name]
-    if says.kind == "text":
-        return str(rng.choice(says.choices))
+    spec = kind.parameters()[name]
+    if spec.kind == "text":
+        return str(rng.choice(spec.choices))
     sets = {"node set": ["top", "bottom"], "element set": ["corner"], "directions": ["f.csv"]}
-    if says.kind in sets:
-        return str(rng.choice(sets[says.kind]))
-    if says.kind == "surface":
+    if spec.kind in sets:
+        return str(rng.choice(sets[spec.kind]))
+    if spec.kind == "surface":
         return SKULL
-    if says.kind == "position":
+    if spec.kind == "position":
         return tuple(rng.uniform(0.0, 0.03, 3).tolist())
-    if says.kind == "vector":
-        return tuple((says.si * rng.normal(size=3)).tolist())
-    if says.kind == "numbers":
-        return tuple((says.si * rng.uniform(0.1, 0.5, 2)).tolist())
-    low, high = max(says.above, -1e3), min(says.below, 1e3)
-    return says.si * float(low + (high - low) * rng.uniform(0.01, 0.99) ** rng.integers(1, 6))
+    if spec.kind == "vector":
+        return tuple((spec.si * rng.normal(size=3)).tolist())
+    if spec.kind == "numbers":
+        return tuple((spec.si * rng.uniform(0.1, 0.5, 2)).tolist())
+    low, high = max(spec.above, -1e3), min(spec.below, 1e3)
+    return spec.si * float(low + (high - low) * rng.uniform(0.01, 0.99) ** rng.integers(1, 6))
 
 
 @pytest.mark.parametrize("kind", list(mechanisms()))
@@ -105,6 +105,6 @@ def test_all_that_a_mechanism_holds_is_a_key():
         (kind, field.name)
         for kind, mechanism in mechanisms().items()
         for field in dataclasses.fields(mechanism)
-        if "says" not in field.metadata and field.name != "ramp"
+        if "spec" not in field.metadata and field.name != "ramp"
     }
     assert others == {("gravity", "lowest")}

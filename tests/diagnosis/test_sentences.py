@@ -39,11 +39,11 @@ def ranked(draw):
     kind = draw(st.sampled_from(sorted(mechanisms())))
     values = []
     known = mechanisms()[kind].parameters()
-    for name, says in known.items():
-        if says.kind in ("number", "numbers"):
-            values.append(Value(name, draw(sizes), draw(spreads), says.unit))
-        elif says.kind in ("vector", "position"):
-            unit = says.unit if says.kind == "vector" else "m"
+    for name, spec in known.items():
+        if spec.kind in ("number", "numbers"):
+            values.append(Value(name, draw(sizes), draw(spreads), spec.unit))
+        elif spec.kind in ("vector", "position"):
+            unit = spec.unit if spec.kind == "vector" else "m"
             values += [Value(f"{name}_{part}", draw(sizes), draw(spreads), unit) for part in ("x", "z", "size")]
     if draw(st.booleans()):
         values.append(Value("share", draw(sizes), draw(spreads), ""))
@@ -57,7 +57,7 @@ def ranked(draw):
 @st.composite
 def smallest(draw):
     kind = draw(st.sampled_from(sorted(mechanisms())))
-    names = [name for name, says in mechanisms()[kind].parameters().items() if says.kind == "number"]
+    names = [name for name, spec in mechanisms()[kind].parameters().items() if spec.kind == "number"]
     name = draw(st.sampled_from([*names, "share"]))
     unit = "" if name == "share" else mechanisms()[kind].parameters()[name].unit
     size = draw(st.one_of(st.floats(0.0, 1e9), st.just(math.inf)))

@@ -212,8 +212,8 @@ def test_which_side_an_exponent_stiffens_is_that_of_the_law():
 
 def test_every_mechanism_says_something_of_every_number():
     for kind, mechanism in mechanisms().items():
-        for name, says in mechanism.parameters().items():
-            if says.kind in ("number", "numbers") and not says.method:
-                text = smallest_in_words(kind, Smallest(1e-3, says.unit, name))
+        for name, spec in mechanism.parameters().items():
+            if spec.kind in ("number", "numbers") and not spec.method:
+                text = smallest_in_words(kind, Smallest(1e-3, spec.unit, name))
                 assert text.startswith(("from ", "would"))
                 assert "_" not in text

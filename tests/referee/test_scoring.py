@@ -31,10 +31,10 @@ def test_intervals_are_exact(hits, of):
 
 def test_the_unit_of_every_parameter_is_known(tmp_path):
     for kind, mechanism in mechanisms().items():
-        told = {name: {"value": 2.0, "sd": 1.0, "unit": says.unit} for name, says in mechanism.parameters().items()}
+        told = {name: {"value": 2.0, "sd": 1.0, "unit": spec.unit} for name, spec in mechanism.parameters().items()}
         found = outcome(tmp_path, label("c"), diagnosis("named", kind, 0.9, parameters=told)).said.parameters
-        for name, says in mechanism.parameters().items():
-            assert found[name] == pytest.approx((2.0 * says.si, says.si)), (kind, name)
+        for name, spec in mechanism.parameters().items():
+            assert found[name] == pytest.approx((2.0 * spec.si, spec.si)), (kind, name)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from warpbrain.cases.format.tables import MECHANISM
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.composition import require_composable, require_left
-from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, Removing, Says
+from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, ParameterSpec, Removing
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.problems import Problems, nearest
 
@@ -66,15 +66,15 @@ def _with(case: Case, said: str) -> Case:
         key = _key(mechanism, word)
         if not equals or key in values:
             raise InputError(f"{part}: expected KEY=VALUE, each key once")
-        says = mechanism.parameters()[key]
-        value = keys[key].in_si(_value(says, key, text), case.frame)
-        values[key] = named.look_up(says.kind, value, partial(Path, value)) if isinstance(value, str) else value
+        spec = mechanism.parameters()[key]
+        value = keys[key].in_si(_value(spec, key, text), case.frame)
+        values[key] = named.look_up(spec.kind, value, partial(Path, value)) if isinstance(value, str) else value
         if named.problems:
             raise InputError(f"{key}: {named.problems.found[0]}")
     missing = [key for key in mechanism.required() if key not in values]
     if missing:
-        says = mechanism.parameters()[missing[0]]
-        raise InputError(f"{missing[0]} is missing{f' [{says.unit}]' if says.unit else ''}: {says.doc}")
+        spec = mechanism.parameters()[missing[0]]
+        raise InputError(f"{missing[0]} is missing{f' [{spec.unit}]' if spec.unit else ''}: {spec.doc}")
     others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
     removing = tuple(there for there in others if isinstance(there, Removing))
     facts = Facts(named.mesh, case.gravity_axis, case.density, removing)
@@ -91,20 +91,20 @@ def _key(mechanism: type[Mechanism], word: str) -> str:
     return matching[0]
 
 
-def _value(says: Says, key: str, text: str) -> Any:
-    if says.kind in _NAMES:
-        if says.choices and text not in says.choices:
-            raise InputError(f"{key}: found '{text}', expected one of {', '.join(says.choices)}")
+def _value(spec: ParameterSpec, key: str, text: str) -> Any:
+    if spec.kind in _NAMES:
+        if spec.choices and text not in spec.choices:
+            raise InputError(f"{key}: found '{text}', expected one of {', '.join(spec.choices)}")
         return text
     try:
         numbers = [float(part) for part in text.split("/")]
     except ValueError:
         numbers = []
-    count = {"number": 1, "position": 3, "vector": 3}.get(says.kind)
+    count = {"number": 1, "position": 3, "vector": 3}.get(spec.kind)
     if not numbers or (count is not None and len(numbers) != count):
         expected = {1: "a number", 3: "three numbers joined by /"}.get(count or 0, "numbers joined by /")
-        raise InputError(f"{key}: found '{text}', expected {expected}{f' [{says.unit}]' if says.unit else ''}")
+        raise InputError(f"{key}: found '{text}', expected {expected}{f' [{spec.unit}]' if spec.unit else ''}")
     for number in numbers:
-        if not says.above < number < says.below:
-            raise InputError(f"{key}: found {number:g}, expected a number between {says.above:g} and {says.below:g}")
+        if not spec.above < number < spec.below:
+            raise InputError(f"{key}: found {number:g}, expected a number between {spec.above:g} and {spec.below:g}")
     return numbers[0] if count == 1 else numbers

@@ -70,7 +70,7 @@ class ClosedSurface:
 
 
 @dataclass(frozen=True)
-class Says:
+class ParameterSpec:
     """What is known of a parameter."""
 
     doc: str  # one sentence
@@ -97,10 +97,10 @@ class Says:
 
 
 def parameter(doc: str, *, default: Any = dataclasses.MISSING, **known: Any) -> Any:
-    """A field of a mechanism that users give; see `Says`."""
-    says = Says(doc, default, **known)
-    assert says.kind in KINDS, says.kind
-    return dataclasses.field(default=default, metadata={"says": says})
+    """A field of a mechanism that users give; see `ParameterSpec`."""
+    spec = ParameterSpec(doc, default, **known)
+    assert spec.kind in KINDS, spec.kind
+    return dataclasses.field(default=default, metadata={"spec": spec})
 
 
 class ParameterError(InputError):
@@ -179,17 +179,17 @@ class Mechanism(Ramped, abc.ABC):
         lines = [inspect.cleandoc(cls.__doc__ or ""), "", "Parameters", "----------"]
         for name, kind in vars(cls).get("__annotations__", {}).items():
             value = vars(cls).get(name)
-            if isinstance(value, dataclasses.Field) and "says" in value.metadata:
-                says: Says = value.metadata["says"]
-                unit = f" [{says.unit}]" if says.si == 1.0 else f" [SI; {says.unit} in a case]"
+            if isinstance(value, dataclasses.Field) and "spec" in value.metadata:
+                spec: ParameterSpec = value.metadata["spec"]
+                unit = f" [{spec.unit}]" if spec.si == 1.0 else f" [SI; {spec.unit} in a case]"
                 lines.append(f"{name} : {kind if isinstance(kind, str) else inspect.formatannotation(kind)}")
-                lines.append(f"    {says.doc}{unit if says.unit else ''}")
+                lines.append(f"    {spec.doc}{unit if spec.unit else ''}")
         cls.__doc__ = "\n".join(lines)
 
     @classmethod
-    def parameters(cls) -> dict[str, Says]:
+    def parameters(cls) -> dict[str, ParameterSpec]:
         """What is known of each parameter, by name."""
-        return {f.name: f.metadata["says"] for f in dataclasses.fields(cls) if "says" in f.metadata}
+        return {f.name: f.metadata["spec"] for f in dataclasses.fields(cls) if "spec" in f.metadata}
 
     def with_body_turned(self, rotation: Floats) -> Mechanism:
         """As it acts on a body that is turned in the room by a rotation (3, 3); itself if it turns with the body."""
@@ -200,11 +200,11 @@ class Mechanism(Ramped, abc.ABC):
         if type(other) is not type(self):
             return False
         for name in (f.name for f in dataclasses.fields(self) if f.name != "ramp"):
-            says, mine, its = self.parameters().get(name), getattr(self, name), getattr(other, name)
-            if says is not None and says.kind in NUMBERS:
-                if not says.method and ((mine is None) != (its is None) or np.shape(mine) != np.shape(its)):
+            spec, mine, its = self.parameters().get(name), getattr(self, name), getattr(other, name)
+            if spec is not None and spec.kind in NUMBERS:
+                if not spec.method and ((mine is None) != (its is None) or np.shape(mine) != np.shape(its)):
                     return False
-            elif not (says is not None and says.method) and mine != its:
+            elif not (spec is not None and spec.method) and mine != its:
                 return False
         return True
 
@@ -213,25 +213,25 @@ class Mechanism(Ramped, abc.ABC):
         """Names of the parameters that a case must give."""
         return tuple(
             name
-            for name, says in cls.parameters().items()
-            if says.needed or (says.default is dataclasses.MISSING and not says.absent)
+            for name, spec in cls.parameters().items()
+            if spec.needed or (spec.default is dataclasses.MISSING and not spec.absent)
         )
 
     @classmethod
     def described(cls, name: str) -> str:
         """What a parameter is, and what it is taken to be where a case does not give it."""
-        says = cls.parameters()[name]
+        spec = cls.parameters()[name]
         if name in cls.required():
-            return says.doc
-        if says.absent:
-            text = says.absent
-        elif says.default is None or says.default == "":
+            return spec.doc
+        if spec.absent:
+            text = spec.absent
+        elif spec.default is None or spec.default == "":
             text = "none"
-        elif isinstance(says.default, str):
-            text = f"'{says.default}'"
+        elif isinstance(spec.default, str):
+            text = f"'{spec.default}'"
         else:
-            text = ", ".join(f"{value / says.si:g}" for value in np.ravel(says.default))
-        return f"{says.doc[:-1]}; {text} if absent."
+            text = ", ".join(f"{value / spec.si:g}" for value in np.ravel(spec.default))
+        return f"{spec.doc[:-1]}; {text} if absent."
 
     @classmethod
     def of_case(cls, values: Mapping[str, Any], facts: Facts) -> Self:
@@ -262,19 +262,19 @@ class Mechanism(Ramped, abc.ABC):
     def everywhere(self) -> bool:
         """Whether it acts in the same way in all of a body, and not in some place of it."""
         places = ("node set", "element set", "position")
-        return not any(getattr(self, name) for name, says in self.parameters().items() if says.kind in places)
+        return not any(getattr(self, name) for name, spec in self.parameters().items() if spec.kind in places)
 
     def check(self, mesh: TetMesh) -> None:
         """Raise `ParameterError` if a parameter makes no sense with a mesh: a set that is not there, or is empty."""
-        for name, says in self.parameters().items():
-            if says.kind not in ("node set", "element set") or not (value := getattr(self, name)):
+        for name, spec in self.parameters().items():
+            if spec.kind not in ("node set", "element set") or not (value := getattr(self, name)):
                 continue
-            sets = mesh.node_sets if says.kind == "node set" else mesh.element_sets
+            sets = mesh.node_sets if spec.kind == "node set" else mesh.element_sets
             if value not in sets:
                 present = ", ".join(sorted(sets)) or "none"
-                raise ParameterError(name, f"the mesh has no {says.kind} '{value}' (it has {present})")
+                raise ParameterError(name, f"the mesh has no {spec.kind} '{value}' (it has {present})")
             if not sets[value].any():
-                raise ParameterError(name, f"the {says.kind} '{value}' is empty")
+                raise ParameterError(name, f"the {spec.kind} '{value}' is empty")
 
     def held(self, mesh: TetMesh) -> tuple[Ints, Floats]:
         """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
@@ -342,30 +342,30 @@ class Mechanism(Ramped, abc.ABC):
         """
         if np.allclose(rotation, np.eye(3)):
             return self
-        for name, says in self.parameters().items():
-            if says.kind in ("directions", "element set", "position") and getattr(self, name):
+        for name, spec in self.parameters().items():
+            if spec.kind in ("directions", "element set", "position") and getattr(self, name):
                 raise ParameterError(
                     name, f"{self.kind}: tests along other axes of the tissue are of what is alike in all of it"
                 )
         vectors = {
             name: tuple((rotation @ np.array(value)).tolist())
-            for name, says in self.parameters().items()
-            if says.kind == "vector" and (value := getattr(self, name)) is not None
+            for name, spec in self.parameters().items()
+            if spec.kind == "vector" and (value := getattr(self, name)) is not None
         }
         return dataclasses.replace(self, **vectors) if vectors else self
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
         parts = []
-        for name, says in self.parameters().items():
+        for name, spec in self.parameters().items():
             value = getattr(self, name)
-            if value is None or value == "" or says.kind == "numbers":
+            if value is None or value == "" or spec.kind == "numbers":
                 continue
             if isinstance(value, str | ClosedSurface):
                 parts.append(f"{name} '{value}'")
             else:
                 # positions are millimetres to people, whatever the case's unit
-                unit, si = ("mm", 1e-3) if says.kind == "position" else (says.unit, says.si)
+                unit, si = ("mm", 1e-3) if spec.kind == "position" else (spec.unit, spec.si)
                 numbers = ", ".join(f"{v / si:g}" for v in np.ravel(value))
                 parts.append(f"{name} {numbers}{f' {unit}' if unit else ''}")
         return f" ({'; '.join(parts)})" if parts else ""

@@ -43,13 +43,13 @@ def smallest_in_words(kind: str, smallest: Smallest) -> str:
 
 def beyond_in_words(kind: str, value: Value) -> str:
     """Which range a number is out of that its parameter has, by its limits or what is expected alike; empty if none."""
-    says = mechanisms()[kind].parameters().get(value.name) if kind in mechanisms() else None
-    if says is None or says.kind != "number":
+    spec = mechanisms()[kind].parameters().get(value.name) if kind in mechanisms() else None
+    if spec is None or spec.kind != "number":
         return ""
-    low, high = says.above, says.below
-    if says.expectation is not None and not says.expectation.is_normal:
-        low, high = says.expectation.quantile(0.0), says.expectation.quantile(1.0)
+    low, high = spec.above, spec.below
+    if spec.expectation is not None and not spec.expectation.is_normal:
+        low, high = spec.expectation.quantile(0.0), spec.expectation.quantile(1.0)
     if low <= value.value <= high:
         return ""
     span = f"above {low:g}" if high == math.inf else f"below {high:g}" if low == -math.inf else f"{low:g} to {high:g}"
-    return f"{value.name} would not be {span} {says.unit}".rstrip()
+    return f"{value.name} would not be {span} {spec.unit}".rstrip()

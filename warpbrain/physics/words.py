@@ -48,7 +48,7 @@ class Measurement:
 
 
 if TYPE_CHECKING:
-    from warpbrain.physics.mechanism import Says
+    from warpbrain.physics.mechanism import ParameterSpec
 
 #: How labels begin that keep their capital.
 _NAMES = ("Poisson", "Young's", "Ogden's")
@@ -164,19 +164,19 @@ def vector_in(values: Values, name: str) -> Floats:
     return np.array([0.0 if component is None else component.value for component in components])
 
 
-def clauses(parameters: Mapping[str, Says], values: Values) -> list[str]:
+def clauses(parameters: Mapping[str, ParameterSpec], values: Values) -> list[str]:
     """Numbers as their parameters say what they are; places and directions are said elsewhere."""
     sentences = []
-    if "share" in values and not any(says.told for says in parameters.values()):
+    if "share" in values and not any(spec.told for spec in parameters.values()):
         share = values["share"]
         sentences.append(f"it is there to {measured(100.0 * share.value, 100.0 * share.sd)} %")
     for name, value in values.items():
-        says = parameters.get(name)
-        if says is None or says.kind not in ("number", "numbers"):
+        spec = parameters.get(name)
+        if spec is None or spec.kind not in ("number", "numbers"):
             continue
-        clause = label(says.doc)
+        clause = label(spec.doc)
         possessive = "" if "'" in clause.split(" ")[0] else "its "
-        positive, *others = says.told or (f"{possessive}{clause} is {{}}",)
+        positive, *others = spec.told or (f"{possessive}{clause} is {{}}",)
         size = value.value
         if others and unsure(value):
             positive = f"{others[1]}, {HARDLY}"

@@ -126,11 +126,11 @@ _KIND = {"node set": "text", "element set": "text", "directions": "text", "surfa
 
 def _mechanism_keys(mechanism: type[Mechanism]) -> tuple[Key, ...]:
     keys = []
-    for name, says in mechanism.parameters().items():
-        unit = "units" if says.kind == "position" else says.unit
-        kind, needed = _KIND.get(says.kind, says.kind), name in mechanism.required()
-        limits = (says.above, says.below)
-        keys.append(Key(name, kind, mechanism.described(name), unit, needed, says.choices, *limits, si=says.si))
+    for name, spec in mechanism.parameters().items():
+        unit = "units" if spec.kind == "position" else spec.unit
+        kind, needed = _KIND.get(spec.kind, spec.kind), name in mechanism.required()
+        limits = (spec.above, spec.below)
+        keys.append(Key(name, kind, mechanism.described(name), unit, needed, spec.choices, *limits, si=spec.si))
     return (*keys, RAMP)
 
 

@@ -41,7 +41,7 @@ class Resection(Mechanism):
     def excluded(cls, other: type[Mechanism]) -> str:
         """Where nothing is left of what another one acts on; see `warpbrain.physics.composition.require_left`."""
         places = ("node set", "element set", "position")
-        if not any(says.kind in places for says in other.parameters().values()):
+        if not any(spec.kind in places for spec in other.parameters().values()):
             return ""
         return f"where nothing is left of what {other.kind} acts on"
 

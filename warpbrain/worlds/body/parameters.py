@@ -70,20 +70,20 @@ def mechanism_numbers(mechanism: Mechanism) -> dict[str, tuple[float, str]]:
     parameters: dict[str, tuple[float, str]] = {}
     if mechanism.ramp:
         parameters["share"] = (mechanism.factor(), "")
-    for name, says in mechanism.parameters().items():
+    for name, spec in mechanism.parameters().items():
         value = getattr(mechanism, name)
         if value is None or isinstance(value, str):
             continue
-        numbers = np.ravel(np.asarray(value, dtype=float)) / says.si
-        if len(numbers) == 1 or says.adds_up:
-            parameters[name] = (float(numbers.sum()), says.unit)
-        if says.kind == "numbers" and len(numbers) > 1:
-            parameters |= {f"{name}_{k}": (number, says.unit) for k, number in enumerate(numbers.tolist(), 1)}
-        if len(numbers) == 3 and says.kind in ("vector", "position"):
-            unit = says.unit if says.kind == "vector" else "m"
+        numbers = np.ravel(np.asarray(value, dtype=float)) / spec.si
+        if len(numbers) == 1 or spec.adds_up:
+            parameters[name] = (float(numbers.sum()), spec.unit)
+        if spec.kind == "numbers" and len(numbers) > 1:
+            parameters |= {f"{name}_{k}": (number, spec.unit) for k, number in enumerate(numbers.tolist(), 1)}
+        if len(numbers) == 3 and spec.kind in ("vector", "position"):
+            unit = spec.unit if spec.kind == "vector" else "m"
             for axis, number in zip("xyz", numbers.tolist(), strict=True):
                 parameters[f"{name}_{axis}"] = (number, unit)
-            if says.kind == "vector":
+            if spec.kind == "vector":
                 parameters[f"{name}_size"] = (float(np.linalg.norm(numbers)), unit)
     return parameters
 

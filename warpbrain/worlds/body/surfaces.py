@@ -132,7 +132,7 @@ def _named_sets(case: Case) -> set[str]:
     named = {boundary.nodes for boundary in case.boundaries}
     for mechanism in case.mechanisms:
         kinds = mechanism.parameters().items()
-        named |= {getattr(mechanism, name) for name, says in kinds if says.kind == "node set"}
+        named |= {getattr(mechanism, name) for name, spec in kinds if spec.kind == "node set"}
     return named
 
 

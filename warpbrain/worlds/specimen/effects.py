@@ -366,13 +366,13 @@ def _registered(kind: type[Mechanism], shown: Tests, situation: Situation) -> Ef
         raise NotTestableError("acts before anything is imposed, and the zero of the force hides it")
     kind.check_tests(shown)
     proposals = kind.proposals(situation)
-    says, first = kind.parameters(), proposals[0]
+    specs, first = kind.parameters(), proposals[0]
     here, there = (first.make(first.without + move) for move in (0.5 * first.sd, first.sd))
-    numbers = [name for name, parameter in says.items() if parameter.kind in ("number", "numbers")]
+    numbers = [name for name, parameter in specs.items() if parameter.kind in ("number", "numbers")]
     names = tuple(name for name in numbers if _number(here, name) != _number(there, name))
     variants = tuple(_variant(proposal, names) for proposal in proposals)
     return Effect(
-        kind.kind, Kind.PHYSICS, kind.sentence, variants, names, tuple(says[name].unit for name in names), True
+        kind.kind, Kind.PHYSICS, kind.sentence, variants, names, tuple(specs[name].unit for name in names), True
     )
 
 
@@ -397,6 +397,6 @@ def _variant(proposal: Proposal, names: tuple[str, ...]) -> Variant:
 
 def _number(mechanism: Mechanism, name: str) -> float:
     """A parameter as one number: of several the sum where that means something, otherwise the first."""
-    says = mechanism.parameters()[name]
+    spec = mechanism.parameters()[name]
     values: Floats = np.ravel(getattr(mechanism, name))
-    return float(values.sum() if says.adds_up else values[0]) / says.si
+    return float(values.sum() if spec.adds_up else values[0]) / spec.si
