@@ -34,7 +34,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     `InputError` if the folder cannot be written to.
     """
     check_writable(path)
-    with _told(path.parent, "cannot be written to"):
+    with _input_errors(path.parent, "cannot be written to"):
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f"{UNFINISHED}{path.stem}-", suffix=path.suffix)
     os.close(handle)
     temporary = Path(name)
@@ -65,7 +65,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
     check_new_folder(path)
     # what is really written, where `path` ends in a dot or is a link
     target = path.resolve()
-    with _told(target.parent, "cannot be written to"):
+    with _input_errors(target.parent, "cannot be written to"):
         temporary = Path(tempfile.mkdtemp(dir=target.parent, prefix=f"{UNFINISHED}{target.name}-"))
     _unfinished.add(temporary)
     try:
@@ -86,7 +86,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _told(path: Path, what: str) -> Iterator[None]:
+def _input_errors(path: Path, what: str) -> Iterator[None]:
     """What the system refuses in the block is bad input, unless the disk is full."""
     try:
         yield
@@ -170,7 +170,7 @@ def remove(path: Path) -> None:
 
 def output_folder(path: Path) -> Path:
     """Make a folder for output if it is not there; `InputError` if it cannot be one."""
-    with _told(path, "cannot be made a folder for output"):
+    with _input_errors(path, "cannot be made a folder for output"):
         path.mkdir(parents=True, exist_ok=True)
     # known now, not only when there is something to write
     if not os.access(path, os.W_OK | os.X_OK):

@@ -216,9 +216,9 @@ class Batch:
         self._chunks, self._groups = stages(n)
         s.shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._groups, b)
         # and what it tells: two norms, the smallest `J`, and whether these are new
-        self._found = self._zeros(4, b)
-        self._totals, self._min_J = self._found[:2], self._found[2:3]
-        self._told = [self._on_host(values) for values in (self._lists, self._numbers, self._found)]
+        self._summary = self._zeros(4, b)
+        self._totals, self._min_J = self._summary[:2], self._summary[2:3]
+        self._host_copies = [self._on_host(values) for values in (self._lists, self._numbers, self._summary)]
         self._J_share = int(np.ceil(np.sqrt(m)))
         self._least_J = self._zeros(-(-m // self._J_share), b)
         parts = parts_of_clusters(system)
@@ -310,7 +310,7 @@ class Batch:
             self._capture()
         self._unsolved[start] = True
         stepping = np.flatnonzero(self._unsolved)
-        flat, numbers, found = (told.numpy() for told in self._told)
+        flat, numbers, summary = (copy.numpy() for copy in self._host_copies)
         lists = flat[: 4 * self.slots].reshape(4, self.slots)
         lists[2:] = 0
         lists[0, : len(start)], lists[1, : len(stepping)] = start, stepping
@@ -329,10 +329,10 @@ class Batch:
             self._room.prepare()
             wp.synchronize_event(self._states_copied)
         iterations, residual, goal = self._cg.results()
-        ready = found[3] != 0.0
+        ready = summary[3] != 0.0
         self._unsolved[ready] = False
-        unbalanced, internal = np.sqrt(found[:2].astype(np.float64))
-        return States(ready, found[2].astype(np.float64), unbalanced, internal, iterations, residual, goal)
+        unbalanced, internal = np.sqrt(summary[:2].astype(np.float64))
+        return States(ready, summary[2].astype(np.float64), unbalanced, internal, iterations, residual, goal)
 
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
         # small blocks: those whose lanes have all ended make room at once
@@ -352,7 +352,7 @@ class Batch:
             self._graph_ahead = capture.graph
 
     def _record(self) -> None:
-        lists, numbers, found = self._told
+        lists, numbers, summary = self._host_copies
         wp.copy(self._lists, lists)
         wp.copy(self._numbers, numbers)
         self._begin_steps()
@@ -360,11 +360,11 @@ class Batch:
         self._launch(self._kernels.update, (self.system.size, self.slots), *self._solve, self._samples)
         self._launch(
             self._kernels.find_ready, self.slots, self._marked, self._stepping, self._cg.solving, self._ready,
-            self._found[3],
+            self._summary[3],
         )  # fmt: skip
         self._launch(self._sums_kernels.gather_active, self.slots, *self._all, self._ready, *self._fresh)
         self._evaluate()
-        wp.copy(found, self._found)
+        wp.copy(summary, self._summary)
 
     def _begin_steps(self) -> None:
         s, nodes, begun = self._samples, (self.system.size, self.slots), self._start

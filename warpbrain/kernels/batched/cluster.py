@@ -187,7 +187,7 @@ class ClusterSolve:
         s.diagonal, s.pair_count, s.values = diagonal, values.shape[0], values
         s.b, s.v, s.free, s.x, s.max_iterations = b, v, free, x, max_iterations
         s.outcome = wp.zeros((self._clusters, 3), dtype=wp.float64, device=device)
-        self._told = wp.zeros((self._clusters, 3), dtype=wp.float64, device="cpu", pinned=True)
+        self._host_outcome = wp.zeros((self._clusters, 3), dtype=wp.float64, device="cpu", pinned=True)
 
     def solve(self, slots: wp.array, count: wp.array) -> None:
         """Solve the systems of a list of slots."""
@@ -198,9 +198,9 @@ class ClusterSolve:
             device=self._device,
             block_dim=THREADS,
         )
-        wp.copy(self._told, self._systems.outcome)
+        wp.copy(self._host_outcome, self._systems.outcome)
 
     def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Iterations, residual norms and goals of the last system of each slot, once the device has ended."""
-        iterations, residual, goal = self._told.numpy().T
+        iterations, residual, goal = self._host_outcome.numpy().T
         return iterations.astype(np.int32), residual.copy(), goal.copy()

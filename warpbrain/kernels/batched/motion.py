@@ -102,15 +102,15 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         stepping: wp.array[int],
         solving: wp.array[int],
         ready: wp.array[int],
-        found: wp.array[scalar],
+        number: wp.array[scalar],
     ):
         """One thread for a slot: 1 where a state is to be evaluated, one that has just been reached or one that is
-        marked; as a flag, and as a number to be told."""
+        marked; as a flag, and as a number beside those of the step."""
         slot = wp.tid()
         ready[slot] = marked[slot]
         if stepping[slot] != 0 and solving[slot] == 0:
             ready[slot] = 1
-        found[slot] = scalar(ready[slot])
+        number[slot] = scalar(ready[slot])
 
     @kernels.add
     def collect(slots: wp.array[int], nodes: wp.array[int], x: wp.array3d[Any], collected: wp.array[wp.vec3d]):

@@ -130,7 +130,7 @@ def patches_of(
         number += len(pieces)
         span = slice(starts[mine.start], starts[mine.stop])
         both = pairs[np.concatenate(listed[mine])]
-        own = kept[np.concatenate(listed[mine])] + FIRST * (firsts[span] & (both[:, 0] == both[:, 1]))
+        of_group = kept[np.concatenate(listed[mine])] + FIRST * (firsts[span] & (both[:, 0] == both[:, 1]))
         pieces = [group[piece] for piece in pieces]
         made.append(
             _tables(
@@ -142,7 +142,7 @@ def patches_of(
                 together,
                 starts[mine.start : mine.stop + 1],
                 rows[span],
-                own,
+                of_group,
             )
         )
     return made, sums

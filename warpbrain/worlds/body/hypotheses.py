@@ -219,8 +219,7 @@ class HypothesisSearch:
     def _missing(self, candidate: WeightedSet) -> float:
         """Log evidence that a set would have to gain to be as probable as the best one."""
         best = max(other.hypothesis.log_evidence + other.hypothesis.log_prior for other in self._sets.values())
-        own = candidate.hypothesis.log_evidence + candidate.hypothesis.log_prior
-        return float(best - own)
+        return float(best - (candidate.hypothesis.log_evidence + candidate.hypothesis.log_prior))
 
     def _refit_subsets(self, names: frozenset[str]) -> None:
         """Fit subsets with one mechanism less again, from the optimum of a set, if that is better than their own.

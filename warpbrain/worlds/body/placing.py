@@ -285,8 +285,9 @@ def with_refined_strain(base: Base, candidate: WeightedSet, causes: BodyCauses, 
     columns = causes.columns(member)
     others = candidate.columns[:, : -columns.shape[1]]
     # how many times a column of 1 m it is, on each row: its size and its course in time
-    own = strains.columns[number]
-    factor = np.divide((columns * own).sum(axis=1), (own**2).sum(axis=1), where=own.any(axis=1), out=np.zeros(len(own)))
+    unit = strains.columns[number]
+    squares = (unit**2).sum(axis=1)
+    factor = np.divide((columns * unit).sum(axis=1), squares, where=squares > 0.0, out=np.zeros(len(unit)))
     elsewhere = strains.at_centres(strains.centres[number] + _cube(base, 0.5 * spacing)[1:])
     tried = [columns, *(factor[:, None] * each for each in elsewhere)]
     without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
