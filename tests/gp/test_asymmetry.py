@@ -21,6 +21,7 @@ from warpbrain.gp.hierarchy import (
     Hierarchy,
     Observations,
     Places,
+    Structure,
     fit_hierarchy,
     mean_asymmetry_of,
     observations,
@@ -165,7 +166,7 @@ def test_intervals_of_the_mean_asymmetry_hold_the_truth(verify):
     for _ in range(120):
         truth = Hierarchy.from_vector(centre + spread * random.standard_normal(len(centre)))
         flat = Hierarchy(truth.spread, truth.length_scale, mean_asymmetry=(0.0, 0.0))
-        covariance = flat.covariance(places, places) + REST**2 * np.eye(len(basis))
+        covariance = flat.covariance(Structure.of(places, places)) + REST**2 * np.eye(len(basis))
         both = np.array(MEAN_ASYMMETRY) * random.standard_normal(2)
         modulus = CENTRE + basis @ both + np.linalg.cholesky(covariance) @ random.standard_normal(len(basis))
         seen = Observations(places, modulus)

@@ -211,11 +211,8 @@ class Gaussian:
 
     def negative_log(self, theta: Floats) -> float:
         """Negative log density, less its constant."""
-        return 0.5 * float((theta - self.mean) @ self.gradient(theta))
-
-    def gradient(self, theta: Floats) -> Floats:
-        """Of the negative log density, shape (p,)."""
-        return self.precision @ (theta - self.mean)
+        away = theta - self.mean
+        return 0.5 * float(away @ (self.precision @ away))
 
 
 #: Draws on which the prior rests.

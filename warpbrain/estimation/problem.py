@@ -106,7 +106,6 @@ class Linearised:
     """Derivatives of the objective at a point by `theta` and the nuisances, p + q numbers."""
 
     jacobian: Floats  # (n, p + q), of the residuals
-    gradient: Floats  # (p + q,)
     information: Floats  # (p + q, p + q), of the data alone
     hessian: Floats  # of the objective, to first order in the residuals: positive definite
     du: Floats  # (p, N, 3), of the displacement [m] by `theta`
@@ -149,9 +148,8 @@ class Problem:
         """Derivatives at a point, from those of its state, or `SolveError` if that is unstable."""
         du, dR = self.forward.differentiate(point.state) if derivatives is None else derivatives
         jacobian = self.nuisances.jacobian(point.rows, point.state.theta, point.nuisances, du, dR)
-        J, r = point.noise.standardised(jacobian), point.noise.standardised(point.rows.residual)
-        gradient = J.T @ r + self.prior.gradient(point.coordinates)
-        return Linearised(jacobian, gradient, J.T @ J, J.T @ J + self.prior.precision, du, dR)
+        J = point.noise.standardised(jacobian)
+        return Linearised(jacobian, J.T @ J, J.T @ J + self.prior.precision, du, dR)
 
     def with_likely_noise(self, point: Point, linearised: Linearised) -> Point:
         """The point with the most probable noise, everything that is estimated integrated out about it."""

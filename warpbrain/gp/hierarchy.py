@@ -177,12 +177,8 @@ class Hierarchy:
         values = np.exp(vector).tolist()
         return cls(dict(zip(EFFECTS, values[:-1], strict=True)), values[-1], kernel, mean_asymmetry)
 
-    def covariance(self, a: Places, b: Places) -> Floats:
+    def covariance(self, structure: Structure) -> Floats:
         """Covariance (n, m) of the moduli at two sets of places, without the rest."""
-        return self.covariance_of(Structure.of(a, b))
-
-    def covariance_of(self, structure: Structure) -> Floats:
-        """The same of two sets of places whose structure is known."""
         even, odd, _, _ = self._curves(structure)
         curves = even * self._sum(structure.even) + odd * self._sum(structure.odd)
         mean = structure.a * np.square(self.mean_asymmetry) @ structure.b.T
@@ -342,7 +338,7 @@ def fit_hierarchy(
     if not np.isfinite(end.fun):
         raise SolveError("the covariance of the studies is not positive definite in double precision")
     hierarchy = Hierarchy.from_vector(end.x, kernel, mean_asymmetry)
-    condition = float(np.linalg.cond(hierarchy.covariance_of(seen.among) + REST**2 * np.eye(len(seen.log_modulus))))
+    condition = float(np.linalg.cond(hierarchy.covariance(seen.among) + REST**2 * np.eye(len(seen.log_modulus))))
     return hierarchy, Fitted(float(end.fun), bool(end.success), str(end.message), int(end.nit), condition)
 
 
@@ -378,7 +374,7 @@ def negative_log_likelihood(hierarchy: Hierarchy, seen: Observations) -> tuple[f
     identity = np.eye(len(seen.log_modulus))
     away = seen.log_modulus - CENTRE
     try:
-        L = cholesky(hierarchy.covariance_of(seen.among) + REST**2 * identity, lower=True)
+        L = cholesky(hierarchy.covariance(seen.among) + REST**2 * identity, lower=True)
     except np.linalg.LinAlgError:
         return np.inf, np.zeros(len(EFFECTS) + 1)
     weights = cho_solve((L, True), away)
@@ -409,9 +405,9 @@ class Conditional:
     def moments(self, structures: Structures) -> tuple[Floats, Floats]:
         """Mean at places (n,) and covariance with other places (n, m)."""
         at, other, between = structures
-        k = self._whitened(self.hierarchy.covariance_of(at))
-        to = k if other is at else self._whitened(self.hierarchy.covariance_of(other))
-        return CENTRE + k.T @ self._factored[1], self.hierarchy.covariance_of(between) - k.T @ to
+        k = self._whitened(self.hierarchy.covariance(at))
+        to = k if other is at else self._whitened(self.hierarchy.covariance(other))
+        return CENTRE + k.T @ self._factored[1], self.hierarchy.covariance(between) - k.T @ to
 
     def mean_asymmetry(self) -> tuple[Floats, Floats]:
         """Mean (2,) and covariance (2, 2) of `a` and `b`, the asymmetry of all papers in the mean."""
@@ -429,7 +425,7 @@ class Conditional:
         """The factor of the covariance of the observations, and what it makes of them."""
         from scipy.linalg import cholesky, solve_triangular
 
-        among = self.hierarchy.covariance_of(self.seen.among)
+        among = self.hierarchy.covariance(self.seen.among)
         L = cholesky(among + REST**2 * np.eye(len(among)), lower=True)
         return L, solve_triangular(L, self.seen.log_modulus - CENTRE, lower=True)
 

@@ -114,7 +114,6 @@ class NodalForce(Load):
     total: tuple[float, float, float]
     mass: float = 0.0
     quadratic: ClassVar[bool] = True
-    sentence: ClassVar[str] = "A force presses on part of the surface."
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -457,7 +457,6 @@ class SpecimenRun(Shown):
     """The simulated tests of a specimen."""
 
     case: Case
-    rig: Rig
     tests: tuple[Tested, ...]
 
     @property
@@ -503,4 +502,4 @@ class SpecimenRunning:
             result = self.rig.run(recording, on_state=lambda part: on_state(part, recording.name))
             return Tested(recording, result, compare_test(recording, result))
 
-        return SpecimenRun(self.case, self.rig, tuple(map(tested, self.tests)))
+        return SpecimenRun(self.case, tuple(map(tested, self.tests)))

@@ -80,11 +80,6 @@ class Study:
         return FORMS[self.form].of_first_invariant and not self.split
 
     @property
-    def parameters(self) -> Parameters | dict[str, Parameters]:
-        """Parameters of the form; of a study that is split, both sets by the names of their sides."""
-        return {"compression": self.compression, "tension": self.tension} if self.split else self.tension
-
-    @property
     def shear_moduli(self) -> tuple[float, float]:
         """Shear modulus at rest `mu0` [Pa] in compression and in tension."""
         modulus = FORMS[self.form].shear_modulus

@@ -135,7 +135,6 @@ class DiagnosingSpecimen:
                 )
                 for candidate, p in ordered[:_TOLD]
             ),
-            assumed=tuple(sorted(best.names)),
             where=shows,
             next_measurement=measurements,
             smallest=smallest_of(sets.about(base)),

@@ -89,8 +89,6 @@ class SpecimenDiagnosis(Verdict[Ranked, Combination]):
     ----------
     protocol : Protocol
         All recorded rows.
-    assumed : tuple of str
-        Causes of the fit that is "explained".
     where : Segment or None
     scores : dict of str to Score
         ``"declared"``, ``"refitted"`` and, if something is missing, ``"explained"``.
@@ -103,7 +101,6 @@ class SpecimenDiagnosis(Verdict[Ranked, Combination]):
     """
 
     protocol: Protocol
-    assumed: tuple[str, ...]
     where: Segment | None
     scores: Mapping[str, Score]
     stresses: Mapping[str, Floats]
