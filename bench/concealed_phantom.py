@@ -102,7 +102,7 @@ def experiment(tissue: str, repetitions: int, options: EstimationOptions | None 
         "all_covered": int(covered.all(axis=1).sum()),
         "mean_estimate_Pa": np.exp(np.mean(estimates, axis=0)).tolist(),
         "scatter_of_estimates": np.std(estimates, axis=0).tolist(),
-        "standard_deviation": first.best.laplace.standard_deviations.tolist(),
+        "standard_deviation": first.best.laplace.posterior.standard_deviations.tolist(),
         "rmse_mm": {"median": float(np.median(errors)), "largest": float(np.max(errors))},
         "pareto_k": first.importance.smoothed.k,
         "amount_of_mesh_error": first.nuisances[0][1:],

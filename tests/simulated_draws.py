@@ -174,7 +174,7 @@ def ranks(setting: Setting, count: int, seed: int = 0) -> Floats:
 def probability_below(posterior: Posterior, theta: Floats) -> Floats:
     """Of each parameter (p,) that it is less than that of a vector (p,)."""
     if posterior.chain is None:
-        return np.asarray(ndtr((theta - posterior.theta) / posterior.best.laplace.standard_deviations))
+        return np.asarray(ndtr((theta - posterior.theta) / posterior.best.laplace.posterior.standard_deviations))
     return np.asarray(np.mean(posterior.chain.theta < theta, axis=0))
 
 

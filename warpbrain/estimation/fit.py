@@ -64,21 +64,11 @@ class Laplace:
         basis = self.prior.factor @ vectors
         return Gaussian(self.theta, np.asarray(basis / (1.0 + values) @ basis.T))
 
-    @property
-    def covariance(self) -> Floats:
-        """Of the parameters, shape (p, p)."""
-        return self.posterior.covariance
-
-    @property
-    def standard_deviations(self) -> Floats:
-        """Of each parameter, shape (p,)."""
-        return self.posterior.standard_deviations
-
     def interval(self, probability: float = 0.95) -> Floats:
         """Central interval of each parameter, shape (p, 2), no farther than its range goes."""
         from scipy.special import ndtri
 
-        away = ndtri(0.5 + 0.5 * probability) * self.standard_deviations
+        away = ndtri(0.5 + 0.5 * probability) * self.posterior.standard_deviations
         ends = np.stack([self.theta - away, self.theta + away], axis=1)
         return np.clip(ends, self.parameters.low[:, None], self.parameters.high[:, None])
 
@@ -150,7 +140,7 @@ class Estimate:
         """Log probability of what was recorded and of this mode, by Laplace, up to what all modes have in common."""
         prior, point = self.problem.mode, self.point
         misfit, _ = self.problem.without_nuisances(point.state, point.nuisances, point.noise)
-        log_volume = 0.5 * float(np.linalg.slogdet(self.laplace.covariance)[1])
+        log_volume = 0.5 * float(np.linalg.slogdet(self.laplace.posterior.covariance)[1])
         log_volume -= float(np.log(np.diag(prior.gaussian.factor)).sum())
         return float(np.log(prior.share)) + log_volume - misfit - prior.gaussian.negative_log(self.theta)
 

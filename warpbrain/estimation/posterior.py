@@ -336,7 +336,7 @@ class Posterior(Shown):
     def covariance(self) -> Floats:
         """Of the parameters, shape (p, p)."""
         if self.chain is None:
-            return self.best.laplace.covariance
+            return self.best.laplace.posterior.covariance
         return np.atleast_2d(np.cov(self.chain.theta, rowvar=False))
 
     @property

@@ -236,7 +236,7 @@ class Importance:
         doubts = []
         if not self.smoothed.k <= RELIABLE:
             doubts.append(f"Pareto k is {self.smoothed.k:.2f}, above {RELIABLE}")
-        deviations = laplace.standard_deviations
+        deviations = laplace.posterior.standard_deviations
         # what as few draws say of a mean is itself uncertain by this many standard deviations
         error = 2.0 / np.sqrt(self.smoothed.effective)
         shift = np.abs(self.mean - laplace.theta) / deviations
