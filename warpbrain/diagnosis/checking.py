@@ -28,7 +28,7 @@ from warpbrain.inference.subsets import Blocks
 from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import width_of
-from warpbrain.worlds.body.fit_columns import with_laws_about
+from warpbrain.worlds.body.fit_columns import with_shapes_about
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
 from warpbrain.worlds.body.nuisances import RigidMotion
@@ -253,7 +253,7 @@ def _error(checks: States, base: Base, fit: Refit) -> float:
     sensors = _sensors(checks, fit.state, error)
     at_times = _at_nearest_times(sensors, base.states.times)
     nuisances, _ = base.for_sensors(at_times)
-    columns = with_laws_about(fit, nuisances, at_times, base)
+    columns = with_shapes_about(fit, nuisances, at_times, base)
     rigid = RigidMotion(checks, nuisances)
     # less tissue and field, which the state has
     linear = fit.nuisances[: nuisances.columns.shape[1]] - nuisances.coordinates(base.prior, fit.state.hypothesis)

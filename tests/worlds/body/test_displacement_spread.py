@@ -17,7 +17,7 @@ def test_nodes_move_as_the_rows_of_a_fit_do(small_diagnosis):
     layout = Layout.of(base.nuisances, len(refit.nuisances), refit.effects)
     columns = displacement_columns(best, base)
     of_rows = refit.state.sensors.by_displacement @ columns
-    for part in (layout.tissue, layout.field, layout.law, base.nuisances.part("known loads"), layout.coefficients):
+    for part in (layout.tissue, layout.field, layout.shapes, base.nuisances.part("known loads"), layout.coefficients):
         size = np.abs(refit.columns[:, part]).max(initial=0.0)
         np.testing.assert_allclose(of_rows[:, part], refit.columns[:, part], atol=0.02 * size)
     registration = columns[:, base.nuisances.part("registration")]

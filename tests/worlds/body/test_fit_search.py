@@ -84,30 +84,31 @@ def test_a_fit_begins_at_that_of_a_subset(sets, base, search):
 
 
 def test_linear_coordinates_are_at_their_best(base, search):
-    """No step of these alone gains anything, after the start and after other columns of laws."""
+    """No step of these alone gains anything, after the start and after other columns of shapes."""
     for _ in range(2):
         linear = np.flatnonzero(search._linear)
         W = search._noise.whitened(search._U[:, linear])
         gradient = W.T @ search._noise.whitened(search.residual) - search.z[linear]
         np.testing.assert_allclose(gradient, 0.0, atol=1e-9 * (1.0 + np.abs(search.z[linear]).max()))
-        search._laws = base.noise[:, None] * np.random.default_rng(5).normal(size=(len(W), 4))
-        search.update_laws()
+        size = (len(W), len(search._layout.shapes))
+        search._shapes = base.noise[:, None] * np.random.default_rng(5).normal(size=size)
+        search.update_shapes()
 
 
-def test_a_renewal_of_laws_that_undoes_the_one_before_is_taken_by_half(base, search, monkeypatch):
-    law = search._layout.law
-    first = base.noise[:, None] * np.random.default_rng(4).normal(size=search._U[:, law].shape)
-    search._U[:, law] = first
+def test_a_renewal_of_shapes_that_undoes_the_one_before_is_taken_by_half(base, search, monkeypatch):
+    shapes = search._layout.shapes
+    first = base.noise[:, None] * np.random.default_rng(4).normal(size=search._U[:, shapes].shape)
+    search._U[:, shapes] = first
     others = [2.0 * first, first, 2.0 * first]
-    monkeypatch.setattr("warpbrain.worlds.body.fitting.law_columns_about", lambda *_: others.pop(0))
+    monkeypatch.setattr("warpbrain.worlds.body.fitting.shape_columns_about", lambda *_: others.pop(0))
     for taken, expected in ((1.0, 2.0 * first), (0.5, 1.5 * first), (0.25, 1.625 * first)):
         search._about = search._nearby, ()
-        search.update_laws()
+        search.update_shapes()
         assert search.taken == taken
-        np.testing.assert_allclose(search._U[:, law], expected)
-    search.update_laws()
+        np.testing.assert_allclose(search._U[:, shapes], expected)
+    search.update_shapes()
     # what is left of it is taken in part again, without another linearisation
-    np.testing.assert_allclose(search._U[:, law], 1.625 * first + 0.25 * 0.375 * first)
+    np.testing.assert_allclose(search._U[:, shapes], 1.625 * first + 0.25 * 0.375 * first)
 
 
 def test_what_a_fit_has_not_reached_is_no_evidence(sets, base, monkeypatch):

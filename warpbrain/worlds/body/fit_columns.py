@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import SolveError
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import is_linear
@@ -16,6 +16,7 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.nuisances import (
     LAW,
+    SHAPES,
     Nuisances,
     field_columns,
     law_columns,
@@ -24,6 +25,7 @@ from warpbrain.worlds.body.nuisances import (
     tissue_columns,
 )
 from warpbrain.worlds.body.sensors import Sensors
+from warpbrain.worlds.body.shapes import columns_of_other_shapes
 from warpbrain.worlds.body.states import SolvedState, States
 from warpbrain.worlds.body.weighted_set import MeshShare, Refit
 
@@ -32,11 +34,11 @@ from warpbrain.worlds.body.weighted_set import MeshShare, Refit
 class Layout:
     """Order of the coordinates of a fit: nuisances, causes that act linearly, coefficients of each effect."""
 
-    #: Tissue, stiffness field, shape of its law, and the coefficients of all effects.
+    #: Tissue, stiffness field, and the coefficients of all effects.
     tissue: slice
     field: slice
-    law: slice
     coefficients: slice
+    shapes: Ints  # of laws, and of mechanisms
     effects: tuple[slice, ...]  # coefficients of each effect
     linear: Bools  # (q + e,), which of the first act linearly: all but tissue and field
     nonlinear: Bools  # (q + e + k,), which act through an equilibrium
@@ -52,9 +54,10 @@ class Layout:
         linear[tissue] = linear[field] = False
         nonlinear = np.concatenate([~linear, np.ones(width_of(effects), dtype=bool)])
         law, parts = nuisances.part(LAW), column_slices(effects, count)
+        shapes = np.r_[law, nuisances.part(SHAPES)]
         parameters = ((shared_parameter(effect), part.start) for effect, part in zip(effects, parts, strict=True))
         shared = tuple((law.start + each.column, at, each.ratio) for each, at in parameters if each is not None)
-        return cls(tissue, field, law, slice(count, None), parts, linear, nonlinear, shared)
+        return cls(tissue, field, slice(count, None), shapes, parts, linear, nonlinear, shared)
 
     def without_shared(self, z: Floats) -> Floats:
         """The same tissue as coordinates (q + e + k,) with shared parameters in the coefficients of effects alone."""
@@ -106,36 +109,36 @@ def columns_about(
     return columns, at
 
 
-def with_laws_about(fit: Refit, nuisances: Nuisances, sensors: Sensors, base: Base) -> Floats:
-    """Columns (n, q) of nuisances over other sensors (n), those of the shape of laws about a fit."""
+def with_shapes_about(fit: Refit, nuisances: Nuisances, sensors: Sensors, base: Base) -> Floats:
+    """Columns (n, q) of nuisances over other sensors (n), those of the shape of laws and of mechanisms about a fit."""
     columns = nuisances.columns
     try:
         at = fit.state.linearised(sensors)
     except SolveError:
         return columns
-    columns[:, nuisances.part(LAW)] = law_columns_about(
+    columns[:, Layout.of(nuisances, columns.shape[1], ()).shapes] = shape_columns_about(
         at, fit.effects, fit.coefficients, base.states, base.mesh_errors
     )
     return columns
 
 
-def law_columns_about(
+def shape_columns_about(
     at: Linearisation,
     effects: Sequence[Effect],
     coefficients: Sequence[Floats],
     states: States,
     mesh_errors: MeshErrors | None,
 ) -> Floats:
-    """Columns (n, k) of the shape of laws about a state with effects that have these coefficients.
+    """Columns (n, k) of the shape of laws and of mechanisms about a state with effects that have these coefficients.
 
-    What that does is next to nothing where strains are small: about the base, which nothing but declared loads deforms.
-    It is not where a mechanism strains tissue by half, and would be taken for a cause. The
-    column of a `SharedParameter` is zero.
+    What a law's does is next to nothing where strains are small: about the base, which nothing but declared loads
+    deforms. It is not where a mechanism strains tissue by half, and would be taken for a cause. The column of a
+    `SharedParameter` is zero.
     """
     relaxed = _relaxation_factor(effects, coefficients, at.sensors)
     columns = relaxed * law_columns(Effects(at, mesh_errors=mesh_errors), states)
     columns[:, [each.column for each in map(shared_parameter, effects) if each is not None]] = 0.0
-    return columns
+    return np.hstack([columns, columns_of_other_shapes(at, effects, coefficients, mesh_errors)])
 
 
 def _relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats], sensors: Sensors) -> Floats:

@@ -3,8 +3,9 @@
 Gauss-Newton's method on standard normal coordinates: those of tissue, field and mechanisms act through an equilibrium,
 those of other nuisances linearly. Columns are made anew where the coordinates have moved away from. The evidence is
 Laplace's: that of the linear model about the best point, summed over the scale of the noise and over gross errors as in
-screening. What the shape of laws does, the error of the mesh, noise and gross errors stay as they are while a best
-point is looked for, and are then taken from there, until that changes nothing; as long as it does, searches are rough.
+screening. What other shapes of laws and mechanisms do, the error of the mesh, noise and gross errors stay as they are
+while a best point is looked for, and are then taken from there, until that changes nothing; as long as it does,
+searches are rough.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
-from warpbrain.worlds.body.fit_columns import Layout, columns_about, law_columns_about
+from warpbrain.worlds.body.fit_columns import Layout, columns_about, shape_columns_about
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion
@@ -107,12 +108,12 @@ class FitSearch:
         # of the last state of this fit that was followed over time
         self._course: tuple[Floats, ...] = ()
         self.columns = columns
-        # the linear model about a state, and the coefficients of effects there, until columns of laws are made of it
+        # the linear model about a state, and the coefficients of effects there, until columns of shapes are made of it
         self._about: tuple[Linearisation, tuple[Floats, ...]] | None = None
-        # columns of the shape of laws about the last linearisation, how they differed from those before, and the part
+        # columns of shapes about the last linearisation, how they differed from those before, and the part
         # of such a difference that is taken
-        self._laws: Floats | None = None
-        self._law_change, self.taken = np.zeros((len(self._U), 1)), 1.0
+        self._shapes: Floats | None = None
+        self._shape_change, self.taken = np.zeros((len(self._U), 1)), 1.0
         # columns and noise at which linear coordinates were put at their best last, and what that needs of these
         self._projection: tuple[Floats, GaussianModel, Floats, tuple[Floats, bool]] | None = None
         # where the error of the mesh was computed last
@@ -306,28 +307,28 @@ class FitSearch:
             self._mesh_share,
         )
 
-    def update_laws(self) -> None:
-        """Replace the columns of the shape of laws by those of the last linearisation.
+    def update_shapes(self) -> None:
+        """Replace the columns of the shape of laws and of mechanisms by those of the last linearisation.
 
         While an optimum is looked for they are fixed: renewed on the way, they would change the objective. Where a
         renewal undoes what the one before has done, as between two states that have each other's columns, half of it is
         taken from then on.
         """
-        law, before = self._layout.law, self._U[:, self._layout.law]
+        part, before = self._layout.shapes, self._U[:, self._layout.shapes]
         if self._about is not None:
             at, coefficients = self._about
-            self._laws = law_columns_about(at, self.effects, coefficients, self._base.states, self.mesh_errors)
+            self._shapes = shape_columns_about(at, self.effects, coefficients, self._base.states, self.mesh_errors)
             self._about = None
-            change = self._base.model.whitened(self._laws - before)
-            if float(np.sum(change * self._law_change)) < 0.0:
+            change = self._base.model.whitened(self._shapes - before)
+            if float(np.sum(change * self._shape_change)) < 0.0:
                 self.taken *= 0.5
-            self._law_change = change
-        if self._laws is None or np.array_equal(self._laws, before):
+            self._shape_change = change
+        if self._shapes is None or np.array_equal(self._shapes, before):
             return
-        columns = before + self.taken * (self._laws - before)
-        residual = self.residual + (before - columns) @ self.z[law]
+        columns = before + self.taken * (self._shapes - before)
+        residual = self.residual + (before - columns) @ self.z[part]
         self._U, self.columns = self._U.copy(), self.columns.copy()
-        self._U[:, law] = self.columns[:, law] = columns
+        self._U[:, part] = self.columns[:, part] = columns
         self._renew(residual)
 
     def _gauss_newton_step(self, field_stays: bool) -> tuple[Floats, float]:
@@ -569,12 +570,12 @@ class Fitter:
         return search.result()
 
     def _update(self, search: FitSearch) -> Refit:
-        """Take laws, the error of the mesh, noise and gross errors of the best point of a search, which is returned.
+        """Take shapes, the error of the mesh, noise and gross errors of the best point of a search, which is returned.
 
         The error of the mesh without any cause is that of all fits to come. It depends on the tissue, not only in
         proportion, and would otherwise be taken for a mechanism's share.
         """
-        search.update_laws()
+        search.update_shapes()
         if self.mesh_errors is not None and search.effects:
             search.update_mesh_share(self.mesh_errors, self.finer)
         elif self.mesh_errors is not None:

@@ -36,6 +36,9 @@ LAW = "shape of the law"
 _ALWAYS = ("tissue.volume", "tissue.exponent")
 #: The family of what is not known of the mesh's error, and that of mechanisms' shares of it, which only fits have.
 UNKNOWN_MESH, MESH_SHARE = "mesh, unknown", "mesh, of mechanisms"
+#: The family of what is not known of the shape of mechanisms in one place, which only fits have: of how many of them,
+#: and how many columns each has, of two other radii and of a neighbour to both sides along each axis.
+SHAPES, SHAPES_OF, SHAPES_EACH = "shape of mechanisms", 3, 8
 #: Exponent of what stiffens in both directions.
 _STIFFENS = 8.0
 #: Step of a difference in `theta`.
@@ -73,6 +76,15 @@ class Nuisances:
         changed = columns.copy()
         changed[:, self.part(name)] = of_family
         return changed
+
+    def without_shapes_of(self, number: int, columns: Floats) -> Floats:
+        """Columns (n, q + k), or coordinates (1, q + k), without the shape of one of some mechanisms."""
+        of_each = np.split(columns[:, self.part(SHAPES)], SHAPES_OF, axis=1)
+        if number >= SHAPES_OF:
+            return columns
+        return self.with_family(
+            SHAPES, columns, np.hstack([*of_each[:number], *of_each[number + 1 :], 0.0 * of_each[0]])
+        )
 
     def coordinates(self, prior: Gaussian, hypothesis: Hypothesis) -> Floats:
         """Coordinates (q,) of the tissue, by its prior, and of the field of a hypothesis; the others are zero."""
@@ -123,6 +135,7 @@ def nuisances_at(
         LAW: law_columns(effects, states),
         "known loads": _known_loads(at),
         "registration": sensors.rigid * registration_of(states.case).deviations,
+        SHAPES: np.zeros((len(sensors), SHAPES_OF * SHAPES_EACH)),
     }
     if mesh_errors is not None:
         error = mesh_errors.error

@@ -31,10 +31,9 @@ from warpbrain.worlds.body.causes import BodyCauses, scaled
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
 from warpbrain.worlds.body.effects import Effect, Effects, width_of
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
+from warpbrain.worlds.body.shapes import RADII, middles_of_faces, places_about
 from warpbrain.worlds.body.weighted_set import Refit, SetMarginal, WeightedSet, evidence_of
 
-#: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
-_RADII = (0.8, 1.0, 1.25)
 #: How often places are looked at anew, how far they are apart in spacings of a scan, and by how much [nats] the linear
 #: model must say that others are better.
 _MOVES, _MOVE, _BETTER = 3, 0.25, 1.0
@@ -88,22 +87,6 @@ def _effects_of(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect]
     return [result for result in switch_effects(effects, proposals) if isinstance(result, Effect)]
 
 
-def places_about(base: Base, proposed: Proposal, step: float) -> list[Proposal]:
-    """Proposals a step [m] from another one along each principal axis, back on the surface if it is of that.
-
-    And at the same place with other radii.
-    """
-    assert proposed.elsewhere is not None and proposed.centre is not None and proposed.radius is not None
-    axes = principal_axes(base.at.system.model.mesh.points)
-    centres = [proposed.centre + sign * step * axis for axis in axes for sign in (-1.0, 1.0)]
-    if proposed.on_surface:
-        middles = _middles(base, proposed.patch)
-        nearest = {int(np.argmin(np.sum((middles - centre) ** 2, axis=1))) for centre in centres}
-        centres = [middles[number] for number in sorted(nearest)]
-    others = [proposed.elsewhere(proposed.centre, factor * proposed.radius) for factor in _RADII if factor != 1.0]
-    return [*others, *(proposed.elsewhere(centre, proposed.radius) for centre in centres)]
-
-
 def _cell(base: Base, effect: Effect, spacing: float) -> list[Proposal]:
     """Proposals throughout the cell of an effect: on the surface all of it, in the depth a step to each side."""
     proposed = effect.proposed
@@ -130,7 +113,7 @@ def _with_radii(proposed: Proposal, centres: Floats) -> list[Proposal]:
     assert proposed.elsewhere is not None and proposed.radius is not None and proposed.centre is not None
     return [
         proposed.elsewhere(centre, radius * proposed.radius)
-        for centre, radius in itertools.product(centres, _RADII)
+        for centre, radius in itertools.product(centres, RADII)
         if radius != 1.0 or not np.array_equal(centre, proposed.centre)
     ]
 
@@ -140,7 +123,7 @@ def _on_surface(base: Base, centre: Floats, reach: float, patch: Patch | None) -
 
     They are a quarter of the reach apart or more.
     """
-    middles = _middles(base, patch)
+    middles = middles_of_faces(base.at.system.model, patch)
     distance = np.linalg.norm(middles - centre, axis=1)
     chosen = [centre]
     for number in np.argsort(distance, kind="stable").tolist():
@@ -149,17 +132,6 @@ def _on_surface(base: Base, centre: Floats, reach: float, patch: Patch | None) -
         if min(np.linalg.norm(np.array(chosen) - middles[number], axis=1)) >= 0.25 * reach:
             chosen.append(middles[number])
     return np.array(chosen)
-
-
-def _middles(base: Base, patch: Patch | None) -> Floats:
-    """Of faces (k, 3) [m] that are free, or that a patch is a part of."""
-    mesh = base.at.system.model.mesh
-    if patch is None:
-        held = np.asarray(base.at.system.model.constrained.reshape(-1, 3).all(axis=1))
-        faces = mesh.boundary[~held[mesh.boundary].any(axis=1)]
-    else:
-        faces = mesh.boundary[patch.held[mesh.boundary].all(axis=1)]
-    return np.asarray(mesh.points[faces].mean(axis=1))
 
 
 class Weighing:
@@ -352,5 +324,5 @@ def _moved_effects(base: Base, effect: Effect, step: float) -> Iterator[Effect]:
         return
     assert proposal.centre is not None and proposal.radius is not None
     size = float(np.max(proposal.sd / proposal.elsewhere(proposal.centre, proposal.radius).sd))
-    for other in places_about(base, proposal, step):
+    for other in places_about(base.at.system.model, proposal, step):
         yield replace(scaled(replace(effect, proposal=other), size), columns=effect.columns)

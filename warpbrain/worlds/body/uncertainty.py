@@ -25,7 +25,7 @@ from warpbrain.estimation.parameters import Parameters
 from warpbrain.inference.causes import Kind
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
-from warpbrain.worlds.body.fit_columns import Layout, columns_about, law_columns_about
+from warpbrain.worlds.body.fit_columns import Layout, columns_about, shape_columns_about
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.sensors import tracked_points
 from warpbrain.worlds.body.weighted_set import WeightedSet
@@ -155,5 +155,5 @@ def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
         columns[:, layout.effects[number]] = effect.columns
     columns, at = columns_about(replace(state, sensors=nodes), z, columns, layout, over_nodes, base, None, None)
     coefficients = [z[part] for part in layout.effects]
-    columns[:, layout.law] = law_columns_about(at, over_nodes, coefficients, base.states, None)
+    columns[:, layout.shapes] = shape_columns_about(at, over_nodes, coefficients, base.states, None)
     return columns

@@ -140,6 +140,7 @@ class Refit:
         if (shared := shared_parameter(self.effects[number])) is not None:
             coordinate = base.nuisances.part(LAW).start + shared.column
             nuisances[coordinate] += float(self.coefficients[number][0]) / shared.ratio
+        nuisances = base.nuisances.without_shapes_of(number, nuisances[None])[0]
 
         def others(values: tuple[Any, ...]) -> tuple[Any, ...]:
             return values[:number] + values[number + 1 :]
@@ -311,7 +312,8 @@ class WeightedSet:
     def without(self, mechanism: str, base: Base) -> WeightedSet:
         """The set less one of its mechanisms, linear about the same point, with an evidence to be compared with its."""
         number = self.mechanisms.index(mechanism)
-        columns = np.delete(self.columns, self.slices[number], axis=1)
+        columns = base.nuisances.without_shapes_of(number, self.columns)
+        columns = np.delete(columns, self.slices[number], axis=1)
         residual, shared = self.residual + self.effects[number].mean, shared_parameter(self.effects[number])
         if shared is not None and self.refit is not None:
             # as a nuisance, which it is again

@@ -1,0 +1,80 @@
+"""What is not known of the shape of a mechanism that acts in one place, as columns about a fit.
+
+A mechanism is looked for as a round patch or a ball. Blades are oblong, tumours are lobed, and oedema follows white
+matter: some of what acts is beside the patch, over a larger one or over a smaller one. Where it moves the recordings
+far that is more than their noise, and without these columns what is left of it is taken for a further mechanism.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from warpbrain.arrays import Floats
+from warpbrain.inference.beliefs import belief
+from warpbrain.mesh.quality import principal_axes
+from warpbrain.physics.proposal import Patch, Proposal
+from warpbrain.simulation.model import Model
+from warpbrain.worlds.body.effects import Effect, Effects
+from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.mesh_error import MeshErrors
+from warpbrain.worlds.body.nuisances import SHAPES_EACH, SHAPES_OF
+
+#: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
+RADII = (0.8, 1.0, 1.25)
+#: How far neighbours are from the middle, in radii: where a patch has half of its height.
+_BESIDE = 0.5
+
+
+def places_about(model: Model, proposed: Proposal, step: float) -> list[Proposal]:
+    """Proposals a step [m] from another one along each principal axis, back on the surface if it is of that.
+
+    And at the same place with other radii.
+    """
+    assert proposed.elsewhere is not None and proposed.centre is not None and proposed.radius is not None
+    axes = principal_axes(model.mesh.points)
+    centres = [proposed.centre + sign * step * axis for axis in axes for sign in (-1.0, 1.0)]
+    if proposed.on_surface:
+        middles = middles_of_faces(model, proposed.patch)
+        nearest = {int(np.argmin(np.sum((middles - centre) ** 2, axis=1))) for centre in centres}
+        centres = [middles[number] for number in sorted(nearest)]
+    others = [proposed.elsewhere(proposed.centre, factor * proposed.radius) for factor in RADII if factor != 1.0]
+    return [*others, *(proposed.elsewhere(centre, proposed.radius) for centre in centres)]
+
+
+def middles_of_faces(model: Model, patch: Patch | None) -> Floats:
+    """Of faces (k, 3) [m] that are free, or that a patch is a part of."""
+    mesh = model.mesh
+    if patch is None:
+        held = np.asarray(model.constrained.reshape(-1, 3).all(axis=1))
+        faces = mesh.boundary[~held[mesh.boundary].any(axis=1)]
+    else:
+        faces = mesh.boundary[patch.held[mesh.boundary].all(axis=1)]
+    return np.asarray(mesh.points[faces].mean(axis=1))
+
+
+def columns_of_other_shapes(
+    at: Linearisation, effects: Sequence[Effect], coefficients: Sequence[Floats], mesh_errors: MeshErrors | None
+) -> Floats:
+    """Columns (n, k) of the family `SHAPES` about a state with effects that have these coefficients.
+
+    Each column moves a part of what acts, `belief("causes.shape")`, to a neighbouring place or another radius. Zero of
+    what is everywhere, is there or not, or has a course in time.
+    """
+    columns = np.zeros((len(at.sensors), SHAPES_OF, SHAPES_EACH))
+    made = Effects(at, mesh_errors=mesh_errors)
+    for number, (effect, z) in enumerate(zip(effects[:SHAPES_OF], coefficients, strict=False)):
+        proposed = effect.proposed
+        if proposed.elsewhere is None or proposed.is_there_or_not or proposed.over_time is not None:
+            continue
+        assert proposed.centre is not None and proposed.radius is not None
+        here = proposed.elsewhere(proposed.centre, proposed.radius)
+        others = places_about(at.system.model, proposed, _BESIDE * proposed.radius)
+        size = effect.coefficients(z)
+        moved = [
+            each.columns @ ((size - proposal.mean) / proposal.sd)
+            for each, proposal in zip(made.of([here, *others], columns_alone=True), [here, *others], strict=True)
+        ]
+        columns[:, number, : len(others)] = np.column_stack(moved[1:]) - moved[0][:, None]
+    return belief("causes.shape") * columns.reshape(len(columns), -1)
