@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.residual_stress import ResidualStress
 from warpbrain.physics.mechanisms.swelling import Swelling
+from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep, solve_equilibrium
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.relaxation import RelaxationOptions, relax_to_rest
@@ -137,6 +139,21 @@ def test_from_a_start_its_branch_is_gone_along(device: str) -> None:
     assert np.abs(found.u - expected.u).max() <= 1e-8 * np.abs(expected.u).max()
 
 
+def test_iterations_that_must_contract(device: str) -> None:
+    """From nearby they find the same; from far away they end at once, where others go on to wherever they come to."""
+    system = System(pushed(BRAIN, -2.0), device)
+    expected = EquilibriumSolver(system, EquilibriumOptions(tolerance=1e-10)).solve()
+    contracting = EquilibriumSolver(
+        system, EquilibriumOptions(tolerance=1e-10, contracts=True, min_load_step=1.0, pass_unstable=False)
+    )
+    found = contracting.solve(start=0.9 * expected.u)
+    assert np.abs(found.u - expected.u).max() <= 1e-8 * np.abs(expected.u).max()
+    far = -2.0 * expected.u
+    assert any(step.step < 1.0 for step in EquilibriumSolver(system).solve(start=far).history)
+    with pytest.raises(SolveError, match=r"after 0 Newton iterations.*a whole step of Newton's method leads too far"):
+        contracting.solve(start=far)
+
+
 def test_same_bits_every_time(device: str, precision) -> None:
     one, other = (
         solve_equilibrium(System(stretched(MATERIALS["ogden -4.7, coupled"], 0.2), device, precision.name))
@@ -180,6 +197,16 @@ def test_relaxation_recovers_from_a_step_that_inverts_elements(device: str) -> N
     expected = solve_equilibrium(System(model, device), EquilibriumOptions(tolerance=1e-10))
     found = relax_to_rest(System(model, device), RelaxationOptions(tolerance=1e-9))
     assert np.abs(found.u - expected.u).max() <= 1e-6 * 0.3
+
+
+@pytest.mark.parametrize("swing", [False, True])
+@pytest.mark.parametrize("time", [10.0, 1000.0])
+def test_relaxation_waits_for_stress_that_relaxes(time: float, swing: bool) -> None:
+    """Nothing but inertia is out of balance while a body creeps, and that is next to nothing."""
+    model = replace(pushed(BRAIN, -1.0), mechanisms=(Viscoelasticity(moduli=(2.0,), times=(time,)),))
+    expected = solve_equilibrium(System(model, "cpu"), EquilibriumOptions(tolerance=1e-10))
+    found = relax_to_rest(System(model, "cpu"), RelaxationOptions(time_step=1.0, swing=swing))
+    assert np.abs(found.u - expected.u).max() <= 1e-7 * np.abs(expected.u).max()
 
 
 @pytest.mark.parametrize("solve", [solve_equilibrium, relax_to_rest])

@@ -74,6 +74,10 @@ class EquilibriumOptions:
         What to do where the tangent is indefinite, at limit and branching points of the equilibrium path. True: go on
         downhill, as the damped body would (snap-through), and say so in the history. False: end there with an error
         that names it. Negative curvature is seen only along the search directions of CG, not in every direction.
+    contracts : bool
+        Whether Newton steps must be whole ones, and each expected to gain less energy than the one before it: where
+        they are not the load step is cut. Other iterations may come to an end far from where they began, or to none, as
+        they are rounded (Deuflhard 2011, Newton Methods for Nonlinear Problems, section 3.3).
     max_augmentations : int
         Solves in all to meet the constraints that penalties stand for (contact).
     """
@@ -87,6 +91,7 @@ class EquilibriumOptions:
     max_cg: int = 10_000
     preconditioner: str = "block-jacobi"
     pass_unstable: bool = True
+    contracts: bool = False
     max_augmentations: int = 20
 
     def __post_init__(self) -> None:
@@ -381,6 +386,7 @@ class EquilibriumSolver:
         closes = False
         # of forces without a potential the linear solver has a part of the tangent
         secants = None if all(term.conservative for term in system.terms) else Multisecant()
+        largest = np.inf
         for iteration in range(1, options.max_newton + 1):
             with self.clock.phase("internal forces"):
                 system.u.assign(u)
@@ -426,8 +432,12 @@ class EquilibriumSolver:
             predicted, remaining = secants.split(u, r) if secants is not None and near else (0.0, r)
             d, linear, shift, indefinite = self._descent(remaining, prescribed, moving, min(eta, 0.5), shift)
             d = d + predicted
+            if options.contracts and secants is None and not moving:
+                largest = self._require_less(r, d, largest)
             with self.clock.phase("line search"):
                 alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)
+            if options.contracts and alpha < 1.0:
+                raise _StepFailed(f"a whole step of Newton's method leads too far{self._worst_element()}")
             record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J, indefinite)
             # try the tangent itself again soon: only that converges quadratically
             shift = 0.1 * shift if shift > self._least_shift() else 0.0
@@ -438,6 +448,18 @@ class EquilibriumSolver:
             f"Newton's method did not converge in {options.max_newton} iterations "
             f"(relative residual {relative:.1e}, goal {self.tolerance:.1e}){self._worst_element()}"
         )
+
+    @staticmethod
+    def _require_less(r: Floats, d: Floats, largest: float) -> float:
+        """The energy [J] that a step (n, 3) [m] is expected to gain, which must be less than that of the one before it.
+
+        Of forces `r` (n, 3) [N]: half the square of Newton's decrement. Unlike lengths it is right where systems are
+        solved roughly, which leaves most of what is soft.
+        """
+        energy = 0.5 * float(np.vdot(r, d))
+        if not energy < largest:
+            raise _StepFailed(f"Newton's method does not contract: {largest:.1e} J to gain, then {energy:.1e} J")
+        return energy
 
     def _least_shift(self) -> float:
         """A multiple of the mass that is just felt beside the tangent: 0.1 % of its mean diagonal [1/s2]."""

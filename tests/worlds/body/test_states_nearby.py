@@ -46,3 +46,20 @@ def test_where_its_branch_ends_there_is_none(states: States) -> None:
     standing = states.solve(hanging(states, 0.5, down))
     with pytest.raises(SolveError, match="no equilibrium found beyond"):
         states.solve(hanging(states, 30.0, down), standing.u, known=standing.u)
+
+
+def test_rounding_does_not_decide_whether_there_is_one(states: States, known: SolvedState) -> None:
+    """Trials of a fit are far away and bold: found or not, and where, must not hang on the last bits of a start."""
+    rng, size = np.random.default_rng(2), float(np.abs(known.u).max())
+    free = ~known.system.model.constrained
+    for times in np.linspace(-6.0, 14.0, 21).tolist():
+        direction = rng.normal(size=3)
+        x, y, z = (direction / np.linalg.norm(direction)).tolist()
+        start, found = 1.5 * known.u, []
+        for moved in (0.0, 1e-7 * size):
+            near = start + moved * free * rng.normal(size=start.shape)
+            try:
+                found.append(states.solve(hanging(states, times, (x, y, z)), near, known=known.u).u)
+            except SolveError:
+                found.append(np.full_like(start, np.nan))
+        np.testing.assert_allclose(found[0], found[1], atol=1e-3 * size, equal_nan=True)

@@ -45,9 +45,8 @@ from warpbrain.worlds.body.surfaces import with_free_surfaces
 TOLERANCE = 1e-6
 #: Short steps after a load has come, as parts of the first time that counts.
 _SHORT = (1e-3, 0.1, 0.4)
-#: Newton iterations of a state beside a known one: at once, where steps of a fit are short and Newton's method has come
-#: to it or gone astray; and along the path from that, of 64 steps at most, so that a trial of no state ends soon.
-_AT_ONCE, _ALONG, _SHORTEST = 15, 60, 1.0 / 64.0
+#: Shortest step along the path from a known state: the step of a fit whose trial needs shorter ones is too bold.
+_SHORTEST = 1.0 / 16.0
 #: Most places at which modes are computed.
 _SITES = 400
 
@@ -247,18 +246,20 @@ class States:
         """The equilibrium under nodal forces (N, 3) [N]; beside a known state (N, 3) [m] the stable one on its branch.
 
         Where several are stable, or none is, iterations that go downhill end in one of them, or nowhere, as they are
-        rounded. So they are given up where a tangent is not positive definite, for the path from the known state; where
-        that turns or branches there is no such state.
+        rounded. So they are given up where a tangent is not positive definite, or steps do not contract, for the path
+        from the known state; where that turns or branches there is no such state. What is found does not depend on how
+        many iterations are allowed: where rounding decides that one more is taken it would be all or nothing.
         """
         factors = self._factors_of(system)
         if known is None:
             return EquilibriumSolver(system, options, factors=factors).solve(external, start)
-        stable = replace(options, pass_unstable=False)
+        most = round(options.max_newton / _SHORTEST)
+        stable = replace(options, pass_unstable=False, contracts=True, max_total_newton=most)
         try:
-            at_once = replace(stable, min_load_step=1.0, max_newton=_AT_ONCE)
+            at_once = replace(stable, min_load_step=1.0)
             return EquilibriumSolver(system, at_once, factors=factors).solve(external, start)
         except SolveError:
-            along = replace(stable, min_load_step=_SHORTEST, max_total_newton=_ALONG)
+            along = replace(stable, min_load_step=_SHORTEST)
             return EquilibriumSolver(system, along, factors=factors).solve(external, known)
 
     def _flowing(self, hypothesis: Hypothesis, system: System) -> Mechanism | None:
