@@ -54,6 +54,8 @@ _AGREES = 0.5
 #: By how much an error of the mesh changes that is worth going on [standard deviations: of the noise, all sensors
 #: together, and of what is not known of that error].
 _MATTERS = 0.3
+#: Change of the columns of laws that is none [standard deviations of the noise, all sensors together].
+_UNSEEN = 1e-3
 #: How often at most a search goes on with laws, error of the mesh, gross errors and noise of its result.
 _ROUNDS = 8
 #: After how many in succession it ends, too, that reach nothing better and leave no less: some go back and forth.
@@ -320,9 +322,11 @@ class FitSearch:
             self._shapes = shape_columns_about(at, self.effects, coefficients, self._base.states, self.mesh_errors)
             self._about = None
             change = self._base.model.whitened(self._shapes - before)
-            if float(np.sum(change * self._shape_change)) < 0.0:
-                self.taken *= 0.5
-            self._shape_change = change
+            # about the same point they are the same but for rounding, which undoes nothing
+            if float(np.linalg.norm(change)) > _UNSEEN:
+                if float(np.sum(change * self._shape_change)) < 0.0:
+                    self.taken *= 0.5
+                self._shape_change = change
         if self._shapes is None or np.array_equal(self._shapes, before):
             return
         columns = before + self.taken * (self._shapes - before)
@@ -547,8 +551,9 @@ class Fitter:
                 best = fit
                 break
             fit = replace(fit, unreached=gain, converged=False)
-            better = best is None or fit.log_evidence > best.log_evidence
-            worse = 0 if better or gain < least else worse + 1
+            # a search that ends where it began has the same evidence but for rounding, which must not tell how to go on
+            better = best is None or fit.log_evidence > best.log_evidence + _ENOUGH
+            worse = 0 if better or gain < least - _ENOUGH else worse + 1
             best, least = fit if better else best, min(gain, least)
             if worse == _WORSE or fit.marginal.log_evidence + belief("fits.trust") * gain < wanted:
                 break
