@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from metamorphic.changes import CHANGES, Changed
 from metamorphic.drawn import displacement, drawn_case
-from metamorphic.tries import BOUNDS, one_try
+from metamorphic.tries import BOUNDS, diagnose, one_try
 
 
 @pytest.mark.parametrize("change", list(CHANGES))
@@ -33,6 +34,20 @@ def test_an_estimate_is_the_same(change, verify):
 )
 def test_a_diagnosis_is_the_same(change, seed):
     assert not one_try(seed, "diagnose", change).wrong
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [42025, 42060, 42085])
+def test_a_diagnosis_is_continuous(seed):
+    """Data that are other in the tenth digit: no threshold, tie or count on the way makes more of it."""
+    case, rng = drawn_case(seed, cells=(3, 3)), np.random.default_rng(seed)
+    case = replace(case, mechanisms=(), boundaries=case.boundaries[:1])
+    [one] = case.recordings
+    other = one.displacement * (1.0 + 1e-10 * rng.choice([-1.0, 1.0], one.displacement.shape))
+    before, after = (diagnose(each) for each in (case, replace(case, recordings=(replace(one, displacement=other),))))
+    assert before.verdict == after.verdict
+    chances = [{each.kind: each.probability for each in found.ranking} for found in (before, after)]
+    assert chances[1] == pytest.approx(chances[0], abs=1e-5)
 
 
 def test_another_body_is_seen(monkeypatch):

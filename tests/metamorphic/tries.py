@@ -102,7 +102,7 @@ def _estimated(case: Case) -> tuple[np.ndarray, np.ndarray]:
     return posterior.theta, np.array([marginal.interval for marginal in posterior.marginals])
 
 
-def _diagnose(case: Case) -> Diagnosis:
+def diagnose(case: Case) -> Diagnosis:
     return Diagnosing(case, _DIAGNOSIS, "cpu").run()
 
 
@@ -116,4 +116,4 @@ def _diagnosed(seed: int, change: str, before: Diagnosis, after: Diagnosis) -> D
     return Difference(seed, change, "diagnose", size, told, first - second, ended=before.verdict)
 
 
-_RESULTS = {"estimate": _estimated, "diagnose": _diagnose}
+_RESULTS = {"estimate": _estimated, "diagnose": diagnose}

@@ -234,7 +234,9 @@ class HypothesisSearch:
             if subset is None or subset.refit is None or not subset.mechanisms:
                 continue
             reduced = superset.without(mechanism, self.base)
-            if reduced.marginal.log_evidence < subset.marginal.log_evidence + _BETTER:
+            # what neither search has come to counts for neither
+            reached = reduced.marginal.log_evidence - superset.refit.unreached
+            if reached < subset.refit.log_evidence + _BETTER:
                 continue
             refitted = self._fitted_less(superset, [mechanism], subset.refit.log_evidence + _BETTER)
             if refitted is None or refitted.refit is None:
