@@ -36,7 +36,7 @@ def estimate(*arguments) -> Ran:
 @pytest.fixture
 def short_chain(monkeypatch):
     """Where Laplace's approximation fails: what is looked at is what is written, not the last digit of it."""
-    monkeypatch.setattr(EstimationOptions, "__init__", partialmethod(EstimationOptions.__init__, chain=60))
+    monkeypatch.setattr(EstimationOptions, "__init__", partialmethod(EstimationOptions.__init__, chain=25))
 
 
 @pytest.mark.usefixtures("drawn", "short_chain")
