@@ -43,11 +43,8 @@ def draining(tmp_path_factory: pytest.TempPathFactory) -> Case:
     return write_slow(tmp_path_factory.mktemp("draining") / "case", CAUSES["drainage"])
 
 
-# stress that relaxes takes twice as long to be named as fluid that drains; its columns are tested beside both
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(name, marks=[] if name == "drainage" else [pytest.mark.slow]) for name in CAUSES],
-)
+# some ten seconds of a processor each; what moves when is tested without, too, and in test_courses.py
+@pytest.fixture(scope="module", params=[pytest.param(name, marks=pytest.mark.slow(10)) for name in CAUSES])
 def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Diagnosis]:
     if request.param == "drainage":
         case = request.getfixturevalue("draining")

@@ -74,6 +74,7 @@ def test_a_killed_worker_costs_only_time(cluster):
     assert bits(found) == bits(alone(work))
 
 
+@pytest.mark.slow(10)
 def test_what_workers_die_of_has_failed_and_the_rest_goes_on(monkeypatch):
     work = replace(job(2), samples=job(2).samples[:4])
     monkeypatch.setattr("warpbrain.ensemble.cluster.compute_part", deadly_parts.compute)
@@ -89,6 +90,7 @@ def test_what_workers_die_of_has_failed_and_the_rest_goes_on(monkeypatch):
     }
 
 
+@pytest.mark.slow(8)
 def test_local_starts_its_own_cluster(tmp_path):
     grey, white = (f'prior = "hyperelastic/{anatomy} matter"' for anatomy in ("grey", "white"))
     priors = ("mu = 1000.0", f"mu = 1000.0\n{grey}"), ("mu = 3000.0", f"mu = 3000.0\n{white}")
