@@ -40,11 +40,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Iterator[None]:
-    """Thousands of tests that are collected are no garbage: none is looked for among them, now or while they run."""
+    """Thousands of tests that are collected are no garbage: none is looked for among them, now or while they run, when
+    it is looked for less often than by default, where it took a fortieth of the time."""
     gc.disable()
     collected = yield
     gc.freeze()
     gc.enable()
+    gc.set_threshold(10_000)
     return collected
 
 
