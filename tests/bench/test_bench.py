@@ -73,6 +73,7 @@ def test_single_precision_moves_about_half():
     assert 0.5 < single / double < 0.6
 
 
+@pytest.mark.slow(6)
 def test_every_sample_is_written(monkeypatch, capsys, tmp_path):
     file = tmp_path / "bench.json"
     ran = bench(

@@ -15,6 +15,7 @@ def bench(monkeypatch, *arguments: str) -> int:
     return int(end.value.code or 0)
 
 
+@pytest.mark.slow(8)
 def test_every_stage_is_written(monkeypatch, capsys, tmp_path):
     write_sinking(tmp_path / "case")
     asked = ("--case", str(tmp_path / "case"), "--device", "cpu", "--runs", "1", "--out", str(tmp_path / "new"))

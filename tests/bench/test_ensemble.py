@@ -25,6 +25,7 @@ def bench(monkeypatch, capsys, *arguments: str) -> Ran:
     return Ran(int(end.value.code or 0), captured.out, captured.err)
 
 
+@pytest.mark.slow(3)
 def test_every_time_is_written(monkeypatch, capsys, tmp_path):
     file = tmp_path / "bench.json"
     ran = bench(monkeypatch, capsys, "--device", "cpu", "--batches", "1,2", "--json", str(file))

@@ -20,6 +20,7 @@ def bench(monkeypatch, capsys, *arguments: str) -> Ran:
     return Ran(int(end.value.code or 0), captured.out, captured.err)
 
 
+@pytest.mark.slow(3)
 def test_every_sample_is_written(monkeypatch, capsys, tmp_path):
     ran = bench(
         monkeypatch, capsys,

@@ -313,6 +313,7 @@ def test_mesh_has_the_volumes_of_the_labels(made):
     )
 
 
+@pytest.mark.slow(4)
 def test_mesh_is_the_same_again(made, tmp_path):
     again = meshed(write_ellipsoids(tmp_path / "a.nii"))
     np.testing.assert_array_equal(again.tetrahedra, made.tetrahedra)
@@ -426,6 +427,7 @@ def test_other_names_are_taken_as_they_are():
     assert parse_names(given)[5] == "grey matter"
 
 
+@pytest.mark.slow(5)
 def test_a_lattice_that_cannot_be_meshed_is_followed_by_another(tmp_path, monkeypatch):
     """Of the template in voxels of 4 mm one of a hundred sizes could not be meshed at all."""
     pytest.importorskip("mmgpy")

@@ -147,6 +147,7 @@ def test_a_motion_over_two_processes_has_the_bits_of_one(folder, tmp_path):
         np.testing.assert_array_equal(values, fields[1][name])
 
 
+@pytest.mark.slow(5)
 def test_the_sweep_has_its_deviations_and_keeps_failures(folder, tmp_path):
     # Ogden's fits to the farthest curves are not all stable
     ran = ensemble(folder, "--grid", "--steps", 1, "--model", "ogden", "--gp", "coregionalised", "--out", tmp_path)

@@ -36,7 +36,7 @@ def estimate(*arguments) -> Ran:
 @pytest.fixture
 def short_chain(monkeypatch):
     """Where Laplace's approximation fails: what is looked at is what is written, not the last digit of it."""
-    monkeypatch.setattr(EstimationOptions, "__init__", partialmethod(EstimationOptions.__init__, chain=60))
+    monkeypatch.setattr(EstimationOptions, "__init__", partialmethod(EstimationOptions.__init__, chain=25))
 
 
 @pytest.mark.usefixtures("drawn", "short_chain")
@@ -117,6 +117,7 @@ def test_too_few_points_to_know_what_else_may_act(tmp_path):
     assert json.loads((out / "estimate.json").read_text(encoding="utf-8"))["nothing_else"] is None
 
 
+@pytest.mark.slow(6)
 @pytest.mark.usefixtures("drawn")
 def test_a_sweep_goes_on_where_it_was_interrupted(folder, tmp_path):
     out = tmp_path / "out"

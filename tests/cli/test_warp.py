@@ -67,6 +67,7 @@ def moved_of(path: Path):
     return rows, before, after
 
 
+@pytest.mark.slow(4)
 def test_run_and_warp_write_the_same(folder, warped, tmp_path):
     done = warpbrain("warp", warped, "--out", tmp_path / "again", *asked(folder))
     assert done.status == 0, done.err
@@ -269,6 +270,7 @@ def test_what_is_outside_an_image_is_said(folder, warped, tmp_path):
     assert re.search(r"^note      T1\.nii\.gz: \d+ % of the body are outside of it$", done.out, re.MULTILINE)
 
 
+@pytest.mark.slow(6)
 def test_what_was_warped_before_is_not_overwritten(folder, warped, points_alone):
     given = ("--out", points_alone, "--points", folder / "F.mrk.json")
     done = warpbrain("warp", warped, *given)

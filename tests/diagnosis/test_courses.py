@@ -85,6 +85,7 @@ def between() -> Diagnosis:
     return diagnosed(without(truth, [recorded(truth, (80.0,), 40, reference=10.0)]))
 
 
+@pytest.mark.slow(4)
 def test_between_two_loaded_states_a_cause_is_what_changed(between: Diagnosis, verify) -> None:
     assert between.verdict == "named" and [one.kind for one in between.named] == ["gravity"]
     assert between.when is not None and between.when.sizes is not None

@@ -9,6 +9,7 @@ import pytest
 from slow_block import CAUSES, PERMEABILITY, TIMES, write_slow
 
 from warpbrain.arrays import Floats
+from warpbrain.cases.case import Case
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.onset import OF_ITS_OWN, Onset, always_there, onset_of
 from warpbrain.diagnosis.result import EXPLAINED, Diagnosis
@@ -37,13 +38,18 @@ pytestmark = pytest.mark.xdist_group("in time")
 _OPTIONS = DiagnosisOptions(candidates=("drainage", "viscoelasticity", "swelling"), mesh_error=False, draws=100)
 
 
-# stress that relaxes takes twice as long to be named as fluid that drains; its columns are tested beside both
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(name, marks=[] if name == "drainage" else [pytest.mark.slow]) for name in CAUSES],
-)
+@pytest.fixture(scope="module")
+def draining(tmp_path_factory: pytest.TempPathFactory) -> Case:
+    return write_slow(tmp_path_factory.mktemp("draining") / "case", CAUSES["drainage"])
+
+
+# some ten seconds of a processor each; what moves when is tested without, too, and in test_courses.py
+@pytest.fixture(scope="module", params=[pytest.param(name, marks=pytest.mark.slow(10)) for name in CAUSES])
 def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Diagnosis]:
-    case = write_slow(tmp_path_factory.mktemp("slow") / "case", CAUSES[request.param])
+    if request.param == "drainage":
+        case = request.getfixturevalue("draining")
+    else:
+        case = write_slow(tmp_path_factory.mktemp("slow") / "case", CAUSES[request.param])
     return request.param, Diagnosing(case, _OPTIONS, "cpu").run()
 
 
@@ -105,8 +111,8 @@ def _followed(states: States, hypothesis: Hypothesis) -> Floats:
     return states.observations.at(u, reactions, states.centre).computed
 
 
-def test_one_course_is_that_of_every_permeability(tmp_path) -> None:
-    states = States(write_slow(tmp_path / "case", CAUSES["drainage"]), "cpu")
+def test_one_course_is_that_of_every_permeability(draining: Case) -> None:
+    states = States(draining, "cpu")
     theta = declared(states.case, states.parameters)
     hypothesis = Hypothesis(theta, np.zeros(states.modes.shape[1]))
     base = states.solve(hypothesis)
@@ -123,10 +129,9 @@ def test_one_course_is_that_of_every_permeability(tmp_path) -> None:
         np.testing.assert_allclose(of_fit, effect.mean, atol=1e-6 * np.abs(effect.mean).max())
 
 
-def test_no_fluid_flows_in_a_body_at_rest(tmp_path) -> None:
+def test_no_fluid_flows_in_a_body_at_rest(draining: Case) -> None:
     """Where no load is declared there is nothing that fluid could carry, and drainage moves nothing."""
-    case = write_slow(tmp_path / "case", CAUSES["drainage"])
-    states = States(replace(case, boundaries=case.boundaries[:1]), "cpu")
+    states = States(replace(draining, boundaries=draining.boundaries[:1]), "cpu")
     base = states.solve(Hypothesis(declared(states.case, states.parameters), np.zeros(states.modes.shape[1])))
     effects = Effects(Linearisation(base.system, base.u, base.reactions, base.sensors))
     for effect in effects.of(dictionary_of(states.case, ("drainage",), len(TIMES)).proposals["drainage"]):

@@ -3,7 +3,7 @@
 import logging
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import deadly_parts
@@ -23,6 +23,11 @@ from warpbrain.terminal.quiet import start_warp_quietly
 WORKERS = 2
 #: Enough moduli for parts to be many.
 MODULI = tuple(500.0 + 150.0 * k for k in range(24))
+
+
+def on_the_cluster(test: Callable[..., None]) -> Callable[..., None]:
+    """Two processes, which take seconds to start and to end, serve all of these tests."""
+    return pytest.mark.slow(3)(pytest.mark.xdist_group("cluster")(test))
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +51,7 @@ def alone(work: Job) -> dict[int, Outcome]:
     return computed(work.system("cpu"), work.course(), list(work.samples), 5)
 
 
+@on_the_cluster
 def test_a_cluster_has_the_bits_of_the_local_run(cluster):
     work = job(4)
     with Cluster(cluster.scheduler_address, 1, "cpu", None, start_warp_quietly) as workers:
@@ -56,6 +62,7 @@ def test_a_cluster_has_the_bits_of_the_local_run(cluster):
     assert bits({o.number: o for part in parts for o in part}) == bits(alone(work))
 
 
+@on_the_cluster
 def test_a_killed_worker_costs_only_time(cluster):
     work = job(100)
     found: dict[int, Outcome] = {}
@@ -74,6 +81,7 @@ def test_a_killed_worker_costs_only_time(cluster):
     assert bits(found) == bits(alone(work))
 
 
+@pytest.mark.slow(10)
 def test_what_workers_die_of_has_failed_and_the_rest_goes_on(monkeypatch):
     work = replace(job(2), samples=job(2).samples[:4])
     monkeypatch.setattr("warpbrain.ensemble.cluster.compute_part", deadly_parts.compute)
@@ -89,6 +97,7 @@ def test_what_workers_die_of_has_failed_and_the_rest_goes_on(monkeypatch):
     }
 
 
+@pytest.mark.slow(8)
 def test_local_starts_its_own_cluster(tmp_path):
     grey, white = (f'prior = "hyperelastic/{anatomy} matter"' for anatomy in ("grey", "white"))
     priors = ("mu = 1000.0", f"mu = 1000.0\n{grey}"), ("mu = 3000.0", f"mu = 3000.0\n{white}")
@@ -101,6 +110,7 @@ def test_local_starts_its_own_cluster(tmp_path):
     assert (tmp_path / "one" / "samples.csv").read_bytes() == (tmp_path / "many" / "samples.csv").read_bytes()
 
 
+@on_the_cluster
 def test_a_worker_of_another_version_is_refused(cluster):
     work = job(1)
     other = Job(work.model, work.samples, steps=1, versions={**work.versions, "warp-lang": "0.0"})
@@ -111,6 +121,7 @@ def test_a_worker_of_another_version_is_refused(cluster):
         list(workers.outcomes(other))
 
 
+@on_the_cluster
 def test_a_device_that_no_worker_has(cluster):
     with pytest.raises(InputError, match="device 'cuda:7': not found on this machine"):
         Cluster(cluster.scheduler_address, 1, "cuda:7", None, start_warp_quietly)

@@ -43,7 +43,9 @@ def moved(model: Model, device: str, precision: str) -> System:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
-    ("formulation", "digits"), [("coupled", "double"), ("uncoupled", "double"), ("coupled", "single")]
+    ("formulation", "digits"),
+    # kernels of each take a second to compile
+    [("coupled", "double"), pytest.param("uncoupled", "double", marks=pytest.mark.slow(2)), ("coupled", "single")],
 )
 def test_a_motion_is_that_of_the_simulator(kind: str, formulation: str, digits: str, device: str) -> None:
     precision = PRECISIONS[digits]

@@ -18,7 +18,7 @@ from scipy.stats import binom, kstest
 from simulated_draws import Setting, ranks
 
 #: One process has the ranks of all settings, where tests are spread one by one.
-pytestmark = pytest.mark.xdist_group("calibration")
+pytestmark = [pytest.mark.slow(240), pytest.mark.xdist_group("calibration")]
 
 PROBABILITIES = (0.5, 0.9, 0.95)
 DRAWS = 60
@@ -57,7 +57,6 @@ def drawn() -> dict[Setting, np.ndarray]:
         return {setting: job.result() for setting, job in zip(every, jobs, strict=True)}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)
 def test_intervals_cover_as_often_as_they_say(setting, drawn, verify) -> None:
     for probability in PROBABILITIES:
@@ -71,7 +70,6 @@ def test_intervals_cover_as_often_as_they_say(setting, drawn, verify) -> None:
         )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("setting", OTHER_ELEMENTS, ids=lambda setting: setting.name)
 def test_intervals_with_the_error_of_the_mesh_are_not_too_narrow(setting, drawn, verify) -> None:
     """One error of the mesh, near what is believed of it, stands for all that are believed possible: more may cover."""
@@ -86,14 +84,12 @@ def test_intervals_with_the_error_of_the_mesh_are_not_too_narrow(setting, drawn,
         )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)
 def test_ranks_are_uniform(setting, drawn) -> None:
     for column in drawn[setting].T:
         assert kstest(column, "uniform").pvalue > 1e-3
 
 
-@pytest.mark.slow
 def test_intervals_of_all_settings_together_cover(drawn, verify) -> None:
     together = np.concatenate([drawn[setting].T.ravel() for setting in SETTINGS])
     for probability in PROBABILITIES:
@@ -106,10 +102,3 @@ def test_intervals_of_all_settings_together_cover(drawn, verify) -> None:
             "truths",
         )
     assert kstest(together, "uniform").pvalue > 1e-3
-
-
-def test_intervals_of_a_few_draws_cover() -> None:
-    found = ranks(Setting("block", 1, 0.4, 0.1), 8, 100)
-    for probability in PROBABILITIES:
-        assert excess(int(covered(found, probability)[0]), len(found), probability, 0.999) == 0.0
-    assert kstest(found[:, 0], "uniform").pvalue > 1e-3

@@ -14,7 +14,11 @@ from warpbrain.kernels.precision import DOUBLE, Precision
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
 
-every_preconditioner = pytest.mark.parametrize("preconditioner", PRECONDITIONERS)
+# Warp's sparse approximate inverse takes six seconds to compile, and is nobody's default
+every_preconditioner = pytest.mark.parametrize(
+    "preconditioner",
+    [pytest.param(name, marks=[pytest.mark.slow(4)] if name == "fsai" else []) for name in PRECONDITIONERS],
+)
 
 
 def system_with(k: float, m: float, device: str, precision: Precision = DOUBLE, clamped: bool = True) -> System:
@@ -61,6 +65,7 @@ def test_solution(preconditioner: str, precision: Precision, device: str) -> Non
     assert result.residual == pytest.approx(residual, rel=2e-3 if precision is DOUBLE else 0.3)
 
 
+@pytest.mark.slow(6)
 def test_preconditioners_help(device: str) -> None:
     iterations = {}
     for name in PRECONDITIONERS:

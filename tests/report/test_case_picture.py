@@ -132,7 +132,7 @@ def test_a_body_without_any_set(picture):
     assert len(places(image, LARGEST_SET)) == 0
 
 
-@pytest.mark.parametrize("size", [1.0, 1e-5])
+@pytest.mark.parametrize("size", [pytest.param(1.0, marks=pytest.mark.slow(2)), 1e-5])
 def test_one_tetrahedron(rendered, size):
     image = rendered(case_of(tetrahedron(size)))
     for row, column in ((0, 0), (0, 1), (1, 0)):
@@ -150,7 +150,7 @@ def test_where_nothing_can_be_rendered(tmp_path, monkeypatch):
 
 
 # each side once: to take one axis for the other would be seen
-@pytest.mark.parametrize(("right", "front"), [(True, False), (False, True)])
+@pytest.mark.parametrize(("right", "front"), [(True, False), pytest.param(False, True, marks=pytest.mark.slow(2))])
 def test_a_body_is_seen_from_where_there_is_most_to_see(rendered, right, front):
     """What is taken out lies at the outside, where another side would hide it."""
     plain = body()

@@ -149,7 +149,9 @@ def test_alone(name: str, device: str, monkeypatch: pytest.MonkeyPatch, verify: 
     check_alone(name, "tet4", device, monkeypatch, verify)
 
 
-@pytest.mark.parametrize("name", AVERAGED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow(4)] if name == "drainage" else []) for name in AVERAGED]
+)
 def test_alone_on_elements_that_do_not_lock(
     name: str, device: str, monkeypatch: pytest.MonkeyPatch, verify: Row
 ) -> None:

@@ -102,9 +102,9 @@ def relative(found: Floats, expected: Floats) -> float:
         (6, 0.02, "tet4", (BRANCHES, *LOADS[:2]), 4),
         (8, 1.0, "tet4", (SLOW,), 4),
         (6, 0.02, "tet4-averaged", (BRANCHES,), 4),
-        (1, 0.02, "tet4", (FLUID, BRANCHES), 4),
-        # implicit steps of two fields are dear
-        (5, 0.02, "tet4-averaged", (FLUID,), 2),
+        # steps of two fields are dear
+        pytest.param(1, 0.02, "tet4", (FLUID, BRANCHES), 4, marks=pytest.mark.slow(3)),
+        pytest.param(5, 0.02, "tet4-averaged", (FLUID,), 2, marks=pytest.mark.slow(4)),
         (5, 1.0, "tet4", (SLOW_FLUID,), 2),
     ],
 )
@@ -129,6 +129,7 @@ def test_against_motions_beside(
             verify(claim, "differences of motions", relative(found[at, k], total[at]), 1e-6)
 
 
+@pytest.mark.slow(4)
 def test_over_minutes_they_are_those_of_equilibria_in_a_row(device: str, verify: Row) -> None:
     """Without inertia, by another solver: Newton's method with a line search, a step of fluid and stress at a time."""
     still = block()

@@ -16,6 +16,9 @@ from febio.materials import constitution
 from febio.problem import Problem, read_problems
 from febio.tetrahedra import solve_on_tetrahedra
 
+# kernels of FEBio's laws, which nobody else uses, take ten seconds to compile
+pytestmark = pytest.mark.slow(1)
+
 DATA = Path(__file__).parent / "data"
 PROBLEMS = {problem.name: problem for problem in read_problems(DATA / "febio")}
 #: Bounds of the relative errors; the solution is homogeneous.

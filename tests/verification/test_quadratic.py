@@ -17,7 +17,13 @@ from warpbrain.simulation.system import System
 
 REGULAR = cube(2)
 MESH = distorted(REGULAR, 0.08, tissues=2)
-every_material = pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS.keys())
+#: What tells most of an element; kernels of each of the others take a second to compile.
+TWO = ("neo-hookean, coupled", "ogden -20, uncoupled")
+every_material = pytest.mark.parametrize(
+    "material",
+    [pytest.param(law, marks=[] if name in TWO else [pytest.mark.slow(2)]) for name, law in MATERIALS.items()],
+    ids=MATERIALS.keys(),
+)
 
 
 @pytest.fixture(params=QUADRATIC)
@@ -35,7 +41,7 @@ def quadratic(material: Material, elements: str, device: str, precision: str = "
 @every_material
 def test_patch(material: Material, elements: str, precision: Precision, device: str, verify: Row) -> None:
     """A linear displacement: no force inside, and the law's stress everywhere."""
-    if precision is SINGLE and material not in (MATERIALS["neo-hookean, coupled"], MATERIALS["ogden -20, uncoupled"]):
+    if precision is SINGLE and material not in [MATERIALS[name] for name in TWO]:
         pytest.skip("two laws tell what single precision does to the element")
     system = quadratic(material, elements, device, precision.name)
     nodes = system.quadratic

@@ -219,7 +219,10 @@ class Observations:
             for seen in self.recordings
         ]
         residual, rigid = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
-        by_u, by_R = (vstack([part[k] for part in parts], format="csr") for k in (2, 3))
+        # of one observation, which most estimates have, nothing is copied thousands of times
+        by_u, by_R = (
+            parts[0][k] if len(parts) == 1 else vstack([part[k] for part in parts], format="csr") for k in (2, 3)
+        )
         rows = Sensors(residual, residual, by_u, by_R, rigid, directions=rigid[:, :3].copy(), **self._rows)
         return replace(rows, computed=rows.answers_in_time(u[None], reactions[None])[:, 0])
 

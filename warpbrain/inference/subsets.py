@@ -28,11 +28,16 @@ from warpbrain.threads import in_threads
 
 @dataclass(frozen=True, eq=False)
 class ActingColumns:
-    """Columns of causes that act together with each block: numbers (k,), prior deviations (k,), mean (n,)."""
+    """Columns of causes that act together with each block, once with each of a combinations of their sizes.
+
+    `numbers` (k,), and the sum `mean` (n,) of their means.
+    `inverse` (a, k, k): `(Z^T Z + D^-1)^-1`, by which they are eliminated; `log_volume` (a,): `-ln |I + D Z^T Z| / 2`.
+    """
 
     numbers: Ints
-    deviations: Floats
     mean: Floats
+    inverse: Floats
+    log_volume: Floats
 
 
 class Blocks:
@@ -107,29 +112,33 @@ class Blocks:
         other._r, other._Z, other._means, other._mean = self._r, self._Z[columns], self._means, self._mean[keep]
         return other
 
-    def acting(self, members: Sequence[tuple[int, int]]) -> ActingColumns:
-        """Blocks by number, with the numbers of their sizes, as columns that act together with others."""
-        columns = [np.arange(self._first[k], self._first[k + 1]) for k, _ in members]
-        deviations = [np.full(self._width[k], self._sizes[k, size]) for k, size in members]
-        mean = self._means[self._mean[[k for k, _ in members]]].sum(axis=0)
-        return ActingColumns(np.concatenate(columns), np.concatenate(deviations), mean)
+    def acting(self, members: Sequence[int], sizes: Sequence[Sequence[int]]) -> ActingColumns:
+        """Blocks by number as columns that act together with others, once with each row (a, m) of numbers of sizes."""
+        columns = np.concatenate([np.arange(self._first[k], self._first[k + 1]) for k in members])
+        deviations = np.repeat(self._sizes[members, sizes], self._width[members], axis=1)
+        of_columns = self._gram[np.ix_(columns, columns)]
+        inverse = np.linalg.inv(of_columns + np.eye(len(columns)) * deviations[:, None] ** -2.0)
+        log_volume = 0.5 * np.linalg.slogdet(inverse)[1] - np.log(deviations).sum(axis=1)
+        return ActingColumns(columns, self._means[self._mean[members]].sum(axis=0), inverse, log_volume)
 
     def log_factors(self, acting: ActingColumns | None = None, start: int = 0) -> Floats:
         """Log Bayes factors (p - start, s) of blocks from `start` on, with every size.
 
-        `acting`: columns that act together with each block: factors are then of both together, against neither.
+        `acting`: columns that act together with each block: factors (a, p - start, s) are then of both together,
+        against neither, with each combination of its sizes.
         `start`: number of the first block.
         """
-        logs = np.empty((len(self) - start, self._sizes.shape[1]))
+        combinations = () if acting is None else (len(acting.inverse),)
+        logs = np.empty((*combinations, len(self) - start, self._sizes.shape[1]))
         widths = self._width[start:]
         # those of the same width are next to each other
         edges = np.flatnonzero(np.diff(widths)) + 1
         for low, high in zip([0, *edges.tolist()], [*edges.tolist(), len(widths)], strict=True):
-            logs[low:high] = self._log_factors_of_width(np.arange(start + low, start + high), acting)
+            logs[..., low:high, :] = self._log_factors_of_width(np.arange(start + low, start + high), acting)
         return logs
 
     def _log_factors_of_width(self, blocks: Ints, acting: ActingColumns | None) -> Floats:
-        """Log Bayes factors (b, s) of blocks that are all as wide as each other."""
+        """Log Bayes factors (b, s), or (a, b, s) beside what acts, of blocks that are all as wide as each other."""
         count, width = len(blocks), int(self._width[blocks[0]])
         at = slice(self._first[blocks[0]], self._first[blocks[-1] + 1])
         of_block, means, sizes = self._Z[at].reshape(count, width, -1), self._mean[blocks], self._sizes[blocks]
@@ -144,21 +153,20 @@ class Blocks:
         b = (of_block @ residual[:, :, None])[:, :, 0]
         log = 0.5 * (self._r @ self._r - np.sum(residual**2, axis=1)) * np.ones(count)
         if acting is not None:
-            of_acting = self._gram[acting.numbers]
-            A = np.linalg.inv(of_acting[:, acting.numbers] + np.diag(acting.deviations**-2.0))
-            projection = self._Z[acting.numbers] @ residual.T
-            C = of_acting[:, at].reshape(len(A), count, width)
-            AC = np.tensordot(A, C, 1)
-            M = M - np.einsum("kbi,kbj->bij", C, AC)
-            b = b - np.einsum("kbi,kb->bi", AC, np.broadcast_to(projection, (len(A), count)))
-            log = log + 0.5 * np.einsum("kb,kl,lb->b", projection, A, projection) * np.ones(count)
-            log = log + 0.5 * np.linalg.slogdet(A)[1] - np.log(acting.deviations).sum()
+            A, projection = acting.inverse, self._Z[acting.numbers] @ residual.T
+            # (k, b w) and, eliminated, (a, k, b w)
+            C = self._gram[acting.numbers, at]
+            AC = A @ C
+            of_pairs = AC.reshape(*AC.shape[:2], count, width).transpose(0, 2, 3, 1)
+            M = M - of_pairs @ C.reshape(-1, count, width).transpose(1, 0, 2)
+            b = b - np.sum(of_pairs * projection.T[:, None], axis=3)
+            log = log + 0.5 * np.sum(projection * (A @ projection), axis=1) + acting.log_volume[:, None]
         values, vectors = np.linalg.eigh(M)
-        projected = np.einsum("bij,bi->bj", vectors, b) ** 2
+        projected = (b[..., None, :] @ vectors) ** 2
         ratio = sizes[:, :, None] ** 2
-        explained = np.sum(ratio * projected[:, None] / (1.0 + ratio * np.maximum(values, 0.0)[:, None]), axis=2)
-        volume = np.sum(np.log1p(ratio * np.maximum(values, 0.0)[:, None]), axis=2)
-        return np.asarray(log[:, None] + 0.5 * (explained - volume))
+        grown = ratio * np.maximum(values, 0.0)[..., None, :]
+        explained = np.sum(ratio * projected / (1.0 + grown), axis=-1)
+        return np.asarray(log[..., None] + 0.5 * (explained - np.sum(np.log1p(grown), axis=-1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,10 +334,11 @@ def _add_pairs(sums: _Sums, blocks: Blocks, none: float, scale: float) -> list[C
         start = int(blocks.cause_edges[np.searchsorted(blocks.cause_edges, first, side="right")])
         if start == len(blocks):
             break
-        for size in range(blocks.log_weights.shape[1]):
+        sizes = range(blocks.log_weights.shape[1])
+        together = blocks.log_factors(blocks.acting([first], [[size] for size in sizes]), start)
+        for size in sizes:
             member = Member(int(blocks.cause[first]), int(blocks.place[first]), size)
-            together = blocks.log_factors(blocks.acting([(first, size)]), start)
-            logs = together + blocks.log_weights[start:] + blocks.log_weights[first, size] + none
+            logs = together[size] + blocks.log_weights[start:] + blocks.log_weights[first, size] + none
             best += sums.add_blocks(blocks, start, logs, (member,), scale)
     return best
 
@@ -339,9 +348,10 @@ def _add_triples(sums: _Sums, blocks: Blocks, none: float, pairs: Sequence[Confi
     number = {(c, p): k for k, (c, p) in enumerate(zip(blocks.cause.tolist(), blocks.place.tolist(), strict=True))}
     by_pair: dict[tuple[int, int], _Sums] = {}
     for pair in pairs:
-        rows = [(number[member.cause, member.place], member.size) for member in pair.members]
-        logs = blocks.log_factors(blocks.acting(rows)) + blocks.log_weights + none
-        logs = logs + sum(blocks.log_weights[row] for row in rows)
+        members = [number[member.cause, member.place] for member in pair.members]
+        sizes = [member.size for member in pair.members]
+        [factors] = blocks.log_factors(blocks.acting(members, [sizes]))
+        logs = factors + blocks.log_weights + none + blocks.log_weights[members, sizes].sum()
         extended = by_pair.setdefault((pair.members[0].cause, pair.members[1].cause), _Sums())
         extended.add_blocks(blocks, 0, logs, pair.members, pair.scale)
     merged: dict[frozenset[int], tuple[float, Configuration]] = {}

@@ -46,6 +46,7 @@ def scaled(case: Case, length: float, stiffness: float) -> Case:
     return replace(case, mesh=small, recordings=(moved,), tissues=tissues, registration=registration)
 
 
+@pytest.mark.slow(6)
 def test_loads_on_a_surface_are_as_probable(case: Case) -> None:
     """Of a body as stiff strains follow pressures, which are the same; registration is the one that is believed."""
     said, chances = [], []
@@ -60,6 +61,7 @@ def test_loads_on_a_surface_are_as_probable(case: Case) -> None:
         assert chances[1][names] == pytest.approx(chance, abs=1e-3)
 
 
+@pytest.mark.slow(6)
 def test_a_weight_is_found_as_it_is(case: Case) -> None:
     """Of a softer body strains follow its weight; nothing fitted, scored or said has a size of its own."""
     case = replace(case, registration=Registration(5e-4, 0.01))
