@@ -35,9 +35,6 @@ from warpbrain.recordings.registration import Registration
 Floats = NDArray[np.float64]
 
 SIDE = 0.03
-#: Equilibria of a chain: what 50 independent draws of it leave open of a rank (0.07) is little beside what 60 truths
-#: leave open of how ranks are spread (0.17 at 5 %), and shorter chains than a user's are no more often right.
-_CHAIN = 150
 #: A level that cuts elements, none of whose faces lies in it.
 DOWN = (0.3, 0.2, -1.0)
 
@@ -163,7 +160,6 @@ def ranks(setting: Setting, count: int, seed: int = 0) -> Floats:
             discretisation=Discretisation() if setting.other_elements else None,
             registration=setting.registration,
             samples=25,
-            chain=_CHAIN,
             seed=number,
         )
         seen = replace(case, recordings=(recording,), registration=registration)
