@@ -21,7 +21,7 @@ def test_a_larger_ball_is_one_with_a_larger_radius_in_part(small_diagnosis):
     proposed, z = ball.proposed, np.array([0.7])
     columns = columns_of_other_shapes(base.at, [ball], [z], base.mesh_errors)
     here, larger = base.effects.of([proposed, proposed.elsewhere(proposed.centre, 1.25 * proposed.radius)])
-    expected = belief("causes.shape") * 0.7 * (larger.columns[:, 0] - here.columns[:, 0])
+    expected = belief("causes.shape") / np.sqrt(SHAPES_EACH) * 0.7 * (larger.columns[:, 0] - here.columns[:, 0])
     np.testing.assert_allclose(columns[:, 1], expected, atol=1e-6 * np.abs(here.columns).max())
     twice = columns_of_other_shapes(base.at, [ball], [2.0 * z], base.mesh_errors)
     np.testing.assert_allclose(twice, 2.0 * columns, rtol=1e-9)

@@ -7,6 +7,7 @@ far that is more than their noise, and without these columns what is left of it 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -59,8 +60,8 @@ def columns_of_other_shapes(
 ) -> Floats:
     """Columns (n, k) of the family `SHAPES` about a state with effects that have these coefficients.
 
-    Each column moves a part of what acts, `belief("causes.shape")`, to a neighbouring place or another radius. Zero of
-    what is everywhere, is there or not, or has a course in time.
+    Each column moves a part of what acts to a neighbouring place or another radius, all together
+    `belief("causes.shape")`. Zero of what is everywhere, is there or not, or has a course in time.
     """
     columns = np.zeros((len(at.sensors), SHAPES_OF, SHAPES_EACH))
     made = Effects(at, mesh_errors=mesh_errors)
@@ -77,4 +78,4 @@ def columns_of_other_shapes(
             for each, proposal in zip(made.of([here, *others], columns_alone=True), [here, *others], strict=True)
         ]
         columns[:, number, : len(others)] = np.column_stack(moved[1:]) - moved[0][:, None]
-    return belief("causes.shape") * columns.reshape(len(columns), -1)
+    return belief("causes.shape") / math.sqrt(SHAPES_EACH) * columns.reshape(len(columns), -1)
