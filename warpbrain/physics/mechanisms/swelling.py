@@ -19,8 +19,8 @@ from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
 
 #: Where it is looked for: usual standard deviation of the change everywhere and in a ball, which may be 2.5 times as
-#: large (mannitol takes 5 %, oedema adds up to 30 %: `amount`), and radii of balls over that of the body, 12 to 27 mm of
-#: a brain.
+#: large (mannitol takes 5 %, oedema adds up to 30 %: `amount`), and radii of balls over that of the body, 12 to 27 mm
+#: of a brain.
 _EVERYWHERE, _SOMEWHERE, _RADII = 0.03, 0.05, (0.185, 0.277, 0.415)
 
 
