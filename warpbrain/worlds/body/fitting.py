@@ -29,6 +29,7 @@ from warpbrain.worlds.body.fit_columns import Layout, columns_about, shape_colum
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion
+from warpbrain.worlds.body.parameters import log_within_expected
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 from warpbrain.worlds.body.weighted_set import MeshShare, Refit, SetMarginal, evidence_of, excess_error, mesh_share_of
 
@@ -294,19 +295,21 @@ class FitSearch:
         covariance = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
         # how far the best point would move if the search had gone on is uncertainty, too
         shift = covariance @ (W.T @ self._noise.whitened(linear)) - z
-        parts = self._layout.effects
+        coefficients = tuple(z[part] for part in self._layout.effects)
+        covariances = tuple(covariance[p, p] + np.outer(shift[p], shift[p]) for p in self._layout.effects)
         return Refit(
             self.effects,
             self.state,
             z[:q],
-            tuple(z[part] for part in parts),
-            tuple(covariance[part, part] + np.outer(shift[part], shift[part]) for part in parts),
+            coefficients,
+            covariances,
             linear - columns @ z,
             linear,
             columns,
             evidence,
             self.converged,
             self._mesh_share,
+            within_expected=sum(map(log_within_expected, self.effects, coefficients, covariances)),
         )
 
     def update_shapes(self) -> None:

@@ -13,6 +13,9 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.words import Smallest, Value
 from warpbrain.worlds.body.effects import Effect
 
+#: Least probability of being in a range that is told from none.
+_LEAST = 1e-30
+
 
 def scanned_values(effects: Sequence[Effect], weights: Floats) -> tuple[Value, ...]:
     """Parameters that differ among proposals, such as a level or a radius: mean and standard deviation over them.
@@ -52,6 +55,26 @@ def values_of(effect: Effect, z: Floats, covariance: Floats) -> tuple[Value, ...
         if sd > 0.0:
             result.append(Value(name, value, sd, unit))
     return tuple(result)
+
+
+def log_within_expected(effect: Effect, z: Floats, covariance: Floats) -> float:
+    """Log probability that numbers of a mechanism are in the ranges outside of which they are not expected at all.
+
+    The evidence of a prior that ends there is so many times that of one that does not (Gelfand, Smith and Lee 1992):
+    a fit must not explain recordings by a Poisson ratio of 0.1.
+
+    `z` (k,), `covariance` (k, k): of the coefficients, a posteriori.
+    """
+    from scipy.stats import norm
+
+    total, specs = 0.0, effect.proposed.make(effect.proposed.mean).parameters()
+    for value in values_of(effect, z, covariance):
+        spec = specs.get(value.name)
+        if spec is None or spec.kind != "number" or spec.expectation is None or spec.expectation.is_normal:
+            continue
+        ends = (np.array([spec.expectation.quantile(q) for q in (0.0, 1.0)]) - value.value) / value.sd
+        total += float(np.log(max(norm.cdf(ends[1]) - norm.cdf(ends[0]), _LEAST)))
+    return total
 
 
 def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:

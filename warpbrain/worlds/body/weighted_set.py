@@ -124,6 +124,8 @@ class Refit:
     mesh_share: MeshShare | None = None
     #: By how much the linear model says that a better point exists [nats], if the search has not come to it.
     unreached: float = 0.0
+    #: Log probability of its mechanisms' numbers to be in the ranges that are expected of them.
+    within_expected: float = 0.0
 
     @property
     def log_evidence(self) -> float:
@@ -131,7 +133,7 @@ class Refit:
 
         That a linear model would explain everything beyond the last state that has an equilibrium is no evidence.
         """
-        return self.marginal.log_evidence - self.unreached
+        return self.marginal.log_evidence - self.unreached + self.within_expected
 
     def without(self, number: int, base: Base) -> Refit:
         """The same point without one of its effects, from which a set without it is fitted."""

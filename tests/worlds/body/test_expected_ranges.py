@@ -1,0 +1,37 @@
+"""Numbers of mechanisms that are not expected at all are no explanation."""
+
+import numpy as np
+import pytest
+
+from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.parameters import log_within_expected, numbers_of
+
+
+def _compressibility() -> Effect:
+    return Effect(mechanisms()["compressibility"].about_law(0.45, 0.4), np.zeros(3), np.ones((3, 1)))
+
+
+@pytest.mark.parametrize(("z", "sd"), [(0.0, 0.1), (-0.5, 0.2), (-3.0, 0.3), (-3.0, 0.8)])
+def test_it_is_the_part_of_the_posterior_within_the_range(z, sd):
+    """As of draws of the number itself, to first order."""
+    effect = _compressibility()
+    spec = mechanisms()["compressibility"].parameters()["poisson"]
+    low, high = spec.expectation.quantile(0.0), spec.expectation.quantile(1.0)
+    at = np.array([z])
+    middle = numbers_of(effect, at)["poisson"][0]
+    slope = (numbers_of(effect, at + 0.01 * sd)["poisson"][0] - numbers_of(effect, at - 0.01 * sd)["poisson"][0]) / 0.02
+    draws = middle + slope * np.random.default_rng(0).normal(size=200_000)
+    part = np.mean((draws > low) & (draws < high))
+    assert np.exp(log_within_expected(effect, at, np.array([[sd**2]]))) == pytest.approx(part, abs=0.02)
+
+
+def test_a_poisson_ratio_of_a_tenth_is_none():
+    z = np.array([(-np.log(0.8) + np.log(0.1)) / 0.4])
+    assert log_within_expected(_compressibility(), z, np.array([[0.01]])) < -20.0
+
+
+def test_what_has_no_range_is_as_probable_as_it_was(small_diagnosis):
+    [weight, *_] = small_diagnosis.search.candidates.effects["gravity"]
+    k = len(weight.proposed.mean)
+    assert log_within_expected(weight, np.full(k, 5.0), np.eye(k)) == 0.0
