@@ -3,9 +3,11 @@
 import logging
 import os
 import signal
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+import dask
 import deadly_parts
 import distributed
 import pytest
@@ -17,7 +19,7 @@ from material_point import LAWS
 from warpbrain.ensemble.cluster import Cluster, local_workers
 from warpbrain.ensemble.sample import Outcome
 from warpbrain.ensemble.workers import Job
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, SolveError
 from warpbrain.terminal.quiet import start_warp_quietly
 
 WORKERS = 2
@@ -30,11 +32,16 @@ def on_the_cluster(test: Callable[..., None]) -> Callable[..., None]:
     return pytest.mark.slow(3)(pytest.mark.xdist_group("cluster")(test))
 
 
+def local_cluster(workers: int) -> distributed.LocalCluster:
+    return distributed.LocalCluster(
+        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
+    )
+
+
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[distributed.LocalCluster]:
-    with distributed.LocalCluster(
-        n_workers=WORKERS, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs="CRITICAL"
-    ) as cluster:
+    # a machine that is busy takes longer to start a worker again than Dask waits for it by default
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "10 minutes"}), local_cluster(WORKERS) as cluster:
         yield cluster
 
 
@@ -76,7 +83,7 @@ def test_a_killed_worker_costs_only_time(cluster):
                 killed.append(process[busy])
                 os.kill(process[busy], signal.SIGKILL)
         # the cluster has grown a new worker, or is about to
-        workers._client.wait_for_workers(WORKERS, timeout=30)
+        workers._client.wait_for_workers(WORKERS, timeout=300)
         assert killed[0] not in workers._client.run(os.getpid).values()
     assert bits(found) == bits(alone(work))
 
@@ -86,7 +93,11 @@ def test_what_workers_die_of_has_failed_and_the_rest_goes_on(monkeypatch):
     work = replace(job(2), samples=job(2).samples[:4])
     monkeypatch.setattr("warpbrain.ensemble.cluster.compute_part", deadly_parts.compute)
     monkeypatch.setattr("warpbrain.ensemble.cluster.parts_of", lambda job, *_: [job.part({0, 1}), job.part({2, 3})])
-    with Cluster("local:1", 1, "cpu", None, start_warp_quietly) as workers:
+    # by default a worker that takes more than 15 s to start again is given up; here any that has to start again
+    with (
+        dask.config.set({"distributed.deploy.lost-worker-timeout": "1 ms"}),
+        Cluster("local:1", 1, "cpu", None, start_warp_quietly) as workers,
+    ):
         found = {outcome.number: outcome for part in workers.outcomes(work) for outcome in part}
     assert sorted(found) == [0, 1, 2, 3]
     assert [number for number, outcome in found.items() if outcome.failed] == [deadly_parts.DEADLY]
@@ -95,6 +106,36 @@ def test_what_workers_die_of_has_failed_and_the_rest_goes_on(monkeypatch):
     assert {number: value == expected[number] for number, value in bits(found).items()} == {
         number: number != deadly_parts.DEADLY for number in range(4)
     }
+
+
+@pytest.mark.slow(5)
+@pytest.mark.parametrize("lost", ["worker", "scheduler"])
+def test_what_does_not_come_back_ends_with_what_is_done_and_how_to_go_on(monkeypatch, lost):
+    work = replace(job(2), samples=job(2).samples[:4])
+    monkeypatch.setattr("warpbrain.ensemble.cluster.compute_part", deadly_parts.compute_without_end)
+    monkeypatch.setattr("warpbrain.ensemble.cluster.parts_of", lambda job, *_: [job.part({k}) for k in (0, 2, 1, 3)])
+    if lost == "worker":
+        monkeypatch.setattr("warpbrain.ensemble.cluster._ABSENCE", 2.0)
+    with local_cluster(1) as cluster, Cluster(cluster.scheduler_address, 1, "cpu", None, start_warp_quietly) as workers:
+        outcomes = workers.outcomes(work)
+        assert [outcome.number for outcome in next(outcomes)] == [0]
+        # then the worker has the result of sample 2, computes 1 and has not begun 3
+        while not any(future.status == "finished" for future in workers._pending):
+            time.sleep(0.01)
+        cluster.workers[0].close_gracefully()  # it does not start a worker again
+        os.kill(cluster.workers[0].pid, signal.SIGKILL)
+        if lost == "scheduler":
+            cluster.close()
+        why = {"worker": "there was no worker for 2 s", "scheduler": "Client lost the connection to the scheduler.*"}
+        told = rf"samples came back, sample [123] did not: {why[lost]}\. The same command goes on with what is missing"
+        with pytest.raises(SolveError, match=rf"--dask {cluster.scheduler_address}: 1 of 4 {told}"):
+            next(outcomes)
+
+
+@pytest.mark.slow(5)
+def test_workers_that_die_before_any_part():
+    with pytest.raises(InputError, match="--dask local:1: workers die of being asked what device they have"):
+        Cluster("local:1", 1, "cpu", None, deadly_parts.die)
 
 
 @pytest.mark.slow(8)
