@@ -16,12 +16,17 @@ class Expectation:
     is_logarithmic: bool = False
 
     def quantile(self, part: float) -> float:
-        """The number below which a part of the distribution lies, 0 < part < 1."""
+        """The number below which a part of the distribution lies, 0 <= part <= 1."""
         if self.is_normal:
             from scipy.special import ndtri
 
             part = float(ndtri(part))
         return self.start * self.width**part if self.is_logarithmic else self.start + self.width * part
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The lowest and the highest number that is expected at all; infinite of a normal distribution."""
+        return self.quantile(0.0), self.quantile(1.0)
 
     def __str__(self) -> str:
         return self.words

@@ -48,7 +48,7 @@ def beyond_in_words(kind: str, value: Value) -> str:
         return ""
     low, high = spec.above, spec.below
     if spec.expectation is not None and not spec.expectation.is_normal:
-        low, high = spec.expectation.quantile(0.0), spec.expectation.quantile(1.0)
+        low, high = spec.expectation.ends
     if low <= value.value <= high:
         return ""
     span = f"above {low:g}" if high == math.inf else f"below {high:g}" if low == -math.inf else f"{low:g} to {high:g}"

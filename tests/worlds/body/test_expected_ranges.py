@@ -17,7 +17,7 @@ def test_it_is_the_part_of_the_posterior_within_the_range(z, sd):
     """As of draws of the number itself, to first order."""
     effect = _compressibility()
     spec = mechanisms()["compressibility"].parameters()["poisson"]
-    low, high = spec.expectation.quantile(0.0), spec.expectation.quantile(1.0)
+    low, high = spec.expectation.ends
     at = np.array([z])
     middle = numbers_of(effect, at)["poisson"][0]
     slope = (numbers_of(effect, at + 0.01 * sd)["poisson"][0] - numbers_of(effect, at - 0.01 * sd)["poisson"][0]) / 0.02

@@ -16,7 +16,6 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.nuisances import (
     LAW,
-    SHAPES,
     Nuisances,
     field_columns,
     law_columns,
@@ -54,10 +53,9 @@ class Layout:
         linear[tissue] = linear[field] = False
         nonlinear = np.concatenate([~linear, np.ones(width_of(effects), dtype=bool)])
         law, parts = nuisances.part(LAW), column_slices(effects, count)
-        shapes = np.r_[law, nuisances.part(SHAPES)]
         parameters = ((shared_parameter(effect), part.start) for effect, part in zip(effects, parts, strict=True))
         shared = tuple((law.start + each.column, at, each.ratio) for each, at in parameters if each is not None)
-        return cls(tissue, field, slice(count, None), shapes, parts, linear, nonlinear, shared)
+        return cls(tissue, field, slice(count, None), nuisances.shapes, parts, linear, nonlinear, shared)
 
     def without_shared(self, z: Floats) -> Floats:
         """The same tissue as coordinates (q + e + k,) with shared parameters in the coefficients of effects alone."""
@@ -116,9 +114,7 @@ def with_shapes_about(fit: Refit, nuisances: Nuisances, sensors: Sensors, base: 
         at = fit.state.linearised(sensors)
     except SolveError:
         return columns
-    columns[:, Layout.of(nuisances, columns.shape[1], ()).shapes] = shape_columns_about(
-        at, fit.effects, fit.coefficients, base.states, base.mesh_errors
-    )
+    columns[:, nuisances.shapes] = shape_columns_about(at, fit.effects, fit.coefficients, base.states, base.mesh_errors)
     return columns
 
 

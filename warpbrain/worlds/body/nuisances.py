@@ -13,7 +13,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Ints
 from warpbrain.estimation.finer_mesh import Discretisation
 from warpbrain.estimation.parameters import Gaussian
 from warpbrain.estimation.registration import moved_back, moved_back_columns, registration_of
@@ -36,9 +36,9 @@ LAW = "shape of the law"
 _ALWAYS = ("tissue.volume", "tissue.exponent")
 #: The family of what is not known of the mesh's error, and that of mechanisms' shares of it, which only fits have.
 UNKNOWN_MESH, MESH_SHARE = "mesh, unknown", "mesh, of mechanisms"
-#: The family of what is not known of the shape of mechanisms in one place, which only fits have: of how many of them,
-#: and how many columns each has, of two other radii and of a neighbour to both sides along each axis.
-SHAPES, SHAPES_OF, SHAPES_EACH = "shape of mechanisms", 3, 8
+#: The family of what is not known of the shape of mechanisms in one place, which only fits have; the number of
+#: mechanisms, and of modes of each: two other radii, and a neighbouring place to both sides along each axis.
+SHAPES, SHAPED_EFFECTS, SHAPE_MODES = "shape of mechanisms", 3, 8
 #: Exponent of what stiffens in both directions.
 _STIFFENS = 8.0
 #: Step of a difference in `theta`.
@@ -77,10 +77,15 @@ class Nuisances:
         changed[:, self.part(name)] = of_family
         return changed
 
+    @property
+    def shapes(self) -> Ints:
+        """Where the columns of the shapes of laws and of mechanisms are."""
+        return np.r_[self.part(LAW), self.part(SHAPES)]
+
     def without_shapes_of(self, number: int, columns: Floats) -> Floats:
         """Columns (n, q + k), or coordinates (1, q + k), without the shape of one of some mechanisms."""
-        of_each = np.split(columns[:, self.part(SHAPES)], SHAPES_OF, axis=1)
-        if number >= SHAPES_OF:
+        of_each = np.split(columns[:, self.part(SHAPES)], SHAPED_EFFECTS, axis=1)
+        if number >= SHAPED_EFFECTS:
             return columns
         return self.with_family(
             SHAPES, columns, np.hstack([*of_each[:number], *of_each[number + 1 :], 0.0 * of_each[0]])
@@ -135,7 +140,7 @@ def nuisances_at(
         LAW: law_columns(effects, states),
         "known loads": _known_loads(at),
         "registration": sensors.rigid * registration_of(states.case).deviations,
-        SHAPES: np.zeros((len(sensors), SHAPES_OF * SHAPES_EACH)),
+        SHAPES: np.zeros((len(sensors), SHAPED_EFFECTS * SHAPE_MODES)),
     }
     if mesh_errors is not None:
         error = mesh_errors.error

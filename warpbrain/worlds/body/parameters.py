@@ -65,15 +65,15 @@ def log_within_expected(effect: Effect, z: Floats, covariance: Floats) -> float:
 
     `z` (k,), `covariance` (k, k): of the coefficients, a posteriori.
     """
-    from scipy.stats import norm
+    from scipy.special import ndtr
 
     total, specs = 0.0, effect.proposed.make(effect.proposed.mean).parameters()
     for value in values_of(effect, z, covariance):
         spec = specs.get(value.name)
         if spec is None or spec.kind != "number" or spec.expectation is None or spec.expectation.is_normal:
             continue
-        ends = (np.array([spec.expectation.quantile(q) for q in (0.0, 1.0)]) - value.value) / value.sd
-        total += float(np.log(max(norm.cdf(ends[1]) - norm.cdf(ends[0]), _LEAST)))
+        low, high = ((end - value.value) / value.sd for end in spec.expectation.ends)
+        total += math.log(max(float(ndtr(high) - ndtr(low)), _LEAST))
     return total
 
 

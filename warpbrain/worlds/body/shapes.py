@@ -20,7 +20,7 @@ from warpbrain.simulation.model import Model
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
-from warpbrain.worlds.body.nuisances import SHAPES_EACH, SHAPES_OF
+from warpbrain.worlds.body.nuisances import SHAPE_MODES, SHAPED_EFFECTS
 
 #: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
 RADII = (0.8, 1.0, 1.25)
@@ -58,14 +58,14 @@ def middles_of_faces(model: Model, patch: Patch | None) -> Floats:
 def columns_of_other_shapes(
     at: Linearisation, effects: Sequence[Effect], coefficients: Sequence[Floats], mesh_errors: MeshErrors | None
 ) -> Floats:
-    """Columns (n, k) of the family `SHAPES` about a state with effects that have these coefficients.
+    """Change of what is recorded (n, k) by each mode of shape of mechanisms, about a state with these coefficients.
 
     Each column moves a part of what acts to a neighbouring place or another radius, all together
     `belief("causes.shape")`. Zero of what is everywhere, is there or not, or has a course in time.
     """
-    columns = np.zeros((len(at.sensors), SHAPES_OF, SHAPES_EACH))
+    columns = np.zeros((len(at.sensors), SHAPED_EFFECTS, SHAPE_MODES))
     made = Effects(at, mesh_errors=mesh_errors)
-    for number, (effect, z) in enumerate(zip(effects[:SHAPES_OF], coefficients, strict=False)):
+    for number, (effect, z) in enumerate(zip(effects[:SHAPED_EFFECTS], coefficients, strict=False)):
         proposed = effect.proposed
         if proposed.elsewhere is None or proposed.is_there_or_not or proposed.over_time is not None:
             continue
@@ -78,4 +78,4 @@ def columns_of_other_shapes(
             for each, proposal in zip(made.of([here, *others], columns_alone=True), [here, *others], strict=True)
         ]
         columns[:, number, : len(others)] = np.column_stack(moved[1:]) - moved[0][:, None]
-    return belief("causes.shape") / math.sqrt(SHAPES_EACH) * columns.reshape(len(columns), -1)
+    return belief("causes.shape") / math.sqrt(SHAPE_MODES) * columns.reshape(len(columns), -1)
