@@ -187,7 +187,7 @@ class Confirming:
         return weighed or {name: weighted_set.without(name, self.search.base) for name in every}
 
     def _confirm(self, weighted_set: WeightedSet, name: str, others: WeightedSet) -> Confirmation:
-        effect = weighted_set.effects[weighted_set.mechanisms.index(name)]
+        effect = weighted_set.effects[weighted_set.acting.index(name)]
         held_out = self._held_out[effect.proposed.centre is not None]
         full, reduced = self.predict(weighted_set, held_out), self.predict(others, held_out)
         patterns = self._patterns(others, held_out, effect.columns.shape[1], (name,))

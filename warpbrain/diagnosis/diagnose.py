@@ -37,6 +37,7 @@ from warpbrain.seconds import Seconds
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.body.causes import RESISTANCE
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, require_observable, screened
+from warpbrain.worlds.body.sources import without_sources
 from warpbrain.worlds.body.surfaces import with_sets_that_act
 from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.options import DiagnosisOptions
@@ -198,7 +199,9 @@ class Diagnosing:
         if not named:
             return None
         assert best.refit is not None
-        case = with_sets_that_act(search.base.states.case_of(best.refit.state.hypothesis), self.case.mesh)
+        hypothesis = best.refit.state.hypothesis
+        declarable = replace(hypothesis, mechanisms=without_sources(hypothesis.mechanisms))
+        case = with_sets_that_act(search.base.states.case_of(declarable), self.case.mesh)
         return replace(case, name=f"{case.name}-explained", title=f"{case.title}, with {' and '.join(named)}")
 
     def _fit(
@@ -296,8 +299,9 @@ def _onset(search: HypothesisSearch, decision: Decision, best: WeightedSet, unkn
     if not best.mechanisms:
         return onset_of(search.base, None, False, best.marginal.model, best.residual)
     name = best.mechanisms[0]
-    effect = best.effects[0]
-    if (sizes := size_over_time(effect, *best.coefficients[0])) is not None:
+    number = best.acting.index(name)
+    effect = best.effects[number]
+    if (sizes := size_over_time(effect, *best.coefficients[number])) is not None:
         return Onset(0.0, sizes.seconds[-1], None, AS_IT_CHANGES, sizes=sizes)
     model, residual = about_base(search, best, name)
     cause = always_there(search.causes, name)

@@ -111,8 +111,8 @@ def next_measurements(
     `first`, `second`: sets with the first and with the second mechanism. `names` (str, str).
     """
     pairs = zip((first, second), names, strict=True)
-    effects = tuple(weighted_set.effects[weighted_set.mechanisms.index(name)] for weighted_set, name in pairs)
-    z = first.coefficients[first.mechanisms.index(names[0])][0]
+    effects = tuple(weighted_set.effects[weighted_set.acting.index(name)] for weighted_set, name in pairs)
+    z = first.coefficients[first.acting.index(names[0])][0]
     discrimination = _Discrimination(base, effects[0], effects[1], z, first.marginal.scale)
     measurements = [
         Measurement("nothing more", discrimination.as_recorded()),

@@ -20,7 +20,7 @@ from warpbrain.inference.subsets import Blocks
 from warpbrain.physics.proposal import Varying
 from warpbrain.physics.words import label
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.causes import BodyCauses, unknown_cause
+from warpbrain.worlds.body.causes import BodyCauses, unknown_fields
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.parameters import mechanism_numbers
 from warpbrain.worlds.body.time_courses import TimeCourse, factor_of_rows, finite_times, time_courses
@@ -73,7 +73,7 @@ def onset_of(base: Base, cause: Cause | None, in_time: bool, model: GaussianMode
         return Onset(0.0, float(times[0]), None, OF_ITS_OWN)
     courses = time_courses(base.states.times)
     per_interval = np.bincount([course.interval for course in courses])
-    cause = cause or unknown_cause(base, [np.ones((len(residual), 1))])
+    cause = cause or unknown_fields(base)
     evidence = [
         _log_evidence(cause, factor_of_rows(course, base.at.sensors), model, residual)
         - float(np.log(per_interval[course.interval]))

@@ -45,7 +45,7 @@ class Ranking:
         if cause.kind is not Kind.PHYSICS:
             why = "no physics" if cause.kind is Kind.NOT_PHYSICS else ""
             return Ranked(cause.name, False, gain, probability, 0.0, None, (), None, None, "", why)
-        number = weighted_set.mechanisms.index(cause.name)
+        number = weighted_set.acting.index(cause.name)
         effect = weighted_set.effects[number]
         weights = self._weights(cause, weighted_set)
         scanned = self._search.causes.effects[cause.name]
@@ -99,9 +99,7 @@ def about_base(search: HypothesisSearch, weighted_set: WeightedSet, name: str) -
     There the columns of all places of the mechanism are known; about a fit they differ.
     """
     base, model = search.base, weighted_set.marginal.model
-    others = [
-        effect for kind, effect in zip(weighted_set.mechanisms, weighted_set.effects, strict=True) if kind != name
-    ]
+    others = [effect for kind, effect in zip(weighted_set.acting, weighted_set.effects, strict=True) if kind != name]
     columns = np.column_stack(
         [base.nuisances.columns, *(effect.columns for effect in others), weighted_set.marginal.excess]
     )

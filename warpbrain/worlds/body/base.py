@@ -24,13 +24,14 @@ from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_er
 from warpbrain.inference.noise import noise_factor, outliers, scales
 from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
-from warpbrain.worlds.body.effects import Effects, SolvedSwitches
+from warpbrain.worlds.body.effects import Effect, Effects, SolvedSwitches
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
 from warpbrain.worlds.body.sensors import Sensors, noise_of, tracked_points
+from warpbrain.worlds.body.sources import sources
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
-from warpbrain.worlds.body.unknown import Strains, body_forces, fields, resistances
+from warpbrain.worlds.body.unknown import body_forces, fields, resistances
 
 #: Gauss-Newton steps at most; the last one moves tissue and field by less than this [standard deviations].
 _STEPS, _CONVERGED = 6, 0.5
@@ -52,7 +53,7 @@ class Base:
     effects: Effects
     nuisances: Nuisances
     unknown: dict[str, Floats]  # (n, k), columns of unknown fields, of 1 m
-    strains: Strains  # unknown, in one place
+    sources: tuple[Effect, ...]  # unknown, in one place
     resistance: Floats  # (n, k), unknown, of tissue; see `resistances`
     #: Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
     model: GaussianModel
@@ -145,7 +146,6 @@ class BaseFinder:
     def _base(self, declared: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
         linear = _LinearModel(self, state, errors)
         unknown = fields(linear.at, linear.lengths, linear.body_forces)
-        strains = Strains(linear.at, self._spacing * belief("unknown.place"), self._spacing)
         nuisances, factor = linear.nuisances, linear.noise_factor
         if errors is not None and not self._without_nuisances:
             smooth = unknown[next(iter(unknown))]
@@ -159,7 +159,7 @@ class BaseFinder:
             linear.effects,
             nuisances,
             unknown,
-            strains,
+            sources(linear.at, self._spacing, linear.typical_noise),
             resistances(linear.at, self.states.times, other_volume(self.states), next(iter(unknown.values()))),
             GaussianModel(factor, nuisances.columns),
             _noises(linear, resolved=errors is None or self._without_nuisances),

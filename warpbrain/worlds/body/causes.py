@@ -50,11 +50,10 @@ class BodyCauses:
         return next(cause for cause in self.causes if cause.name == name)
 
     def effect(self, member: Member) -> Effect | None:
-        """The effect of a mechanism at a place with a size; None if the cause is no mechanism."""
+        """The effect of a mechanism, or a source, at a place with a size; None of what acts linearly."""
         cause = self.causes[member.cause]
-        if cause.kind is not Kind.PHYSICS:
-            return None
-        return scaled(self.effects[cause.name][member.place], float(cause.sizes[member.size]))
+        effect = self.effects[cause.name][member.place]
+        return None if effect.proposal is None else scaled(effect, float(cause.sizes[member.size]))
 
     def columns(self, member: Member) -> Floats:
         """Columns (n, k) of one standard deviation."""
@@ -105,6 +104,9 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
     unit_sizes = np.ones(len(sizes))
     causes: list[Cause] = []
     for kind, of_kind in candidates.effects.items():
+        if kind == UNKNOWN:
+            causes.append(_unknown_cause(base, of_kind))
+            continue
         places = tuple(Place(effect.columns, effect.mean if effect.mean.any() else None) for effect in of_kind)
         if of_kind[0].proposal is None:
             causes.append(
@@ -115,12 +117,6 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
         has_mean = any(place.mean is not None for place in places)
         sized, log_prior = unit_sizes if has_mean else sizes, math.log(belief(of_kind[0].proposal.odds))
         causes.append(Cause(kind, places, log_prior, sized, shares=_shares(of_kind)))
-    # setting in at any recorded time, or changing from one to the next as mechanisms may
-    times, sensors = base.states.times, base.at.sensors
-    factors = [factor_of_rows(course, sensors)[:, None] for course in main_courses(times)]
-    if len(times) > 1:
-        factors.append(modes_of_rows(times, sensors))
-    causes.append(unknown_cause(base, [factor for factor in factors if factor.any()]))
     return BodyCauses(tuple(causes), candidates.effects)
 
 
@@ -141,23 +137,44 @@ def _shares(effects: Sequence[Effect]) -> Floats | None:
     return None if (shares == 1.0).all() else shares / shares.sum()
 
 
-def unknown_cause(base: Base, factors: Sequence[Floats]) -> Cause:
-    """Tissue whose resistance changes in time, unknown fields of every kind and length, or a strain in one place.
+def unknown_effects(base: Base) -> tuple[Effect, ...]:
+    """Tissue whose resistance changes in time if there are several, unknown fields of every kind, and sources."""
+    # setting in at any recorded time, or changing from one to the next as mechanisms may
+    times, sensors = base.states.times, base.at.sensors
+    factors = [factor_of_rows(course, sensors)[:, None] for course in main_courses(times)]
+    if len(times) > 1:
+        factors.append(modes_of_rows(times, sensors))
+    linear = [base.typical_noise * base.resistance] if base.resistance.size else []
+    linear += _fields(base, [factor for factor in factors if factor.any()])
+    zero = np.zeros(len(sensors))
+    return (*(Effect(None, zero, columns) for columns in linear), *base.sources)
 
-    `factors` (n, r): of the modes of each course of a field on the rows. In one place there is only the first.
-    """
-    noise, in_one_place = base.typical_noise, belief("unknown.in_one_place")
-    fields = [Place(noise * with_courses(columns, factor)) for columns in base.unknown.values() for factor in factors]
-    strains = [Place(noise * factors[0][:, :1] * columns) for columns in base.strains.columns]
-    groups = [(fields, 1.0 - in_one_place), (strains, in_one_place)]
+
+def _fields(base: Base, factors: Sequence[Floats]) -> list[Floats]:
+    """Columns of unknown fields; `factors` (n, r): of the modes of each course on the rows."""
+    return [base.typical_noise * with_courses(columns, f) for columns in base.unknown.values() for f in factors]
+
+
+def _unknown_cause(base: Base, effects: Sequence[Effect]) -> Cause:
+    """Of `unknown_effects`."""
+    places = [Place(effect.columns) for effect in effects]
+    # fields, and sources of each length, are as probable as others of their kind
+    lengths = np.array([0.0 if effect.proposal is None else effect.proposed.radius for effect in effects])
+    _, groups, counts = np.unique(lengths, return_inverse=True, return_counts=True)
+    counts[0] -= bool(base.resistance.size)
+    local = belief("unknown.in_one_place")
+    shares = np.where(lengths == 0.0, 1.0 - local, local / (len(counts) - 1)) / counts[groups]
     if base.resistance.size:
-        resistance = belief("unknown.resistance")
-        groups = [(places, (1.0 - resistance) * share) for places, share in groups]
-        groups.insert(0, ([Place(noise * base.resistance, label=RESISTANCE)], resistance))
-    # strains come last, see `with_refined_strain`
-    shares = np.concatenate([np.full(len(places), share / max(len(places), 1)) for places, share in groups])
-    places = tuple(place for group, _ in groups for place in group)
-    return Cause(UNKNOWN, places, math.log(belief("causes.unknown")), beliefs("unknown.sizes"), Kind.UNKNOWN, shares)
+        shares *= 1.0 - belief("unknown.resistance")
+        shares[0], places[0] = belief("unknown.resistance"), replace(places[0], label=RESISTANCE)
+    sizes = beliefs("unknown.sizes")
+    return Cause(UNKNOWN, tuple(places), math.log(belief("causes.unknown")), sizes, Kind.UNKNOWN, shares)
+
+
+def unknown_fields(base: Base) -> Cause:
+    """Unknown fields of every kind, as they would be if they acted all the time."""
+    places = tuple(map(Place, _fields(base, [np.ones((len(base.residual), 1))])))
+    return Cause(UNKNOWN, places, math.log(belief("causes.unknown")), beliefs("unknown.sizes"), Kind.UNKNOWN)
 
 
 def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]:

@@ -151,6 +151,10 @@ class Candidates:
     rejected: dict[str, str]
     source: Effects  # which made them at a state
 
+    def with_effects(self, kind: str, effects: tuple[Effect, ...]) -> Candidates:
+        """With those of one kind more."""
+        return replace(self, effects=self.effects | {kind: effects})
+
 
 def candidates_at(
     dictionary: Dictionary,

@@ -30,12 +30,12 @@ from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads, one_thread_of_blas
 from warpbrain.worlds.body.base import Base, BaseFinder
-from warpbrain.worlds.body.causes import UNKNOWN, BodyCauses, causes_of, not_physics_at, visible
+from warpbrain.worlds.body.causes import UNKNOWN, BodyCauses, causes_of, not_physics_at, unknown_effects, visible
 from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit, candidates_at, dictionary_of
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
-from warpbrain.worlds.body.placing import Weighing, moved_about_fit, with_refined_places, with_refined_strain
+from warpbrain.worlds.body.placing import Weighing, moved_about_fit, with_refined_places
 from warpbrain.worlds.body.states import States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
@@ -120,14 +120,10 @@ class HypothesisSearch:
             for candidate in in_threads(partial(weighing.weigh, screened=model), _most_probable(screened)):
                 _keep_better(self._sets, candidate)
         # a local cause that has been missed by half a cell seems to do nothing
-        singles = [
-            candidate for candidate in self._sets.values() if len(candidate.mechanisms) == len(candidate.names) == 1
-        ]
+        singles = [candidate for candidate in self._sets.values() if len(candidate.acting) == len(candidate.names) == 1]
         refine = partial(with_refined_places, base, spacing=self.spacing, source=base.effects)
         for candidate in in_threads(refine, singles):
             self._sets[candidate.names] = candidate
-        if (unknown := self._sets.get(frozenset((UNKNOWN,)))) is not None:
-            self._sets[unknown.names] = with_refined_strain(self.base, unknown, self._visible, self.spacing)
 
     def fit(self, alone: bool = False) -> None:
         """Fit sets, and weigh supersets of those that are fitted, until no fit can be expected to change the verdict.
@@ -229,9 +225,9 @@ class HypothesisSearch:
         """
         superset = self._sets[names]
         assert superset.refit is not None
-        for mechanism in superset.mechanisms:
+        for mechanism in superset.acting:
             subset = self._sets.get(names - {mechanism})
-            if subset is None or subset.refit is None or not subset.mechanisms:
+            if subset is None or subset.refit is None or not subset.acting:
                 continue
             reduced = superset.without(mechanism, self.base)
             # what neither search has come to counts for neither
@@ -257,7 +253,7 @@ class HypothesisSearch:
         begun, reduced = superset.refit, superset
         assert begun is not None
         for mechanism in mechanisms:
-            begun = begun.without(reduced.mechanisms.index(mechanism), self.base)
+            begun = begun.without(reduced.acting.index(mechanism), self.base)
             reduced = reduced.without(mechanism, self.base)
         screened = reduced.marginal
         try:
@@ -436,7 +432,7 @@ def screened(
                 base.effects,
                 not_physics_at(base.at, base.nuisances),
                 lambda kind: listener.stage(f"candidate: {kind}"),
-            )
+            ).with_effects(UNKNOWN, unknown_effects(base))
         search = HypothesisSearch(base, candidates, spacing, listener)
         with timed("screening"):
             search.screen()

@@ -51,6 +51,8 @@ _GROWTH = 1e-4
 #: Columns that one thread computes at a time: of dense forces, and of sparse ones at most; few of these are in so many
 #: parts.
 _TOGETHER, _TOGETHER_SPARSE, _PARTS = 64, 128, 16
+#: Part of sparse forces that is not zero above which a dense product is faster.
+_DENSE = 0.1
 
 
 class HeldSurface:
@@ -345,6 +347,8 @@ class Linearisation:
         if "_rows" in self.__dict__ or self._equilibria >= len(self.sensors):
             rows, which = self._rows
             answers = np.empty((len(rows), count))
+            if issparse(forces) and forces.nnz > _DENSE * np.prod(forces.shape):
+                forces = forces.toarray()
             together = min(_TOGETHER_SPARSE, 1 + count // _PARTS) if issparse(forces) else _TOGETHER
             fill_columns(answers, lambda columns: rows @ forces[:, columns], together)
             return answers[which]

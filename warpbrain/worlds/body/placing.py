@@ -145,6 +145,7 @@ class Weighing:
         self, base: Base, causes: BodyCauses, sizes: tuple[int, int], about: WeightedSet | None = None
     ) -> None:
         self._base, self._causes, self._sizes = base, causes, sizes
+        self._names: tuple[str, ...] = () if about is None else about.acting
         self._acting: tuple[Effect, ...] = () if about is None else about.effects
         self._residual = base.residual if about is None else about.residual
         self._columns = base.model.columns if about is None else about.columns
@@ -172,22 +173,23 @@ class Weighing:
 
     def _weigh_at(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
         """The same as if its best configuration stood for all places."""
-        effects, residual, columns, further, result = self._at(hypothesis.best.members, hypothesis.best.scale)
+        acting, effects, residual, columns, further, result = self._at(hypothesis.best.members, hypothesis.best.scale)
         values, log_prior = scales()
         log_screened = screened.with_columns(further).log_marginal(residual, values, log_prior)
         log_evidence = hypothesis.log_evidence + result.log_evidence - log_screened
-        return WeightedSet(replace(hypothesis, log_evidence=log_evidence), effects, residual, columns, result)
+        return WeightedSet(replace(hypothesis, log_evidence=log_evidence), acting, effects, residual, columns, result)
 
     def _acting_with(
         self, members: tuple[Member, ...], scale: float
-    ) -> tuple[tuple[Effect, ...], Floats, Floats, Floats, SetMarginal]:
-        """Effects, residual (n,) and columns (n, q + k) with members of a hypothesis, columns (n, k) of these alone.
+    ) -> tuple[tuple[str, ...], tuple[Effect, ...], Floats, Floats, Floats, SetMarginal]:
+        """Names of what acts, effects, residual (n,) and columns (n, q + k) with members of a hypothesis.
 
-        And the evidence, whose sum begins at a scale of the noise.
+        And columns (n, k) of these alone, and the evidence, whose sum begins at a scale of the noise.
         """
         causes, effects = self._causes, [self._causes.effect(member) for member in members]
         linear = [causes.columns(member) for member, effect in zip(members, effects, strict=True) if effect is None]
         added = [effect for effect in effects if effect is not None]
+        names = [causes.causes[m.cause].name for m, effect in zip(members, effects, strict=True) if effect is not None]
         residual = self._residual - sum(
             (causes.mean(member) for member in members), start=np.zeros(len(self._residual))
         )
@@ -198,7 +200,7 @@ class Weighing:
         before, after = np.hsplit(self._columns, [split])
         columns = np.column_stack([before, *linear, after, *(effect.columns for effect in added)])
         columns, result = evidence_of(self._base, columns, residual, scale, self._sizes)
-        return (*self._acting, *added), residual, columns, further, result
+        return (*self._names, *names), (*self._acting, *added), residual, columns, further, result
 
 
 def with_refined_places(
@@ -239,39 +241,6 @@ def with_refined_places(
             log_share=candidate.log_share + log_share,
         ).with_evidence(candidate.hypothesis.log_evidence + gain)
     return replace(candidate, refined=True)
-
-
-def with_refined_strain(base: Base, candidate: WeightedSet, causes: BodyCauses, spacing: float) -> WeightedSet:
-    """The set of the unknown alone, with a strain in one place moved to the best place in its cell of the scan.
-
-    Unchanged if the unknown is a field throughout the body. Mechanisms are placed as finely (`with_refined_places`),
-    and would otherwise be preferred for their places alone.
-
-    `causes`: those that were weighed. `spacing`: between the places of the scan [m].
-    """
-    [member] = candidate.hypothesis.best.members
-    unknown, strains = causes.causes[member.cause], base.strains
-    number = member.place - (len(unknown.places) - len(strains.centres))
-    if number < 0:
-        return candidate
-    columns = causes.columns(member)
-    others = candidate.columns[:, : -columns.shape[1]]
-    # how many times a column of 1 m it is, on each row: its size and its course in time
-    unit = strains.columns[number]
-    squares = (unit**2).sum(axis=1)
-    factor = np.divide((columns * unit).sum(axis=1), squares, where=squares > 0.0, out=np.zeros(len(unit)))
-    elsewhere = strains.at_centres(strains.centres[number] + _cube(base, 0.5 * spacing)[1:])
-    tried = [columns, *(factor[:, None] * each for each in elsewhere)]
-    without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
-    nothing = np.zeros(len(candidate.residual))
-    logs = log_densities_of(without, candidate.residual, base.points, [(nothing, each) for each in tried])
-    gain, log_share = _summed_over_cell(logs)
-    moved = np.column_stack([others, tried[int(np.argmax(logs))]])
-    moved, refined = evidence_of(base, moved, candidate.residual, candidate.marginal.scale, candidate.marginal.sizes)
-    candidate = replace(
-        candidate, columns=moved, marginal=refined, log_share=candidate.log_share + log_share, refined=True
-    )
-    return candidate.with_evidence(candidate.hypothesis.log_evidence + gain)
 
 
 def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:

@@ -76,7 +76,7 @@ def far_from_linear(sets: Sequence[WeightedSet], bend: float) -> WeightedSet | N
     """
     nothing = next(candidate.hypothesis.log_evidence for candidate in sets if not candidate.names)
     best = max(candidate.hypothesis.log_evidence for candidate in sets)
-    single = [s for s in sets if len(s.names) == 1 and s.mechanisms and s.refit is None and not s.failure]
+    single = [s for s in sets if len(s.names) == 1 and s.acting and s.refit is None and not s.failure]
     likely = max(single, key=lambda candidate: candidate.hypothesis.log_evidence, default=None)
     if likely is None or likely.hypothesis.log_evidence + bend * (best - nothing) < best:
         return None
@@ -155,7 +155,7 @@ def _subset_first(
     """
     count = len(chosen.names) - 1
     subsets = [candidate for candidate in sets if candidate.names < chosen.names and len(candidate.names) == count]
-    subsets = [candidate for candidate in subsets if candidate.mechanisms and not candidate.failure]
+    subsets = [candidate for candidate in subsets if candidate.acting and not candidate.failure]
     if chosen.refit is not None or not subsets or any(candidate.names in expanded for candidate in subsets):
         return chosen
     return subsets[0]

@@ -1,5 +1,5 @@
-"""Unknown causes as columns over sensors: smooth random fields of body force, eigenstress, traction and pressure, a
-strain in one place, or tissue whose resistance changes in time.
+"""Unknown causes as columns over sensors: smooth random fields of body force, eigenstress, traction and pressure,
+or tissue whose resistance changes in time.
 
 Each field is a sum of Gaussian patches with independent coefficients, a Gaussian process of that length. An eigenstress
 `s` acts within the body: its nodal forces `-V s grad N` have no net force and no moment. Fluids, and what slides along
@@ -49,7 +49,7 @@ def _weights(
     """Sites (s, 3) [m], and Gaussians (N, s) about them at the nodes, of height 1, times the shares of nodes (N,)."""
     points = at.system.model.mesh.points
     sites = places[spread_points(places, length if spacing is None else spacing, 700)]
-    return sites, shares[:, None] * _gaussians(points, sites, length)
+    return sites, shares[:, None] * gaussians(points, sites, length)
 
 
 def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ...]:
@@ -87,54 +87,17 @@ def _free_of_surface(at: Linearisation) -> Bools:
 def eigenstresses(at: Linearisation, length: float) -> Floats:
     """Columns (n, k) of an eigenstress of a length [m], all six components."""
     mesh = at.system.model.mesh
-    columns = _stress_patches(at, mesh.centres[spread_points(mesh.centres, length, 700)], length)
+    sites = mesh.centres[spread_points(mesh.centres, length, 700)]
+    columns = stress_patches(at, mesh.points + at.u, sites, length)
     return _visible_modes(columns, at.sensors.is_displacement)
 
 
-class Strains:
-    """A strain in one place, at each of several a spacing [m] apart; Gaussian, of a length [m].
-
-    Five components are deviatoric stresses, the sixth is a growth. As strains they are alike: hardly compressible
-    tissue turns a pressure into next to no strain, and a stress whose six components are alike never swells. So each
-    moves what was recorded as much as the others, in the mean over all places. Of 1 m root mean square over these.
-    """
-
-    def __init__(self, at: Linearisation, length: float, spacing: float) -> None:
-        mesh = at.system.model.mesh
-        self._at, self._length = at, length
-        self.centres = mesh.centres[spread_points(mesh.centres, spacing, 700)]  # (s, 3) [m]
-        parts = self._parts(self.centres)
-        rows = at.sensors.is_displacement
-        rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
-        sizes = [max(_root_mean_square(part[rows]), 1e-300) for part in parts]
-        count = sum(part.shape[1] for part in parts)
-        self._units = [np.sqrt(part.shape[1] / count) / size for part, size in zip(parts, sizes, strict=True)]
-        self.columns = self._joined(parts)  # (n, 6) of each place
-
-    def at_centres(self, centres: Floats) -> tuple[Floats, ...]:
-        """Columns (n, 6) of the same strain at each of other centres (k, 3) [m]."""
-        return self._joined(self._parts(centres))
-
-    def _joined(self, parts: Sequence[Floats]) -> tuple[Floats, ...]:
-        columns = np.concatenate([unit * part for unit, part in zip(self._units, parts, strict=True)], axis=1)
-        return tuple(np.ascontiguousarray(columns[:, :, k]) for k in range(columns.shape[2]))
-
-    def _parts(self, centres: Floats) -> list[Floats]:
-        """Columns (n, 5, k) of stresses without a trace, and (n, 1, k) of growth."""
-        at = self._at
-        stresses = _stress_patches(at, centres, self._length).reshape(len(at.sensors), len(_PAIRS), len(centres))
-        basis = np.linalg.svd(np.ones((1, 3)))[2][1:]
-        deviatoric = np.concatenate([np.einsum("ij,njs->nis", basis, stresses[:, :3]), stresses[:, 3:]], axis=1)
-        weights = _gaussians(at.system.model.mesh.centres, centres, self._length)
-        return [deviatoric, at.answers_of_elements(at.growth_forces, weights)[:, None]]
-
-
-def _root_mean_square(columns: Floats) -> float:
+def root_mean_square(columns: Floats) -> float:
     """Of what all components (k) together move, over rows and places: of columns (n, k) or (n, k, s)."""
     return float(np.sqrt(np.mean(np.sum(columns**2, axis=1))))
 
 
-def _gaussians(points: Floats, sites: Floats, length: float) -> Floats:
+def gaussians(points: Floats, sites: Floats, length: float) -> Floats:
     """Gaussians (m, s) of a length [m] about sites (s, 3) at points (m, 3) [m]."""
     from scipy.spatial.distance import cdist
 
@@ -186,23 +149,25 @@ def stress_beside_held(at: Linearisation, length: float) -> Floats:
     if not len(held):
         return np.zeros((len(at.sensors), 0))
     # two lengths away a patch has an eighth of its stress
-    columns = _stress_patches(at, sites[cKDTree(held).query(sites)[0] < 2.0 * length], length)
+    near = sites[cKDTree(held).query(sites)[0] < 2.0 * length]
+    columns = stress_patches(at, model.mesh.points + at.u, near, length)
     rows = at.sensors.is_displacement
-    size = _root_mean_square(columns[rows]) if rows.any() and columns.size else 0.0
+    size = root_mean_square(columns[rows]) if rows.any() and columns.size else 0.0
     return columns / size if size > 0.0 else np.zeros((len(at.sensors), 0))
 
 
-def _stress_patches(at: Linearisation, sites: Floats, length: float) -> Floats:
-    """Response (n, 6 s) to each component of a stress of 1 Pa, spread about sites (s, 3) with a Gaussian."""
-    mesh = at.system.model.mesh
-    weights = _gaussians(mesh.centres, sites, length)
-    # on deformed elements, where a symmetric stress has no moment
-    forces = _unit_stresses((mesh.points + at.u)[at.system.tetrahedra])
+def stress_patches(at: Linearisation, points: Floats, sites: Floats, length: float) -> Floats:
+    """Response (n, 6 s) to each component of a stress of 1 Pa, spread about sites (s, 3) with a Gaussian.
+
+    In elements whose nodes are at points (N, 3): where these are deformed a symmetric stress has no moment.
+    """
+    weights = gaussians(at.system.model.mesh.centres, sites, length)
+    forces = unit_stresses(points[at.system.tetrahedra])
     columns = [at.answers_of_elements(forces[component], weights) for component in range(len(_PAIRS))]
     return np.concatenate(columns, axis=1)
 
 
-def _unit_stresses(corners: Floats) -> Floats:
+def unit_stresses(corners: Floats) -> Floats:
     """Internal forces (6, m, 4, 3) of stresses of 1 Pa (Frobenius) in elements with these corners (m, 4, 3)."""
     edges = corners[:, 1:] - corners[:, :1]
     volumes = np.abs(np.linalg.det(edges)) / 6.0
@@ -241,4 +206,4 @@ def _visible_modes(columns: Floats, rows: Bools) -> Floats:
     total = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
     kept = min(int(np.searchsorted(total, 1.0 - belief("unknown.cut"))) + 1, int(belief("unknown.modes")))
     modes = columns @ (columns[rows].T @ (vectors[:, :kept] / np.maximum(sizes[:kept], 1e-300)))
-    return np.asarray(modes / max(_root_mean_square(modes[rows]), 1e-300))
+    return np.asarray(modes / max(root_mean_square(modes[rows]), 1e-300))

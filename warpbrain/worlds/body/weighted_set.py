@@ -246,9 +246,11 @@ class WeightedSet:
     """A set of causes and the linear model about its best point."""
 
     hypothesis: Hypothesis
-    effects: tuple[Effect, ...]  # of its mechanisms, in the order of the hypothesis
+    #: Names of its causes that act through an equilibrium: mechanisms, and the unknown where it is a source.
+    acting: tuple[str, ...]
+    effects: tuple[Effect, ...]  # of these
     residual: Floats  # (n,), with all coordinates at zero
-    #: (n, q + e + k): of nuisances, of causes that are no mechanisms (unknown fields, and what is no physics), and of
+    #: (n, q + e + k): of nuisances, of causes that act linearly (unknown fields, and what is no physics), and of
     #: effects.
     columns: Floats
     marginal: SetMarginal
@@ -268,7 +270,7 @@ class WeightedSet:
 
     @property
     def mechanisms(self) -> tuple[str, ...]:
-        """Names of its mechanisms, in the order of `effects`."""
+        """Names of its mechanisms."""
         return self.hypothesis.of_kind(Kind.PHYSICS)
 
     @property
@@ -313,7 +315,7 @@ class WeightedSet:
 
     def without(self, mechanism: str, base: Base) -> WeightedSet:
         """The set less one of its mechanisms, linear about the same point, with an evidence to be compared with its."""
-        number = self.mechanisms.index(mechanism)
+        number = self.acting.index(mechanism)
         columns = base.nuisances.without_shapes_of(number, self.columns)
         columns = np.delete(columns, self.slices[number], axis=1)
         residual, shared = self.residual + self.effects[number].mean, shared_parameter(self.effects[number])
@@ -329,5 +331,6 @@ class WeightedSet:
             kinds=self.hypothesis.kinds[:at] + self.hypothesis.kinds[at + 1 :],
             log_evidence=self.hypothesis.log_evidence - self.marginal.log_evidence + reduced.log_evidence,
         )
+        acting = self.acting[:number] + self.acting[number + 1 :]
         effects = self.effects[:number] + self.effects[number + 1 :]
-        return WeightedSet(hypothesis, effects, residual, columns, reduced)
+        return WeightedSet(hypothesis, acting, effects, residual, columns, reduced)

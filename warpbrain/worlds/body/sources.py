@@ -1,0 +1,147 @@
+"""What has no name and acts in one place: a force there, one that runs around it, or a stress, Gaussian.
+
+To first order in its extent over the distance of the sensors a source of any kind is a force and a tensor of moments
+(Aki and Richards, Quantitative Seismology, 2nd ed., section 3.3), whose antisymmetric part runs around the place and
+whose symmetric part is a stress. It is a load that fits can follow as they follow mechanisms: what tissue does that
+moves by more than its own size is far from linear, and a mechanism that is nearly right would explain it better than
+the source that it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar
+
+import numpy as np
+
+from warpbrain.arrays import Floats
+from warpbrain.inference.beliefs import beliefs
+from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
+from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.potential import Enters
+from warpbrain.physics.proposal import Place, Proposal
+from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.linearisation import Linearisation, Moment
+from warpbrain.worlds.body.sensors import spread_points
+from warpbrain.worlds.body.unknown import gaussians, root_mean_square, stress_patches, unit_stresses
+
+#: From coefficients of a stress to its components as of `unit_stresses`: two and three without a trace, and a pressure,
+#: which moves hardly compressible tissue so little that it has a size of its own.
+_STRESSES = np.zeros((6, 6))
+_STRESSES[:3, [0, 1, 5]] = np.linalg.svd(np.ones((1, 3)))[2][[1, 2, 0]].T
+_STRESSES[3:, 2:5] = np.eye(3)
+#: How far places are apart, in lengths, unless those of a scan are farther.
+_APART = 0.7
+#: Gaussians that are kept, the latest ones.
+_KEPT = 64
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source(Load, Mechanism):
+    """A source without a name in one place; no case can declare it."""
+
+    centre: Place  # [m]
+    length: float  # [m]
+    force: Place = (0.0, 0.0, 0.0)  # [N]
+    turn: Place = (0.0, 0.0, 0.0)  # a force that is this times the arm over the length [N]
+    stress: tuple[float, ...] = ()  # six components as of `unit_stresses` [Pa]
+    kind: ClassVar[str] = "unknown"
+    sentence: ClassVar[str] = "Something without a name acts in one place."
+    example: ClassVar[str] = ""
+    enters: ClassVar[Enters] = Enters("load", "f_unknown")
+    several: ClassVar[bool] = True
+
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
+        assert isinstance(mesh, TetMesh), "a diagnosis has linear elements"
+        at_nodes, at_centres = _weights(mesh, self.centre, self.length)
+        arms = (mesh.points - np.array(self.centre)) / self.length
+        forces = at_nodes[:, None] * (np.array(self.force) + np.cross(np.array(self.turn), arms))
+        if self.stress:
+            of_elements = np.tensordot(np.array(self.stress), unit_stresses(mesh.points[mesh.tetrahedra]), axes=1)
+            forces -= summed_at_nodes(mesh, at_centres[:, None, None] * of_elements)
+        return np.asarray(forces)
+
+
+@lru_cache(maxsize=_KEPT)
+def _weights(mesh: TetMesh, centre: Place, length: float) -> tuple[Floats, Floats]:
+    """Gaussians at the nodes (N,), which add up to 1, and at the middles of elements (m,), of height 1."""
+    at_nodes, at_centres = _of_places(mesh, np.array([centre]), length)
+    return at_nodes[:, 0], at_centres[:, 0]
+
+
+def _of_places(mesh: TetMesh, centres: Floats, length: float) -> tuple[Floats, Floats]:
+    at_nodes = mesh.node_volumes[:, None] * gaussians(mesh.points, centres, length)
+    return at_nodes / np.maximum(at_nodes.sum(axis=0), 1e-300), gaussians(mesh.centres, centres, length)
+
+
+def sources(at: Linearisation, spacing: float, size: float) -> tuple[Effect, ...]:
+    """Forces, and stresses, of every length at places throughout the body.
+
+    Each of their components moves what was recorded by as much as the others, in the mean over all places; together by
+    a root mean square of `size` [m]. `spacing`: between places of a scan [m].
+    """
+    mesh = at.system.model.mesh
+    effects: list[Effect] = []
+    for is_force, lengths in ((True, beliefs("unknown.force_lengths")), (False, beliefs("unknown.stress_lengths"))):
+        for length in (spacing * lengths).tolist():
+            centres = mesh.centres[spread_points(mesh.centres, max(spacing, _APART * length), 700)]
+            effects += _sources(at, centres, length, is_force, size)
+    return tuple(effects)
+
+
+def _sources(at: Linearisation, centres: Floats, length: float, is_force: bool, size: float) -> list[Effect]:
+    def about(moment: Moment) -> Floats:
+        return (_force_columns if is_force else _stress_columns)(moment.at, centres, length)
+
+    columns = at.summed_in_time(about)  # (n, 6, s)
+    rows = at.sensors.is_displacement
+    rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
+    sd = np.empty(len(_STRESSES))
+    for part in (slice(0, 3), slice(3, 6)) if is_force else (slice(0, 5), slice(5, 6)):
+        share = (part.stop - part.start) / len(sd)
+        sd[part] = size * np.sqrt(share) / max(root_mean_square(columns[rows, part]), 1e-300)
+    nothing = np.zeros(len(columns))
+    return [
+        Effect(_proposal(sd, is_force, centre, length), nothing, np.ascontiguousarray(sd * columns[:, :, number]))
+        for number, centre in enumerate(centres)
+    ]
+
+
+def _proposal(sd: Floats, is_force: bool, centre: Floats, length: float) -> Proposal:
+    x, y, z = centre.tolist()
+
+    def make(c: Floats) -> Source:
+        if is_force:
+            return Source(centre=(x, y, z), length=length, force=tuple(c[:3].tolist()), turn=tuple(c[3:].tolist()))
+        return Source(centre=(x, y, z), length=length, stress=tuple((_STRESSES @ c).tolist()))
+
+    def elsewhere(other: Floats, radius: float) -> Proposal:
+        return _proposal(sd, is_force, other, radius)
+
+    return Proposal(make, np.zeros(len(sd)), sd, elsewhere=elsewhere, centre=centre, radius=length)
+
+
+def _force_columns(at: Linearisation, centres: Floats, length: float) -> Floats:
+    """Columns (n, 6, s) of a force of 1 N along each axis, and of one that runs around each."""
+    mesh = at.system.model.mesh
+    weights, _ = _of_places(mesh, centres, length)
+    arms = (mesh.points[:, None] - centres) / length
+    pushes = at.answers_of_patches(weights).transpose(0, 2, 1)
+    moments = [at.answers_of_patches(weights * arms[:, :, axis]) for axis in range(3)]
+    turns = [moments[i][..., j] - moments[j][..., i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    return np.concatenate([pushes, np.stack(turns, axis=1)], axis=1)
+
+
+def _stress_columns(at: Linearisation, centres: Floats, length: float) -> Floats:
+    """Columns (n, 6, s) of a stress of 1 Pa for each column of `_STRESSES`."""
+    mesh = at.system.model.mesh
+    columns = stress_patches(at, mesh.points, centres, length).reshape(len(at.sensors), len(_STRESSES), -1)
+    return np.asarray(np.einsum("ij,nis->njs", _STRESSES, columns))
+
+
+def without_sources(mechanisms: Sequence[Mechanism]) -> tuple[Mechanism, ...]:
+    """Mechanisms that a case can declare."""
+    return tuple(mechanism for mechanism in mechanisms if not isinstance(mechanism, Source))
