@@ -8,7 +8,7 @@ from warpbrain.estimation.parameters import declared
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import other_volume
 from warpbrain.worlds.body.states import Hypothesis, States
-from warpbrain.worlds.body.unknown import Strains, _unit_stresses, body_forces, fields, pressures, resistances
+from warpbrain.worlds.body.unknown import body_forces, fields, pressures, resistances, unit_stresses
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def at(small_diagnosis) -> Linearisation:
 
 def test_an_eigenstress_has_no_net_force_and_no_moment(at, verify):
     corners = (at.system.model.mesh.points + at.u)[at.system.model.mesh.tetrahedra]
-    forces = _unit_stresses(corners)
+    forces = unit_stresses(corners)
     weights = np.random.default_rng(0).random(len(corners))
     total = np.einsum("m,cmai->ci", weights, forces)
     moment = np.einsum("m,cmai->ci", weights, np.cross(corners[None], forces))
@@ -30,7 +30,7 @@ def test_an_eigenstress_has_no_net_force_and_no_moment(at, verify):
 def test_a_uniform_pressure_of_it_is_the_load_on_the_surface(at):
     """The nodal forces of a uniform stress are those of its traction on the boundary (divergence theorem)."""
     mesh = at.system.model.mesh
-    forces = _unit_stresses(mesh.points[mesh.tetrahedra])
+    forces = unit_stresses(mesh.points[mesh.tetrahedra])
     nodal = np.zeros(mesh.points.shape)
     np.add.at(nodal, mesh.tetrahedra, forces[:3].sum(axis=0))
     a, b, c = mesh.points[mesh.boundary].transpose(1, 0, 2)
@@ -42,10 +42,10 @@ def test_a_uniform_pressure_of_it_is_the_load_on_the_surface(at):
 def test_a_uniform_pressure_of_it_moves_what_it_does_on_the_surface(at):
     """The answer of the sensors to it is that to its nodal forces, whatever the order of the corners of elements."""
     mesh = at.system.model.mesh
-    forces = _unit_stresses((mesh.points + at.u)[at.system.tetrahedra])[:3].sum(axis=0)
+    forces = unit_stresses((mesh.points + at.u)[at.system.tetrahedra])[:3].sum(axis=0)
     nodal = np.zeros(mesh.points.shape)
     corners = (mesh.points + at.u)[mesh.tetrahedra]
-    np.add.at(nodal, mesh.tetrahedra, _unit_stresses(corners)[:3].sum(axis=0))
+    np.add.at(nodal, mesh.tetrahedra, unit_stresses(corners)[:3].sum(axis=0))
     [answer] = at.answers_of_elements(forces, np.ones((len(forces), 1))).T
     np.testing.assert_allclose(answer, at.answers(-nodal[None])[:, 0], atol=1e-9 * np.abs(answer).max())
 
@@ -73,29 +73,6 @@ def test_fields_are_of_one_metre(at):
     assert {name.split(",")[0] for name in every} == {"body force", "eigenstress", "pressure", "traction"}
     for columns in every.values():
         np.testing.assert_allclose(np.mean(np.sum(columns[rows] ** 2, axis=1)), 1.0)
-
-
-def test_a_strain_in_one_place_is_one_that_swells_too(at):
-    """What a growth about a site moves is what one of its components does, as far as any other component alone."""
-    mesh = at.system.model.mesh
-    length, spacing = 0.18 * mesh.radius, 0.3 * mesh.radius
-    strains = Strains(at, length, spacing)
-    assert len(strains.columns) == len(strains.centres) > 5
-    distance = np.linalg.norm(mesh.centres[:, None] - strains.centres, axis=2)
-    growth = at.answers_of_elements(at.growth_forces, np.exp(-0.5 * (distance / length) ** 2)).T
-    swells = np.array([columns[:, 5] for columns in strains.columns])
-    cosines = np.sum(growth * swells, axis=1) / np.linalg.norm(growth, axis=1) / np.linalg.norm(swells, axis=1)
-    np.testing.assert_allclose(cosines, 1.0, atol=1e-9)
-    rows = at.sensors.is_displacement
-    squares = np.mean([np.mean(columns[rows] ** 2, axis=0) for columns in strains.columns], axis=0)
-    assert squares[5] == pytest.approx(squares[:5].mean())
-    assert squares.sum() == pytest.approx(1.0)
-
-
-def test_a_strain_elsewhere_is_in_the_same_unit(at):
-    strains = Strains(at, 0.18 * at.system.model.mesh.radius, 0.3 * at.system.model.mesh.radius)
-    again = strains.at_centres(strains.centres[2:4])
-    np.testing.assert_allclose(again, strains.columns[2:4], atol=1e-9 * np.abs(strains.columns[2]).max())
 
 
 def test_tissue_that_is_softer_at_one_time_moves_as_equilibria_of_softer_tissue(tmp_path):

@@ -220,24 +220,29 @@ class HypothesisSearch:
     def _refit_subsets(self, names: frozenset[str]) -> None:
         """Fit subsets with one mechanism less again, from the optimum of a set, if that is better than their own.
 
-        The evidence has several local optima, with other points as gross errors. A mechanism with no effect must not
-        seem probable because the fit with it has reached a better one than the fit without it.
+        The evidence has several local optima, with other points as gross errors, or the unknown as a source. A
+        mechanism with no effect must not seem probable because the fit with it has reached a better one than the fit
+        without it.
         """
         superset = self._sets[names]
         assert superset.refit is not None
-        for mechanism in superset.acting:
-            subset = self._sets.get(names - {mechanism})
-            if subset is None or subset.refit is None or not subset.acting:
+        for cause in superset.acting:
+            subset = self._sets.get(names - {cause})
+            if subset is None or not subset.names:
                 continue
-            reduced = superset.without(mechanism, self.base)
+            reduced = superset.without(cause, self.base)
+            if subset.refit is None and subset.acting == reduced.acting:
+                continue
+            # a field without a name that is not fitted, and may be a source, has that of the linear model
+            known = subset.marginal.log_evidence if subset.refit is None else subset.refit.log_evidence
             # what neither search has come to counts for neither
             reached = reduced.marginal.log_evidence - superset.refit.unreached
-            if reached < subset.refit.log_evidence + _BETTER:
+            if reached < known + _BETTER:
                 continue
-            refitted = self._fitted_less(superset, [mechanism], subset.refit.log_evidence + _BETTER)
+            refitted = self._fitted_less(superset, [cause], known + _BETTER)
             if refitted is None or refitted.refit is None:
                 continue
-            gain = refitted.refit.log_evidence - subset.refit.log_evidence
+            gain = refitted.refit.log_evidence - known
             if gain > _BETTER:
                 better = replace(refitted, hypothesis=subset.hypothesis)
                 self._sets[subset.names] = better.with_evidence(subset.hypothesis.log_evidence + gain)
