@@ -13,8 +13,8 @@ KINDS = {"registration": Kind.NOT_PHYSICS, "unknown": Kind.UNKNOWN}
 def weighted(log_evidence, *names, fitted=False, failure=""):
     kinds = tuple(KINDS.get(name, Kind.PHYSICS) for name in names)
     hypothesis = Hypothesis(names, kinds, log_evidence, -3.0 * len(names), None)
-    nothing = np.zeros(0)
-    return WeightedSet(hypothesis, (), nothing, np.zeros((0, 0)), None, object() if fitted else None, failure)
+    nothing, acting = np.zeros(0), hypothesis.of_kind(Kind.PHYSICS)
+    return WeightedSet(hypothesis, acting, (), nothing, np.zeros((0, 0)), None, object() if fitted else None, failure)
 
 
 def following(*sets, expanded=(), rivals=True):
