@@ -52,7 +52,9 @@ def test_before_something_has_no_name_the_likeliest_mechanism_is_fitted():
     likely, less = weighted(20.0, "viscoelasticity"), weighted(10.0, "swelling")
     assert following(nothing, unknown, likely, less) == ["viscoelasticity"]
     fitted = weighted(20.0, "viscoelasticity", fitted=True)
-    assert following(nothing, unknown, fitted, less) is None
+    # what acts beside it may be what the unknown stands for
+    assert following(nothing, unknown, fitted, less) == ["viscoelasticity"]
+    assert following(nothing, unknown, fitted, less, expanded=[("viscoelasticity",)]) is None
 
 
 def test_a_named_mechanism_is_fitted_then_expanded_then_left():
@@ -60,6 +62,16 @@ def test_a_named_mechanism_is_fitted_then_expanded_then_left():
     assert following(nothing, weighted(30.0, "pressure")) == ["pressure"]
     assert following(nothing, weighted(30.0, "pressure", fitted=True)) == ["pressure"]
     assert following(nothing, weighted(30.0, "pressure", fitted=True), expanded=[("pressure",)]) is None
+
+
+def test_before_a_rest_has_no_name_the_likeliest_mechanism_is_fitted_and_expanded():
+    nothing, rest = weighted(0.0, fitted=True), weighted(60.0, "swelling", "unknown", fitted=True)
+    known = {"expanded": [("swelling", "unknown"), ("swelling",)]}
+    assert following(nothing, rest, weighted(30.0, "traction"), **known) == ["traction"]
+    fitted = weighted(30.0, "traction", fitted=True)
+    assert following(nothing, rest, fitted, **known) == ["traction"]
+    known["expanded"].append(("traction",))
+    assert following(nothing, rest, fitted, **known) is None
 
 
 def test_after_many_fits_only_what_the_verdict_rests_on_is_fitted():

@@ -15,7 +15,7 @@ from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis
-from warpbrain.inference.decide import UNKNOWN, Decision, decide
+from warpbrain.inference.decide import NAMED_AND_REST, UNKNOWN, Decision, decide
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -40,7 +40,7 @@ def next_to_fit(
     named = [candidate for candidate in sets if frozenset(candidate.mechanisms) == frozenset(decision.causes)]
     if named and named[0].mechanisms and not _is_settled(named, expanded):
         chosen = named[0]
-    elif part := _part_not_fitted(decision, sets) or _unknown_not_fitted(decision, sets):
+    elif part := _part_not_fitted(decision, sets) or _unknown_not_fitted(decision, sets, expanded):
         return part
     elif not rivals:
         return None
@@ -115,20 +115,25 @@ def _part_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> Weighte
     return next(open_parts, None)
 
 
-def _unknown_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> WeightedSet | None:
-    """One not fitted yet of the likeliest set with the unknown alone, that without it, and the likeliest mechanism.
+def _unknown_not_fitted(
+    decision: Decision, sets: Sequence[WeightedSet], expanded: Collection[frozenset[str]]
+) -> WeightedSet | None:
+    """What is to be fitted, or expanded, before something without a name is a part of the verdict; None if all was.
 
-    None if all were, or the verdict is another one. In the linear model, what a finite rigid rotation does to second
-    order looks like an unknown force, and what a mechanism does that is far from linear like tissue or a force.
+    Of a verdict of the unknown alone the likeliest set with that alone, and that without it: in the linear model, what
+    a finite rigid rotation does to second order looks like an unknown force. Of any the likeliest mechanism, with what
+    may act beside it: sets with the unknown are many, and what a mechanism does that is far from linear, with others
+    beside it, looks like one of them.
     """
-    if decision.verdict != UNKNOWN:
+    if decision.verdict != UNKNOWN and not (decision.verdict == NAMED_AND_REST and UNKNOWN in sets[0].names):
         return None
     without_names = (candidate for candidate in sets if UNKNOWN in candidate.names and not candidate.mechanisms)
     likely = next((candidate.names for candidate in without_names), frozenset())
-    mechanisms = (candidate.names for candidate in sets if len(candidate.names) == len(candidate.mechanisms) == 1)
-    mechanism = next(mechanisms, frozenset())
-    parts = (candidate for candidate in sets if candidate.names in (likely, likely - {UNKNOWN}, mechanism))
-    return next((part for part in parts if part.refit is None and not part.failure), None)
+    alone = (likely, likely - {UNKNOWN}) if decision.verdict == UNKNOWN else ()
+    mechanism = next((s for s in sets if len(s.names) == len(s.mechanisms) == 1 and not s.failure), None)
+    parts = (candidate for candidate in sets if candidate.names in alone or candidate is mechanism)
+    part = next((part for part in parts if part.refit is None and not part.failure), None)
+    return part or (None if mechanism is None or mechanism.names in expanded else mechanism)
 
 
 def _not_fitted(sets: Sequence[WeightedSet], probabilities: Floats) -> Iterator[WeightedSet]:
