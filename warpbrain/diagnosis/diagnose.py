@@ -9,7 +9,7 @@ import numpy as np
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
 from warpbrain.diagnosis.checking import Confirming, check_errors, distance
-from warpbrain.diagnosis.locating import Traits, map_of_search, traits_of
+from warpbrain.diagnosis.locating import FittedSource, Traits, map_of_search, traits_of
 from warpbrain.diagnosis.measuring import imitations, next_measurements, smallest
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time
 from warpbrain.diagnosis.ranking import Ranking, about_base
@@ -137,6 +137,10 @@ class Diagnosing:
                 resists = search.likely_unknown(best) == RESISTANCE
                 noise, centre = base.typical_noise, where.centre
                 unknown = traits_of(base.at, model, best.residual, noise, search.spacing, centre, resists)
+            if unknown is not None and checked.decision.verdict == UNKNOWN and (fitted := search.fitted_source):
+                apart = confirming.held_out_for(fitted)
+                without, error = (apart.error(confirming.predict(each, apart)) for each in (nothing, fitted))
+                unknown = replace(unknown, source=FittedSource.of(fitted, without, error))
         with self.seconds.of("what would be seen"):
             confusion = imitations(search.causes, nothing.marginal.model)
             seen = smallest(search.causes, nothing.marginal.model, confusion)

@@ -29,9 +29,12 @@ from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.predict import own_axes, p_value
 from warpbrain.mesh import nodes_of
+from warpbrain.worlds.body.causes import UNKNOWN
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.sources import Source
 from warpbrain.worlds.body.unknown import force_patches, stress_beside_held
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 #: Size of a patch of the map, in spacings of the scan.
 _PATCH = 0.7
@@ -158,6 +161,35 @@ def score_map(
 
 
 @dataclass(frozen=True, eq=False)
+class FittedSource:
+    """What has no name, as a source in one place that was fitted."""
+
+    centre: Floats  # (3,) [m]
+    length: float  # of its Gaussian [m]
+    is_stress: bool  # a stress, and no force
+    turns: bool  # whether it moves more by what runs around the place than by its net force
+    force: Floats  # (3,), net force [N]; zero of a stress
+    force_sd: Floats
+    #: Root mean square error of points that were not fitted, without it and with it [m].
+    without: float
+    error: float
+
+    @classmethod
+    def of(cls, fitted: WeightedSet, without: float, error: float) -> FittedSource:
+        """Of a fitted set with a source; errors of points that were not fitted, without and with it [m]."""
+        number = fitted.acting.index(UNKNOWN)
+        effect, (z, covariance) = fitted.effects[number], fitted.coefficients[number]
+        source = effect.proposed.make(effect.coefficients(z))
+        assert isinstance(source, Source)
+        is_stress, sd = bool(source.stress), effect.proposed.sd[:3] * np.sqrt(np.diag(covariance)[:3])
+        turns = not is_stress and float(np.linalg.norm(z[3:])) > float(np.linalg.norm(z[:3]))
+        force_sd = np.zeros(3) if is_stress else sd
+        return cls(
+            np.array(source.centre), source.length, is_stress, turns, np.array(source.force), force_sd, without, error
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Traits:
     """Of an unknown force."""
 
@@ -172,7 +204,8 @@ class Traits:
     hidden: bool  # whether there seems to be a net force, which what holds the body may carry: it cannot be told
     surface_nats: float  # log Bayes factor of a force on the surface alone over one within the body alone
     centre: Floats  # (3,), where it is [m]
-    resistance: bool  # whether it is more like tissue whose resistance changes in time than a force or a strain
+    resistance: bool  # whether it is more like tissue whose resistance changes in time than a force or a stress
+    source: FittedSource | None = None  # where it is all that acts, in one place
 
     @property
     def size(self) -> tuple[float, float]:

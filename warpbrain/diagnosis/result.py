@@ -10,7 +10,7 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.case import Case
-from warpbrain.diagnosis.locating import ScoreMap, Traits
+from warpbrain.diagnosis.locating import FittedSource, ScoreMap, Traits
 from warpbrain.diagnosis.onset import Onset
 from warpbrain.inference import Kind
 from warpbrain.inference.beliefs import belief
@@ -225,6 +225,9 @@ def traits_in_words(unknown: Traits, extent: float) -> str:
         )
     size, sd = unknown.size
     where = f"about {place(unknown.centre, extent)}"
+    fitted = "" if unknown.source is None else f" {_source_in_words(unknown.source, extent)}"
+    if fitted and not unknown.outside:
+        return fitted
     if unknown.outside:
         sentence = f"It is a force from outside, {where}, of {measured(size, sd, 'N')} in all"
     elif unknown.hidden:
@@ -239,7 +242,19 @@ def traits_in_words(unknown: Traits, extent: float) -> str:
     depth = abs(unknown.surface_nats)
     if depth > belief("checks.surface_told"):
         sentence += ", and on the surface" if unknown.surface_nats > 0.0 else ", and below the surface"
-    return f" {sentence}."
+    return f" {sentence}.{fitted}"
+
+
+def _source_in_words(source: FittedSource, extent: float) -> str:
+    """What a source that was fitted is, and how well it predicts."""
+    size = float(np.linalg.norm(source.force))
+    sd = float(np.linalg.norm(source.force / max(size, 1e-300) * source.force_sd))
+    kind = "a stress" if source.is_stress else "a force that runs around an axis" if source.turns else "a force"
+    net = "" if source.is_stress or source.turns else f" of {measured(size, sd, 'N')}"
+    return (
+        f"Fitted as {kind}{net} about {place(source.centre, extent)}, within {number(1e3 * source.length)} mm, it "
+        f"leaves {length(source.error)} at points that were not fitted, {length(source.without)} without it."
+    )
 
 
 def assumptions_of(case: Case, base: Base, best: WeightedSet) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from shapes import box
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.diagnosis.diagnose import diagnose
+from warpbrain.diagnosis.result import sentence_of
 from warpbrain.inference.decide import UNKNOWN
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import NeoHookean
@@ -152,3 +153,9 @@ def test_a_whirl_that_turns_tissue_far_is_not_called_by_a_name(size):
     beads = PointsRecording(name="beads", file="beads.csv", role="fit", points=x, displacement=moved, sigma=noise)
     result = diagnose(replace(case, recordings=(beads,)), None, "cpu")
     assert result.decision.verdict == UNKNOWN
+    source = result.unknown.source
+    assert source.turns and np.linalg.norm(source.centre - whirl.centre) < whirl.length
+    assert 0.6 * whirl.length < source.length < 1.6 * whirl.length
+    # to the noise, each component of it
+    assert source.error < min(1.5 * np.sqrt(3.0) * noise, 0.5 * source.without)
+    assert "a force that runs around an axis about" in sentence_of(result)

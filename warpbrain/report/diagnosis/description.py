@@ -115,11 +115,14 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
         "where": place and place | {"region": best.region if best is not None else ""}
         | {"local_p": where.local_p, "global_p": where.global_p},
         "mechanisms": named,
-        "unknown": _picked(
+        "unknown": diagnosis.unknown and _picked(
             diagnosis.unknown, "turning", net_force_n="force", net_force_sd_n="force_sd", net_moment_nm="moment",
             net_moment_sd_nm="moment_sd", from_outside="outside", net_force_hidden="hidden",
             surface_over_depth_nats="surface_nats", centre_m="centre", resistance_in_time="resistance",
-        ),
+        ) | {"source": _picked(
+            diagnosis.unknown.source, "turns", centre_m="centre", length_m="length", of_stress="is_stress",
+            net_force_n="force", net_force_sd_n="force_sd", heldout_rmse_without_m="without", heldout_rmse_m="error",
+        )},
         "when": onset and {
             "seconds": [onset.first, onset.last],
             "probability": onset.probability,

@@ -164,6 +164,12 @@ class HypothesisSearch:
             self._sets[fitted.names] = fitted
         return fitted
 
+    @property
+    def fitted_source(self) -> WeightedSet | None:
+        """The most probable set with the unknown and no mechanism, if that is a source in one place and was fitted."""
+        likely = next((s for s in self.weighted_sets if UNKNOWN in s.names and not s.mechanisms), None)
+        return likely if likely is not None and likely.refit is not None and UNKNOWN in likely.acting else None
+
     def likely_unknown(self, weighted: WeightedSet) -> str:
         """Label of the most probable place of the unknown in the residuals of a weighted set; see `Place.label`."""
         cause = self.causes.named(UNKNOWN)
