@@ -274,7 +274,7 @@ def bent_without_flow(stabilised: float) -> tuple[float, float]:
     )
     system = System(model, "cpu")
     term = fluid_of(system)
-    term.softness.assign(stabilised * term.softness.numpy())
+    term.softness *= stabilised
     [moment] = follow_slowly(system, [1.0])
     inner = (x > 8.0) & (x < 40.0) & (y > 7.0) & (y < 37.0)
     powers = [(x / 48.0) ** i * (y / 44.0) ** k for i in range(5) for k in range(5 - i)]

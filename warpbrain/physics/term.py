@@ -65,21 +65,19 @@ class Body(Protocol):
 
 @dataclass(frozen=True)
 class Coupling:
-    """Unknowns `p` of a term's own, one for a node, which follow the displacement: `A p = c - b(u)`.
+    """Unknowns `p` of a term's own, one for a node, which follow the displacement: `A p = c - b(u)`; SciPy sparse.
 
     Of the forces `-(db/du)^T p`, blocks can hold what they do at the same `p`. That `p` changes with `u` adds
     `(db/du)^T A^-1 (db/du)`, which is dense: linear solvers take `A` and `db/du` themselves.
     """
 
-    offsets: wp.array  # sparse rows; a node without unknown has none
-    columns: wp.array
-    compliance: wp.array  # `A_ij`, positive definite
+    compliance: Any  # `A` (n, n), positive definite; a node without unknown has no entry
     #: About `(db/du) K^-1 (db/du)^T`: how the solid gives way to `p`, in the same rows. Of a preconditioner, which no
     #: solution depends on.
-    yielding: wp.array
-    own: wp.array  # `db_i/du_j`
-    #: `b(u) + A p` where the term advanced last, without what flowed in that step; zero once it has forgotten
-    content: wp.array
+    yielding: Any
+    own: Any  # `db/du` (n, 3 n)
+    #: `b(u) + A p` (n,) where the term advanced last, without what flowed in that step; zero once it has forgotten
+    content: Floats
 
 
 class Term(abc.ABC):
@@ -103,8 +101,6 @@ class Term(abc.ABC):
     of_moduli: bool = True
     #: Whether it is there in full, however little of the load is.
     in_full: ClassVar[bool] = False
-    #: Its own unknowns; None if there are none.
-    coupling: Coupling | None = None
     #: Names of the arrays that hold what it remembers of earlier steps and augmentations.
     memory: ClassVar[tuple[str, ...]] = ()
     #: Names of what no number of a mechanism changes: rigid shapes around the body, solvers and what they work on.
@@ -153,6 +149,11 @@ class Term(abc.ABC):
 
     def forget(self) -> None:  # noqa: B027
         """Tell a term with a memory that the body is at rest in its reference shape, and always was."""
+
+    @property
+    def coupling(self) -> Coupling | None:
+        """Its own unknowns; None if there are none."""
+        return None
 
     @property
     def coupled(self) -> bool:

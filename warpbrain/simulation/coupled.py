@@ -73,27 +73,18 @@ class CoupledSolver:
             self._plain.prepare()
 
     def _take_matrix(self) -> None:
-        from scipy.sparse import block_diag, bsr_matrix, csr_matrix, diags, vstack
+        from scipy.sparse import block_diag, bsr_matrix, diags, vstack
 
-        n, matrix, parts = self._system.size, self._system.matrix, []
+        n, matrix = self._system.size, self._system.matrix
         values = matrix.values.numpy().astype(np.float64, copy=False)
         # constrained rows and columns are those of the identity
         self._K = bsr_matrix((values, matrix.columns.numpy(), matrix.offsets.numpy()), shape=(3 * n, 3 * n))
         self._root = math.sqrt(self._system.coupling_factor)
-        for c in (term.coupling for term in self._terms if term.coupled and term.coupling is not None):
-            offsets, columns = c.offsets.numpy(), c.columns.numpy()
-            components = (3 * columns[:, None] + np.arange(3)).ravel()
-            coupling = self._root * c.own.numpy().astype(np.float64).ravel() * self._free[components]
-            A, Y = (
-                csr_matrix((values.numpy().astype(np.float64), columns, offsets), shape=(n, n))
-                for values in (c.compliance, c.yielding)
-            )
-            parts.append((A, csr_matrix((coupling, components, 3 * offsets), shape=(n, 3 * n)), Y))
-        compliances, couplings, yielding = zip(*parts, strict=True)
-        self._A = block_diag(compliances, format="csr")
-        self._B = vstack(couplings, format="csr")
+        coupled = [c for term in self._terms if term.coupled and (c := term.coupling) is not None]
+        self._A = block_diag([c.compliance for c in coupled], format="csr")
+        self._B = self._root * vstack([c.own for c in coupled], format="csr") @ diags(self._free.astype(np.float64))
         self._BT = self._B.T
-        S = self._A + self._root**2 * block_diag(yielding, format="csr")
+        S = self._A + self._root**2 * block_diag([c.yielding for c in coupled], format="csr")
         # a node without an unknown has no row
         S = (S + diags((S.diagonal() == 0.0).astype(np.float64))).tocsc()
         if self._schur is None or not np.array_equal(self._schur[0].data, S.data):

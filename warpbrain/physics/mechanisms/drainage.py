@@ -15,9 +15,18 @@ in each element, and for a given displacement the solution of one symmetric syst
 
     (S M + N + h (H + k_c M)) p = fluid at the beginning - b(u) + h k_c M p_c,     b(u) = what `J - 1` takes up
 
-(`warpbrain.kernels.pore`; `N` stabilises pairs of linear displacement and linear pressure as in White and Borja, CMAME
-197, 2008). So a step has a potential, and its forces are the slope of it. In an equilibrium the flow is steady: the
-pressure is that of the drained faces where nothing is exchanged, and the skeleton carries the load alone.
+So a step has a potential, and its forces are the slope of it. In an equilibrium the flow is steady: the pressure is
+that of the drained faces where nothing is exchanged, and the skeleton carries the load alone. In an element of
+reference volume `V` with the gradients `g_a` of its shape functions,
+
+    b_a = V/4 (J - 1)                              fluid that the deformation takes up [m3]
+    H_ab = V k/J (cof F g_a) . (cof F g_b)         flow, Darcy's law in the deformed body [m3/(Pa s)]
+    M_ab = V (1 + delta_ab)/20                     storage and exchange
+    N_ab = V/(2 mu) ((1 + delta_ab)/20 - 1/16)     stabilisation
+
+`J C^-1 = cof F^T cof F / J`. `N` is what White and Borja (2008, CMAME 197) add to the rate of storage: the product of
+what of two pressures is not constant in an element (Dohrmann and Bochev 2004). It is zero for a uniform pressure, so no
+fluid is lost, and zero in a steady flow, which has no rate.
 
 The ramp, and the share of a load step, multiply both pressures, `pressure` and `capillary_pressure`.
 
@@ -28,13 +37,17 @@ follow the pressure there, which overshoots (Vermeer and Verruijt 1981).
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
 import warp as wp
 
 from warpbrain.arrays import Bools, Floats
-from warpbrain.kernels.pore import pore_kernels
+from warpbrain.kernels.invariants import cofactor
+from warpbrain.kernels.module import KernelSet
+from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
@@ -45,6 +58,8 @@ from warpbrain.physics.term import Body, Coupling, Term
 
 #: Relative change of a steady pressure that is worth another solve.
 _STEADY = 1e-7
+#: `M` of an element without its volume.
+_MASS = (np.ones((4, 4)) + np.eye(4)) / 20.0
 #: Permeabilities that are looked for: so many equally probable ones, at most a factor of 4 apart but for the outermost.
 _LOOKED_FOR = 11
 
@@ -176,135 +191,139 @@ class Drainage(Mechanism):
 
 
 class DrainageTerm(Term):
-    """`Drainage` on a device, with the fluid that it remembers.
+    """`Drainage` with the fluid that it remembers; on the host whatever the device, where its pressure is solved for.
 
     The pressure is held as that of the drained nodes and what is `beyond` it, zero there. `softness` (k,) is `1/(2 mu)`
     of each element [1/Pa], of the stabilisation; with the factor that its moduli have.
     """
 
     memory = ("_held", "_shape", "_beyond")
-    lasting = ("coupling", "_pores")
-    coupling: Coupling
 
     def __init__(self, body: Body, mechanism: Drainage) -> None:
         elements = elements_of(body.mesh, mechanism.elements)
         super().__init__(body, body.tetrahedra[elements], mechanism.factor)
-        self.mechanism = mechanism
-        made, self._kernels = pore_kernels(body.precision)
-        scalar, vec3 = body.precision.scalar, body.precision.vec3
-        size, count = len(body.mesh.points), len(elements)
-        volumes = body.mesh.volumes[elements]
-        self._elements = self.array(elements, int)
-        self._volume = self.array(volumes, scalar)
-        self._numbers = self.array(np.zeros(3), scalar)
-        self._closed = self.array(~mechanism.open_nodes(body.mesh), scalar)
-        lumped = np.bincount(self.stencils.ravel(), np.repeat(0.25 * volumes, 4), minlength=size)
-        self._lumped = self.array(lumped, scalar)
-        self._place_rows(size)
-        self.softness, self._storage, self._entries = self.zeros(count), self.zeros(count, 10), self.zeros(count, 10)
-        self._element_coupling = self.zeros(count, 4, dtype=vec3)
-        self._taken, self._held, self._change = self.zeros(count), self.zeros(size), self.zeros(size)
-        self._supply, self._beyond = self.zeros(size), self.zeros(size)
-        self._shape = self.zeros(size, dtype=vec3)
-        compliance, yielding = (self.zeros(len(self._rows)) for _ in range(2))
-        own, others = (self.zeros(len(self._rows), dtype=vec3) for _ in range(2))
-        self.coupling = Coupling(self._offsets, self._columns, compliance, yielding, own, self._held)
-        self._h = np.inf
-        # of `A`, made where they are needed
-        self._factors: Any = None
-        self._pores = made()
-        self._pores.nodes, self._pores.inverse_edges = body.nodes, body.inverse_edges
-        self._pores.softness, self._pores.scale = self.softness, self.scale
-        self._pores.own, self._pores.others = own, others
-        for name in (
-            *("elements", "volume", "taken", "corner_first", "corners", "closed", "lumped", "held", "beyond"),
-            *("rows", "offsets", "columns", "first", "contributions", "numbers"),
-        ):
-            setattr(self._pores, name, getattr(self, f"_{name}"))
-        self.take_moduli()
-
-    def _place_rows(self, size: int) -> None:
-        """Sparse rows over the nodes, and who contributes to each entry: `16 e + 4 a + b` for node pairs (a, b)."""
+        self.mechanism, self._elements = mechanism, elements
+        size = len(body.mesh.points)
+        self._volumes = body.mesh.volumes[elements]
+        self._closed = ~mechanism.open_nodes(body.mesh)
+        self._lumped = self._at_nodes(0.25 * self._volumes)
+        # sparse rows over the nodes, and which parts (a, b) of elements each entry is the sum of
         nodes = self.stencils.astype(np.int64)
         key = (nodes[:, :, None] * size + nodes[:, None, :]).ravel()
-        contributions = np.argsort(key, kind="stable")
-        key = key[contributions]
-        first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
-        rows, columns = np.divmod(key[first], size)
-        self._rows, self._columns = self.array(rows, int), self.array(columns, int)
-        self._offsets = self.array(np.searchsorted(rows, np.arange(size + 1)), int)
-        self._first = self.array(np.r_[first, len(key)], int)
-        self._contributions = self.array(contributions, int)
-        corners = np.argsort(nodes.ravel(), kind="stable")
-        self._corner_first = self.array(np.searchsorted(nodes.ravel()[corners], np.arange(size + 1)), int)
-        self._corners = self.array(corners, int)
+        self._parts = np.argsort(key, kind="stable")
+        self._starts = np.flatnonzero(np.diff(key[self._parts], prepend=-1))
+        self._rows, self._columns = np.divmod(key[self._parts][self._starts], size)
+        self._offsets = np.searchsorted(self._rows, np.arange(size + 1))
+        self._held, self._beyond = (wp.zeros(size, dtype=wp.float64, device="cpu") for _ in range(2))
+        vec3 = body.precision.vec3
+        self._shape = self.zeros(size, dtype=vec3)
+        self._kernels, self._on_device = _kernels(body.precision), self.array(elements, int)
+        self._normals, self._change = self.zeros(len(elements), 4, dtype=vec3), self.zeros(len(elements))
+        self._h = np.inf
+        #: `db/du` where tangents were evaluated last, and of `A` what solves with it, made where it is needed.
+        self._coupling: Any = None
+        self._factors: Any = None
+        self.take_moduli()
+
+    @property
+    def coupling(self) -> Coupling:
+        return Coupling(self._compliance, self._yielding, self._coupling, self._held.numpy())
+
+    # -- sums over elements ---------------------------------------------------------------------------------------
+
+    def _at_nodes(self, amounts: Floats) -> Floats:
+        """What each element (k,) adds to each of its nodes, summed there (n,)."""
+        sums = np.bincount(self.stencils.ravel(), np.repeat(amounts, 4), minlength=len(self.body.mesh.points))
+        return sums.astype(np.float64)
+
+    def _gathered(self, parts: Floats) -> Floats:
+        """Parts of elements (k, 4, 4), summed into entries of the sparse rows."""
+        return np.add.reduceat(parts.ravel()[self._parts], self._starts)
+
+    def _matrix(self, parts: Floats) -> Any:
+        """These as a sparse matrix (n, n); rows and columns of drained nodes are those of the identity."""
+        from scipy.sparse import csr_matrix
+
+        i, j = self._rows, self._columns
+        values = np.where(self._closed[i] & self._closed[j], self._gathered(parts), 1.0 * (i == j))
+        return csr_matrix((values, j, self._offsets), (len(self._lumped),) * 2)
+
+    def _deformed(self, u: wp.array) -> tuple[Floats, Floats]:
+        """`cof F g_a` (k, 4, 3) [1/m] and `J - 1` (k,) at a displacement [m]."""
+        body = self.body
+        outputs = self._normals, self._change
+        inputs = self._on_device, body.nodes, body.inverse_edges, u, *outputs
+        self.launch(self._kernels.deform, len(self.stencils), *inputs)
+        normals, change = (output.numpy().astype(np.float64, copy=False) for output in outputs)
+        return normals, change
 
     # -- the pressure's system ------------------------------------------------------------------------------------
 
-    def _over_compliance(self, given: wp.array) -> Floats:
-        """`A^-1` times numbers of the nodes, on the host: fewer than a third of those of a displacement."""
-        from scipy.sparse import csr_matrix, diags
+    def _over_compliance(self, given: Floats) -> Floats:
+        """`A^-1` times numbers of the nodes."""
+        from scipy.sparse import diags
         from scipy.sparse.linalg import splu
 
         if self._factors is None:
-            c, size = self.coupling, len(self._held)
-            A = csr_matrix(
-                (c.compliance.numpy().astype(np.float64), c.columns.numpy(), c.offsets.numpy()), (size, size)
-            )
+            A = self._compliance
             # a node outside the pores has no row, and no pressure
             A = (A + diags((A.diagonal() == 0.0).astype(np.float64))).tocsc()
             options = {"SymmetricMode": True}
             self._factors = splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-        return np.asarray(self._factors.solve(given.numpy().astype(np.float64)))
+        return np.asarray(self._factors.solve(given))
 
-    def _element_compliance(self, mass: float, stabilisation: float, flow: float, out: wp.array) -> None:
-        scalar = self.body.precision.scalar
-        self.launch(
-            self._kernels.compliance, len(self.stencils), self._pores, scalar(mass), scalar(stabilisation),
-            scalar(flow * self.mechanism.permeability), self._shape, out,
-        )  # fmt: skip
+    def _compliances(self, mass: float, stabilisation: float, flow: float) -> Floats:
+        """Parts of elements (k, 4, 4) of `mass M + stabilisation N + flow H`, in the shape at the last advance."""
+        normals, change = self._deformed(self._shape)
+        soft = stabilisation * self.softness
+        flows = flow * self.mechanism.permeability / (1.0 + change)
+        mass_, soft, flows, V = (x[:, None, None] for x in (mass + soft, soft, flows, self._volumes))
+        return np.asarray(V * (mass_ * _MASS - soft / 16.0 + flows * (normals @ normals.transpose(0, 2, 1))))
 
     def take_moduli(self) -> None:
-        body, elements = self.body, self._elements.numpy()
-        self.softness.assign(0.5 / (body.stiffness_factors * body.shear_moduli)[elements])
-        self._element_compliance(self.mechanism.storage, 1.0, 0.0, self._storage)
+        from scipy.sparse import csr_matrix
+
+        body = self.body
+        factor, mu, lam = (
+            x[self._elements] for x in (body.stiffness_factors, body.shear_moduli, body.volumetric_moduli)
+        )
+        self.softness = 0.5 / (factor * mu)
+        stored = self._gathered(self._compliances(self.mechanism.storage, 1.0, 0.0))
+        self._storage = csr_matrix((stored, self._columns, self._offsets), (len(self._lumped),) * 2)
         # the solid gives way to a pressure that varies over a length that is short beside the body: mass over
         # `lam + 2 mu`, element by element
-        modulus = (body.stiffness_factors * (body.volumetric_moduli + 2.0 * body.shear_moduli))[elements]
-        pairs = [2.0 if a == b else 1.0 for a in range(4) for b in range(a, 4)]
-        self._entries.assign(np.outer(self._volume.numpy().astype(np.float64) / (20.0 * modulus), pairs))
-        self._gather(self.coupling.yielding)
+        self._yielding = self._matrix((self._volumes / (factor * (lam + 2.0 * mu)))[:, None, None] * _MASS)
         self._renew()
 
     def _renew(self) -> None:
-        """`A` and the numbers, for the time step and the shape at the beginning of it."""
+        """`A` and the source, for the time step and the shape at the beginning of it."""
         steady, m = not self.coupled, self.mechanism
         exchanged = m.exchange * (m.capillary_pressure - m.pressure)
-        source = exchanged if steady else self._h * exchanged - m.storage * m.pressure
-        self._numbers.assign([m.pressure, source, 0.0 if steady else 1.0])
+        self._source = exchanged if steady else self._h * exchanged - m.storage * m.pressure
         mass = m.exchange if steady else m.storage + self._h * m.exchange
-        self._element_compliance(mass, 0.0 if steady else 1.0, 1.0 if steady else self._h, self._entries)
-        self._gather(self.coupling.compliance)
-        self._factors = None
+        parts = self._compliances(mass, 0.0, 1.0) if steady else self._compliances(mass, 1.0, self._h)
+        self._compliance, self._factors = self._matrix(parts), None
 
-    def _gather(self, out: wp.array) -> None:
-        """Sum entries of elements into sparse rows."""
-        self.launch(self._kernels.gather_compliance, len(self._rows), self._pores, self._entries, out)
-
-    def _solve(self, u: wp.array) -> None:
-        """The pressure at a displacement."""
-        self.launch(self._kernels.volumes, len(self.stencils), self._pores, u)
-        self.launch(self._kernels.supply, len(self._held), self._pores, self._supply)
+    def _solve(self, u: wp.array) -> tuple[Floats, Floats]:
+        """Find the pressure at a displacement; returns `cof F g_a` and `J`."""
+        normals, change = self._deformed(u)
+        self._taken = 0.25 * self._volumes * change
+        kept = self._held.numpy() - self._at_nodes(self._taken) if self.coupled else 0.0
+        self._supply = self._closed * (kept + self._source * float(self.scale.numpy()[0]) * self._lumped)
         self._beyond.assign(self._over_compliance(self._supply))
+        return normals, 1.0 + change
+
+    @property
+    def _base(self) -> float:
+        """The pressure at drained nodes [Pa]."""
+        return self.mechanism.pressure * float(self.scale.numpy()[0])
 
     def pressures(self) -> Floats:
         """Pressure of the fluid at the nodes (n,) [Pa], at the displacement of the last evaluation.
 
         Zero where there are no pores.
         """
-        base = self.mechanism.pressure * float(self.scale.numpy()[0])
-        total = base + self._beyond.numpy().astype(np.float64)
-        return np.where(self._lumped.numpy() > 0.0, total, 0.0)
+        return np.where(self._lumped > 0.0, self._base + self._beyond.numpy(), 0.0)
 
     def nodal_pressures(self) -> dict[str, Floats]:
         return {"fluid_pressure": self.pressures()}
@@ -322,7 +341,8 @@ class DrainageTerm(Term):
 
     def advance(self, u: wp.array) -> None:
         self._solve(u)
-        self.launch(self._kernels.content, len(self._held), self._pores, self._storage)
+        content = self._storage @ (self._base + self._beyond.numpy())
+        self._held.assign(self._at_nodes(self._taken) + content)
         wp.copy(self._shape, u)
         self._renew()
 
@@ -355,29 +375,83 @@ class DrainageTerm(Term):
     # -- forces ---------------------------------------------------------------------------------------------------
 
     def evaluate_forces(self, u: wp.array) -> None:
-        self._solve(u)
-        self.launch(self._kernels.forces, len(self.stencils), self._pores, u, self.forces)
+        self._evaluate(u)
+
+    def _evaluate(self, u: wp.array) -> tuple[Floats, Floats, Floats]:
+        """Write the forces of the pressure; returns `cof F g_a`, `J`, and the pressure times the volume (k, 1, 1)."""
+        normals, J = self._solve(u)
+        pV = (self._volumes * (self._base + self._beyond.numpy()[self.stencils].mean(axis=1)))[:, None, None]
+        self.forces.assign(-pV * normals)
+        return normals, J, pV
 
     def evaluate_tangents(self, u: wp.array) -> None:
-        self._solve(u)
-        outputs = (self.forces, self.blocks, self._element_coupling)
-        self.launch(self._kernels.tangents, len(self.stencils), self._pores, u, *outputs)
-        self.launch(self._kernels.gather_coupling, len(self._rows), self._pores, self._element_coupling)
+        from scipy.sparse import csr_matrix
+
+        normals, J, pV = self._evaluate(u)
+        factors = self.array(-pV.ravel() / J, self.body.precision.scalar)
+        self.launch(self._kernels.tangents, len(J), self._normals, factors, self.blocks)
+        if not self.coupled:
+            return
+        # `db_a/du_b` is the same for each of the nodes a
+        by_node = (0.25 * self._volumes[:, None, None] * normals).reshape(-1, 3)
+        values = np.add.reduceat(by_node[self._parts // 16 * 4 + self._parts % 4], self._starts)
+        values[~self._closed[self._rows]] = 0.0
+        components = 3 * self._columns[:, None] + np.arange(3)
+        shape = (len(self._lumped), 3 * len(self._lumped))
+        self._coupling = csr_matrix((values.ravel(), components.ravel(), 3 * self._offsets), shape)
 
     def add_stiffness(self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array) -> None:
         if not self.coupled:
             return
-        self.launch(self._kernels.taken_up, len(self._held), self._pores, columns, x, self._change)
-        self._change.assign(self._over_compliance(self._change))
-        number = self.body.precision.scalar(factor)
-        self.launch(self._kernels.push, len(self._held), self._pores, self._change, number, rows, y)
+        change = self._over_compliance(self._coupling @ (columns.numpy() * x.numpy()).ravel())
+        pushed = (self._coupling.T @ change).reshape(-1, 3)
+        y.assign(y.numpy() + factor * rows.numpy() * pushed)
 
     def energy(self, u: wp.array) -> float:
         self._solve(u)
-        beyond, taken = self._beyond.numpy().astype(np.float64), self._taken.numpy().astype(np.float64)
-        base = self.mechanism.pressure * float(self.scale.numpy()[0])
         if self.coupled:
-            stored = 0.5 * float(beyond @ self._supply.numpy().astype(np.float64))
+            stored = 0.5 * float(self._beyond.numpy() @ self._supply)
         else:
-            stored = -float(taken @ beyond[self.stencils].sum(axis=1))
-        return stored - 4.0 * base * float(taken.sum())
+            stored = -float(self._taken @ self._beyond.numpy()[self.stencils].sum(axis=1))
+        return stored - 4.0 * self._base * float(self._taken.sum())
+
+
+@cache
+def _kernels(precision: Precision) -> KernelSet:
+    """Kernels of what a deformation does to elements, and of tangent blocks, with a thread for an element."""
+    scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
+    kernels = KernelSet(f"drainage_{precision.name}")
+
+    @kernels.add
+    def deform(
+        start: int,
+        elements: wp.array[int],
+        nodes: wp.array[wp.vec4i],
+        inverse_edges: wp.array[mat33],
+        u: wp.array[vec3],
+        normals: wp.array2d[vec3],
+        change: wp.array[scalar],
+    ):
+        t = start + wp.tid()
+        G = inverse_edges[elements[t]]
+        F = deformation_gradient(u, nodes[elements[t]], G)
+        cof = cofactor(F)
+        normals[t, 0] = -(cof * (G[0] + G[1] + G[2]))
+        for a in range(3):
+            normals[t, a + 1] = cof * G[a]
+        # det(I + D) - 1 from the invariants of D: small changes keep their digits in single precision
+        D = F - wp.identity(n=3, dtype=scalar)
+        tr = wp.trace(D)
+        change[t] = tr + scalar(0.5) * (tr * tr - wp.ddot(D, wp.transpose(D))) + wp.determinant(D)
+
+    @kernels.add
+    def tangents(start: int, normals: wp.array2d[vec3], factors: wp.array[scalar], blocks: wp.array2d[mat33]):
+        """Of `g_a . d(cof F)/dF . g_b`, times `J`: `a b^T - b a^T` with `a = cof F g_a` and `b` alike."""
+        t = start + wp.tid()
+        a = factors[t] * normals[t, 1]
+        b = normals[t, 2]
+        c = normals[t, 3]
+        bc = factors[t] * wp.skew(wp.cross(c, b))
+        store_blocks(mat33(), wp.skew(wp.cross(b, a)), wp.skew(wp.cross(c, a)), mat33(), bc, mat33(), blocks, t)
+
+    return kernels

@@ -30,6 +30,7 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.following_pressure import pressure_kernels
 from warpbrain.mesh import TetMesh, faces_of, rim_edges
 from warpbrain.mesh.integrals import triangle_rule
+from warpbrain.mesh.surface import SIDES
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, ParameterError, Reading, parameter
 from warpbrain.physics.potential import Enters
@@ -38,6 +39,9 @@ from warpbrain.physics.regions import elements_with
 from warpbrain.physics.term import Body, TriangleTerm
 
 Ints = NDArray[np.int32]
+
+#: Nodes of the sides of triangles, one way around, by how many nodes these have.
+_SIDES = {3: SIDES, 6: np.array([[0, 3, 1], [1, 5, 2], [2, 4, 0]])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,50 +135,31 @@ class PressureTerm(TriangleTerm):
             ramp,
         )
         self.conservative = value == 0.0 or not body.movable[rim].any()
-        self._rim = np.unique(rim)
+        self._rim, self._pressure = rim, value * np.where(even, 1.0, -1.0)
 
     def skew_stiffness(self, u: Floats) -> Any:
-        """See `Term`: of the nodes of the rim alone. Forces are quadratic in `u`, so that differences are exact.
-
-        Nodes of which no two are of one triangle are moved together.
-        """
+        """See `Term`, and the module: of sides of triangles on the rim."""
         from scipy.sparse import coo_matrix
 
-        step = float(np.ptp(self.body.mesh.points, axis=0).max())
-        stencils, on_rim = np.asarray(self.stencils), np.isin(self.stencils, self._rim)
-        rows, columns, values = [], [], []
-        for nodes in _apart(stencils, self._rim):
-            triangles, corner = np.nonzero(np.isin(stencils, nodes))
-            # components of the nodes of each of these triangles that are of the rim
-            some, other = np.nonzero(on_rim[triangles])
-            of_forces = (3 * stencils[triangles[some], other][:, None] + np.arange(3)).ravel()
-            for axis in range(3):
-                sides = []
-                for sign in (1.0, -1.0):
-                    moved = u.copy()
-                    moved[nodes, axis] += sign * step
-                    self.evaluate_forces(self.array(moved, self.body.precision.vec3))
-                    sides.append(self.forces.numpy()[triangles[some], other].ravel())
-                rows.append(of_forces)
-                columns.append(np.repeat(3 * stencils[triangles[some], corner[some]] + axis, 3))
-                values.append((sides[0] - sides[1]) / (2.0 * step))
-        indices = (np.concatenate(rows), np.concatenate(columns))
-        stiffness = coo_matrix((np.concatenate(values), indices), shape=(u.size, u.size)).tocsr()
-        return 0.5 * (stiffness - stiffness.T)
-
-
-def _apart(stencils: Ints, nodes: NDArray[np.integer]) -> list[NDArray[np.integer]]:
-    """Nodes (m,) in groups of which no two are of one stencil (k, s)."""
-    groups: list[NDArray[np.integer]] = []
-    left = nodes
-    while len(left):
-        chosen: list[int] = []
-        taken = np.zeros(len(stencils), dtype=bool)
-        for node in left.tolist():
-            of_node = (stencils == node).any(axis=1)
-            if not (of_node & taken).any():
-                taken |= of_node
-                chosen.append(node)
-        groups.append(np.array(chosen, dtype=nodes.dtype))
-        left = np.setdiff1d(left, chosen)
-    return groups
+        body, count = self.body, self.stencils.shape[1]
+        # the nodes of each side one after the other, and the sides of the rim
+        sides = self.stencils[:, _SIDES[count]].astype(np.int64)
+        ends = np.sort(sides[:, :, [0, -1]], axis=2) @ [len(u), 1]
+        triangles, which = np.nonzero(np.isin(ends, self._rim[:, :2] @ [len(u), 1]))
+        nodes = sides[triangles, which]
+        # `int N_a N_b dx` from shape functions and their slopes on [0, 1], by a rule of degree 5
+        t, weights = np.polynomial.legendre.leggauss(3)
+        t = 0.5 + 0.5 * t
+        shapes, slopes = np.stack([1.0 - t, t]), np.array([[-1.0], [1.0]]) + 0.0 * t
+        if count == 6:
+            shapes = np.stack([(1.0 - t) * (1.0 - 2.0 * t), 4.0 * t * (1.0 - t), t * (2.0 * t - 1.0)])
+            slopes = np.stack([4.0 * t - 3.0, 4.0 - 8.0 * t, 4.0 * t - 1.0])
+        integrals = np.einsum("q,aq,bq,cq->abc", 0.5 * weights, shapes, shapes, slopes)
+        along = np.einsum("abc,sci->sabi", integrals, (body.node_mesh.points + u)[nodes])
+        along *= (-0.5 * self._pressure[triangles] * float(self.scale.numpy()[0]))[:, None, None, None]
+        # matrices of `d x`
+        values = np.cross(np.eye(3), along[..., None, :])
+        components = 3 * nodes[:, :, None] + np.arange(3)
+        rows, columns = components[:, :, None, :, None], components[:, None, :, None, :]
+        indices = [np.broadcast_to(index, values.shape).ravel() for index in (rows, columns)]
+        return coo_matrix((values.ravel(), tuple(indices)), shape=(u.size, u.size)).tocsr()

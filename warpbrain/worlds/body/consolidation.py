@@ -23,7 +23,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import Following
-from warpbrain.physics.term import Term
+from warpbrain.physics.term import Coupling, Term
 from warpbrain.simulation.sparse_factors import SparseFactors
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -103,28 +103,23 @@ def consolidation(at: Linearisation, term: Term) -> Course:
 
 def _matrices(at: Linearisation, term: Term) -> tuple[Floats, Any, Any, Any]:
     """`b` (m,), `B` (m, 3 N), `N` and `H` (m, m) at the state, of nodes whose unknown is free."""
-    from scipy.sparse import csr_matrix
 
-    system, coupling = at.system, term.coupling
-    assert coupling is not None
-    system.u.assign(at.u)
+    def coupling() -> Coupling:
+        assert term.coupling is not None
+        return term.coupling
+
+    at.system.u.assign(at.u)
     # takes the deformed geometry, in which fluid flows, and the content
-    term.advance(system.u)
-    content = coupling.content.numpy().astype(np.float64)
+    term.advance(at.system.u)
+    content = coupling().content
     # the flow is in proportion to the time step
     steps = []
     for h in (1.0, 2.0):
         term.set_time_step(h)
-        values = coupling.compliance.numpy().astype(np.float64)
-        graph = coupling.columns.numpy(), coupling.offsets.numpy()
-        steps.append(csr_matrix((values, *graph), shape=(len(content), len(content))))
+        steps.append(coupling().compliance)
     H = steps[1] - steps[0]
     open_rows = np.flatnonzero(H.diagonal() > 0.0)
-    term.evaluate_tangents(system.u)
-    columns = coupling.columns.numpy()
-    components = (3 * columns[:, None] + np.arange(3)).ravel()
-    block_values = coupling.own.numpy().astype(np.float64).ravel()
-    B = csr_matrix((block_values, components, 3 * coupling.offsets.numpy()), shape=(system.size, 3 * system.size))
+    term.evaluate_tangents(at.system.u)
     square = np.ix_(open_rows, open_rows)
     N = (2.0 * steps[0] - steps[1])[square]
-    return content[open_rows], B[open_rows], N, H[square].tocsc()
+    return content[open_rows], coupling().own[open_rows], N, H[square].tocsc()
