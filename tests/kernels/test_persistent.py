@@ -89,7 +89,7 @@ def test_blocks_that_give_up_are_told(cuda: str) -> None:
     system = system_of(4, cuda)
     solver = persistent.PersistentSolve(
         system.matrix, system.diagonal, system.load, system.solution, DOUBLE,
-        max_iterations=1000, jacobi=True, watch=False,
+        max_iterations=1000, watch=False,
     )  # fmt: skip
     solver._meetings.control.assign([0, 1])
     solver.launch(1e-6)

@@ -212,14 +212,13 @@ def gradients_kernels(precision: Precision) -> KernelSet:
 
     `warpbrain.kernels.multicore.launch_together` runs the first. Its arguments after those of the threads: the
     addresses of `sync` and of what gives way; the matrix by `offsets`, `columns` and `values`, or a `copy` of these in
-    single precision if there is one; the `inverse` diagonal blocks; `b`; `x`, the first guess and the result; whether
-    the inverse blocks are to be used (`preconditioned`); `r`, `p` and `Ap`, scratch like `x`;
-    `partial` (chunks, 4), scratch; the relative `tolerance`; the most iterations; whether to end where the matrix is
-    seen not to be positive definite; `outcome` (8,): iterations, squares of the norm of the residual and of its goal,
-    the least `p . A p / p . p`, and four numbers of the recurrences. Then of the coarse space: how many chunks of rows
-    are an `aggregate`; `free`, 1 where a component is; `places` of nodes; the `coarse_inverse` (12 k, 12 k) of `k`
-    aggregates, none if there is no such space; residual and solution in it (12 k,); and `restricted` (chunks, 4),
-    scratch.
+    single precision if there is one; the `inverse` diagonal blocks; `b`; `x`, the first guess and the result; `r`, `p`
+    and `Ap`, scratch like `x`; `partial` (chunks, 4), scratch; the relative `tolerance`; the most iterations; whether
+    to end where the matrix is seen not to be positive definite; `outcome` (8,): iterations, squares of the norm of the
+    residual and of its goal, the least `p . A p / p . p`, and four numbers of the recurrences. Then of the coarse
+    space: how many chunks of rows are an `aggregate`; `free`, 1 where a component is; `places` of nodes; the
+    `coarse_inverse` (12 k, 12 k) of `k` aggregates, none if there is no such space; residual and solution in it
+    (12 k,); and `restricted` (chunks, 4), scratch.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"multicore_gradients_{precision.name}")
@@ -266,7 +265,6 @@ def gradients_kernels(precision: Precision) -> KernelSet:
         inverse: wp.array[mat33],
         b: wp.array[vec3],
         x: wp.array[vec3],
-        preconditioned: int,
         r: wp.array[vec3],
         p: wp.array[vec3],
         Ap: wp.array[vec3],
@@ -306,9 +304,7 @@ def gradients_kernels(precision: Precision) -> KernelSet:
                         else:
                             s -= row_product(offsets, columns, values, x, i)
                         r[i] = s
-                        z = s
-                        if preconditioned != 0:
-                            z = inverse[i] * s
+                        z = inverse[i] * s
                         Ap[i] = z
                         p[i] = vec3()
                         rr += wp.dot(s, s)
@@ -360,9 +356,7 @@ def gradients_kernels(precision: Precision) -> KernelSet:
                         x[i] = x[i] + alpha * p[i]
                         s = r[i] - alpha * Ap[i]
                         r[i] = s
-                        z = s
-                        if preconditioned != 0:
-                            z = inverse[i] * s
+                        z = inverse[i] * s
                         # the product is not needed any more
                         Ap[i] = z
                         rr += wp.dot(s, s)

@@ -28,7 +28,7 @@ extern __shared__ char dynamic_smem_base[];
 
 const auto offsets = given.offsets, columns = given.columns, diagonal = given.diagonal;
 const int max_iterations = given.max_iterations;
-const bool watch = given.watch, jacobi = given.jacobi;
+const bool watch = given.watch;
 const int tid = threadIdx.x, lane = tid % 32, warp = tid / 32, sub = lane % LANES;
 const bool adds_up = warp == WARPS;
 const int grid = gridDim.x, me = blockIdx.x;
@@ -278,19 +278,16 @@ for (int i = tid; i < rows; i += THREADS) {
     double a[9];
     for (int k = 0; k < 9; ++k)
         a[k] = double(all_values[9 * size_t(diagonal.data[row0 + i]) + k]);
-    double inverse[6] = {1.0, 0.0, 0.0, 1.0, 0.0, 1.0};
-    if (jacobi) {
-        const double c0 = a[4] * a[8] - a[5] * a[7];
-        const double c1 = a[5] * a[6] - a[3] * a[8];
-        const double c2 = a[3] * a[7] - a[4] * a[6];
-        const double d = 1.0 / (a[0] * c0 + a[1] * c1 + a[2] * c2);
-        inverse[0] = d * c0;
-        inverse[1] = d * (a[2] * a[7] - a[1] * a[8]);
-        inverse[2] = d * (a[1] * a[5] - a[2] * a[4]);
-        inverse[3] = d * (a[0] * a[8] - a[2] * a[6]);
-        inverse[4] = d * (a[2] * a[3] - a[0] * a[5]);
-        inverse[5] = d * (a[0] * a[4] - a[1] * a[3]);
-    }
+    const double c0 = a[4] * a[8] - a[5] * a[7];
+    const double c1 = a[5] * a[6] - a[3] * a[8];
+    const double c2 = a[3] * a[7] - a[4] * a[6];
+    const double d = 1.0 / (a[0] * c0 + a[1] * c1 + a[2] * c2);
+    const double inverse[6] = {d * c0,
+                               d * (a[2] * a[7] - a[1] * a[8]),
+                               d * (a[1] * a[5] - a[2] * a[4]),
+                               d * (a[0] * a[8] - a[2] * a[6]),
+                               d * (a[2] * a[3] - a[0] * a[5]),
+                               d * (a[0] * a[4] - a[1] * a[3])};
     for (int k = 0; k < 6; ++k)
         vectors[INVERSE * length + 6 * i + k] = inverse[k];
 }

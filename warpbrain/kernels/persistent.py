@@ -77,7 +77,6 @@ def persistent_kernel(precision: Precision, shared_bytes: int, lanes: int, messa
         x: wp.array[vec3]
         max_iterations: int
         watch: int
-        jacobi: int
         exchange: wp.array[wp.float64]
         messages: wp.array[wp.uint64]
         scratch: wp.array[wp.float64]
@@ -148,8 +147,7 @@ class Meetings:
 class PersistentSolve:
     """Solves ``matrix x = b`` by one launch; its parameters are those of `warpbrain.kernels.linear.ConjugateGradient`.
 
-    `diagonal`, `b`, `x` (n,). `jacobi`: precondition by inverse diagonal blocks. `watch`: end where the smallest
-    curvature is not positive.
+    `diagonal`, `b`, `x` (n,). `watch`: end where the smallest curvature is not positive.
     """
 
     def __init__(
@@ -161,7 +159,6 @@ class PersistentSolve:
         precision: Precision,
         *,
         max_iterations: int,
-        jacobi: bool,
         watch: bool,
     ) -> None:
         device, n = b.device, b.shape[0]
@@ -172,7 +169,7 @@ class PersistentSolve:
         self._solve = s = made()
         s.offsets, s.columns, s.values, s.diagonal = matrix.offsets, matrix.columns, matrix.values, diagonal
         s.starts, s.b, s.x = wp.array(starts, dtype=int, device=device), b, x
-        s.max_iterations, s.watch, s.jacobi = max_iterations, int(watch), int(jacobi)
+        s.max_iterations, s.watch = max_iterations, int(watch)
         s.exchange, s.messages, s.scratch, s.control = m.exchange, m.messages, m.scratch, m.control
         s.outcome = wp.zeros(4, dtype=wp.float64, device=device)
         self._device = device

@@ -91,8 +91,6 @@ class Simulator:
         Iterations of a linear solve.
     newton : int
         Newton iterations a step; 1 is the paper's linearised step.
-    preconditioner : str
-        See `warpbrain.kernels.linear.PRECONDITIONERS`.
 
     Attributes
     ----------
@@ -110,7 +108,6 @@ class Simulator:
         tolerance: float = STEP_TOLERANCE,
         max_cg: int = 2000,
         newton: int = 1,
-        preconditioner: str = "block-jacobi",
     ) -> None:
         require_kind(system, System, "system", "a System, as warpbrain.System(model) gives")
         if newton < 1:
@@ -129,7 +126,7 @@ class Simulator:
         self._u_start = system.u if newton == 1 else wp.zeros_like(self.v)
         self._v_prescribed = wp.zeros_like(self.v)
         self._moving = False
-        self._cg = system.linear_solver(tolerance=self.tolerance, max_iterations=max_cg, preconditioner=preconditioner)
+        self._cg = system.linear_solver(tolerance=self.tolerance, max_iterations=max_cg)
         self._graph: Graph | None = None
         self._graph_moves = False
         system.solution.zero_()

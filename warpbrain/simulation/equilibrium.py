@@ -68,8 +68,6 @@ class EquilibriumOptions:
         Loosest relative tolerance of a linear solve; tightened as Newton converges.
     max_cg : int
         Iterations of a linear solve.
-    preconditioner : str
-        See `warpbrain.kernels.linear.PRECONDITIONERS`.
     pass_unstable : bool
         What to do where the tangent is indefinite, at limit and branching points of the equilibrium path. True: go on
         downhill, as the damped body would (snap-through), and say so in the history. False: end there with an error
@@ -89,7 +87,6 @@ class EquilibriumOptions:
     min_load_step: float = 1.0 / 1024.0
     cg_tolerance: float = 0.03
     max_cg: int = 10_000
-    preconditioner: str = "block-jacobi"
     pass_unstable: bool = True
     contracts: bool = False
     max_augmentations: int = 20
@@ -181,7 +178,6 @@ class EquilibriumSolver:
         self._linear = system.linear_solver(
             tolerance=self.options.cg_tolerance,
             max_iterations=self.options.max_cg,
-            preconditioner=self.options.preconditioner,
             watch_curvature=True,
             at_rest=True,
             factors=factors,

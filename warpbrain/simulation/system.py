@@ -496,7 +496,6 @@ class System:
         *,
         tolerance: float,
         max_iterations: int,
-        preconditioner: str = "block-jacobi",
         watch_curvature: bool = False,
         at_rest: bool = False,
         factors: KeptFactors | None = None,
@@ -512,8 +511,6 @@ class System:
         tolerance : float
             Relative.
         max_iterations : int
-        preconditioner : str
-            See `warpbrain.kernels.linear.PRECONDITIONERS`.
         watch_curvature : bool
             Tell an indefinite matrix.
         at_rest : bool
@@ -521,7 +518,7 @@ class System:
         factors : KeptFactors, optional
             Of states nearby, for an indefinite matrix.
         """
-        kind = conjugate_gradient(self.device, preconditioner, only_blocks=self.assembled)
+        kind = conjugate_gradient(self.device, only_blocks=self.assembled)
         plain = kind(
             self.matrix,
             self.diagonal,
@@ -530,7 +527,6 @@ class System:
             self.precision,
             tolerance=tolerance,
             max_iterations=max_iterations,
-            preconditioner=preconditioner,
             watch_curvature=watch_curvature,
             beyond=None if self.assembled else self._add_beyond_blocks,
             nodes=(self.model.node_mesh.points, self.free) if at_rest else None,

@@ -356,11 +356,6 @@ class DrainageTerm(Term):
         super().recall(remembered)
         self._renew()
 
-    def adopt(self, other: Term) -> None:
-        # with the other's time step too, but for the shape that this one remembers
-        super().adopt(other)
-        self._renew()
-
     def augment(self, u: wp.array) -> bool:
         if self.coupled:
             return False
