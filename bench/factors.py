@@ -17,8 +17,8 @@ import numpy as np
 from scipy.sparse.linalg import splu
 
 from warpbrain.cases.shipped import find_case
+from warpbrain.simulation.factors import SparseFactors
 from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.sparse_factors import SparseFactors
 from warpbrain.simulation.system import System
 
 

@@ -17,7 +17,7 @@ import pytest
 import warp as wp
 from verification_rows import Row, Rows
 
-from warpbrain.kernels.precision import PRECISIONS, Precision
+from warpbrain.kernels.module import PRECISIONS, Precision
 
 if TYPE_CHECKING:
     from warpbrain.diagnosis.result import Diagnosis

@@ -10,7 +10,7 @@ from many_samples import computed, samples_of, shaken_block
 from warpbrain.ensemble.course import Resting
 from warpbrain.ensemble.workers import Job, acts_before_all
 from warpbrain.errors import InputError
-from warpbrain.kernels.precision import PRECISIONS
+from warpbrain.kernels.module import PRECISIONS
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms

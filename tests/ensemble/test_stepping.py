@@ -10,7 +10,7 @@ from material_point import LAWS
 from warpbrain.ensemble.course import Moving, Resting
 from warpbrain.ensemble.sample import Sample
 from warpbrain.errors import InputError, SolveError
-from warpbrain.kernels.precision import PRECISIONS
+from warpbrain.kernels.module import PRECISIONS
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 from warpbrain.simulation.dynamics import Simulator
 from warpbrain.simulation.model import Material, Model

@@ -8,7 +8,7 @@ from bodies import matrix_of, model_of, stiffness_at
 from material_point import LAWS
 from shapes import cube, distorted
 
-from warpbrain.kernels.precision import DOUBLE, Precision
+from warpbrain.kernels.module import DOUBLE, Precision
 from warpbrain.simulation.assembly import build_pattern
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System

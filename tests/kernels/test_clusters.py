@@ -12,7 +12,7 @@ from warpbrain.ensemble.batch import pattern_of
 from warpbrain.kernels.batched import cluster
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
 from warpbrain.kernels.batched.parts import Parts
-from warpbrain.kernels.precision import DOUBLE, Precision
+from warpbrain.kernels.module import DOUBLE, Precision
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System

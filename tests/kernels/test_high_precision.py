@@ -5,7 +5,7 @@ import pytest
 from material_point import MATERIALS, Point, exact, random_rotations
 from verification_rows import Row
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 
 _ROTATIONS = random_rotations(2, seed=3)
 

@@ -13,7 +13,7 @@ from material_point import (
     stress_at,
 )
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.physics.laws import FORMULATIONS, Law, MooneyRivlin, NeoHookean, Ogden
 from warpbrain.simulation.model import Material
 

@@ -10,7 +10,7 @@ from material_point import LAWS
 from shapes import cube, distorted
 
 from warpbrain.kernels.linear import LinearResult, conjugate_gradient
-from warpbrain.kernels.precision import DOUBLE, Precision
+from warpbrain.kernels.module import DOUBLE, Precision
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
 

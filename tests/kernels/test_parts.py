@@ -7,7 +7,7 @@ from shapes import box, distorted
 
 from warpbrain.ensemble.batch import pattern_of
 from warpbrain.kernels.batched.parts import ENDS, Parts, Pattern, bisected, parts_of, spread_over_banks
-from warpbrain.kernels.precision import DOUBLE
+from warpbrain.kernels.module import DOUBLE
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System

@@ -10,7 +10,7 @@ from shapes import box, distorted
 
 from warpbrain.ensemble.batch import Batch
 from warpbrain.kernels.batched.cluster import forms_clusters
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System

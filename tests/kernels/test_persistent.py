@@ -9,7 +9,7 @@ from shapes import cube, distorted
 from warpbrain.errors import SolveError
 from warpbrain.kernels import persistent
 from warpbrain.kernels.linear import LinearResult, conjugate_gradient
-from warpbrain.kernels.precision import DOUBLE, Precision
+from warpbrain.kernels.module import DOUBLE, Precision
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
 

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from material_point import random_gradients, random_rotations
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.kernels.principal import singular_value_decomposition
 
 

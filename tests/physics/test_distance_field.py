@@ -5,7 +5,7 @@ import pytest
 import warp as wp
 from shapes import room, sphere
 
-from warpbrain.kernels.precision import DOUBLE
+from warpbrain.kernels.module import DOUBLE
 from warpbrain.physics.mechanism import ClosedSurface
 from warpbrain.physics.mechanisms.contact import DistanceField
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.physics.laws.ogden import expm1_ratio, power_minus_one, power_quotient
 
 ALPHAS = (-20.0, -11.92, -4.7, -2.0, -1.0, 1.0, 2.0, 8.0, 25.0)

@@ -8,8 +8,7 @@ from bodies import model_of
 from shapes import box, cube, distorted
 
 from warpbrain.errors import InputError
-from warpbrain.kernels.module import find_device
-from warpbrain.kernels.precision import DOUBLE, SINGLE, find_precision
+from warpbrain.kernels.module import DOUBLE, SINGLE, find_device, find_precision
 from warpbrain.mesh import QuadraticMesh, TetMesh
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.load import NodalForce

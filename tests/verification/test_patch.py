@@ -7,7 +7,7 @@ from material_point import MATERIALS, random_gradients, random_rotations, stress
 from shapes import cube, distorted
 from verification_rows import Row
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.physics.laws import NeoHookean, Ogden
 from warpbrain.simulation.equilibrium import EquilibriumOptions, solve_equilibrium
 from warpbrain.simulation.model import Material

@@ -8,7 +8,7 @@ from material_point import MATERIALS, random_gradients, random_rotations, stress
 from shapes import cube, distorted
 from verification_rows import Row
 
-from warpbrain.kernels.precision import SINGLE, Precision
+from warpbrain.kernels.module import SINGLE, Precision
 from warpbrain.mesh import surface_forces
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver

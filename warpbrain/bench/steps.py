@@ -11,8 +11,7 @@ import warp as wp
 from warpbrain.bench import command
 from warpbrain.bench.measure import BODIES, PREPROCESSING, RESTART, STEP, measure_row
 from warpbrain.bench.table3 import MAIN_LOOP, TABLE3
-from warpbrain.kernels.module import find_device
-from warpbrain.kernels.precision import find_precision
+from warpbrain.kernels.module import find_device, find_precision
 from warpbrain.report.page import lines
 from warpbrain.simulation.dynamics import finest_tolerance
 from warpbrain.terminal.progress import Progress

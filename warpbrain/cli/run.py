@@ -28,9 +28,8 @@ def run(options: argparse.Namespace) -> None:
 def _begin_loading_kernels(options: argparse.Namespace) -> None:
     """Begin to compile what every model needs; `System.load_kernels` does the rest."""
     from warpbrain.kernels.assembly import assembly_kernels
-    from warpbrain.kernels.module import begin_loading, find_device
+    from warpbrain.kernels.module import begin_loading, find_device, find_precision
     from warpbrain.kernels.multicore import team_kernels
-    from warpbrain.kernels.precision import find_precision
 
     device, precision = find_device(options.device), find_precision(options.precision)
     # the least one first: until it is compiled others wait

@@ -18,7 +18,7 @@ from warpbrain.arrays import Floats
 from warpbrain.ensemble.batch import Batch, States
 from warpbrain.ensemble.sample import Outcome, Sample, failure
 from warpbrain.kernels.linear import LinearResult
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.simulation.dynamics import STEP_TOLERANCE, fault_of_step
 from warpbrain.simulation.model import Model, require_held
 from warpbrain.simulation.relaxation import LINEAR_TOLERANCE, RelaxationOptions, least_residual

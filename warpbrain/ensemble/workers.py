@@ -29,8 +29,7 @@ from warpbrain.ensemble.course import Course, Moving, Resting, step_samples
 from warpbrain.ensemble.sample import Outcome, Sample
 from warpbrain.errors import InputError, SolveError
 from warpbrain.kernels.batched.layout import TANGENT
-from warpbrain.kernels.module import find_device
-from warpbrain.kernels.precision import find_precision
+from warpbrain.kernels.module import find_device, find_precision
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms

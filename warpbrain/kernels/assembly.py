@@ -10,8 +10,7 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import KernelSet
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import KernelSet, Precision
 
 
 @wp.func

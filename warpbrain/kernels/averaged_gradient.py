@@ -13,8 +13,7 @@ from functools import cache
 
 import warp as wp
 
-from warpbrain.kernels.module import KernelSet
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import KernelSet, Precision
 
 
 @cache

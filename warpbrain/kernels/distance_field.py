@@ -14,8 +14,7 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision, compiled_module
 
 
 @wp.func

@@ -17,8 +17,7 @@ import numpy as np
 import warp as wp
 
 from warpbrain.arrays import Floats
-from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision, compiled_module
 from warpbrain.kernels.ten_nodes import UNROLL
 
 

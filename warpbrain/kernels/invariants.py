@@ -17,7 +17,7 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.kernels.tetrahedron import ElementKernels, law_kernels
 
 

@@ -25,11 +25,10 @@ from warp.sparse import BsrMatrix
 
 from warpbrain.arrays import Floats
 from warpbrain.kernels.assembly import assembly_kernels
-from warpbrain.kernels.module import KernelSet
+from warpbrain.kernels.module import KernelSet, Precision
 from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together, team_kernels
 from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernels, sync_words
 from warpbrain.kernels.persistent import PersistentSolve, blocks_stay
-from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.row_product import LANES, row_product_kernel
 from warpbrain.threads import MOST, one_thread_of_blas
 

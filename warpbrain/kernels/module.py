@@ -1,4 +1,4 @@
-"""Where kernels are compiled: one named Warp module for each set that is always used together."""
+"""Where kernels are compiled, a named Warp module for each set that is always used together, and for what precision."""
 
 from __future__ import annotations
 
@@ -7,15 +7,46 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import warp as wp
 import warp._src.context as warp_context
 
 from warpbrain.errors import InputError
 from warpbrain.threads import thread_count
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Warp and NumPy types of one floating-point precision."""
+
+    name: str  # ``"double"`` or ``"single"``
+    scalar: Any  # Warp's types
+    vec3: Any
+    mat33: Any
+    numpy: np.dtype[Any]
+
+    @property
+    def epsilon(self) -> float:
+        """Relative rounding error of one operation."""
+        return float(np.finfo(self.numpy).eps)
+
+
+DOUBLE = Precision("double", wp.float64, wp.vec3d, wp.mat33d, np.dtype(np.float64))
+SINGLE = Precision("single", wp.float32, wp.vec3f, wp.mat33f, np.dtype(np.float32))
+PRECISIONS = {p.name: p for p in (DOUBLE, SINGLE)}
+
+
+def find_precision(name: str) -> Precision:
+    """The precision of a name, ``"double"`` or ``"single"``; `InputError` otherwise."""
+    if name not in PRECISIONS:
+        raise InputError(f"precision '{name}': expected one of {', '.join(PRECISIONS)}")
+    return PRECISIONS[name]
+
 
 #: Our kernels are chains of 3 x 3 products on one thread. LLVM's SLP vectoriser packs them into shuffles that halve the
 #: speed of the matrix-vector product on the CPU; fused multiply-adds help all of them. (The inlining thresholds are

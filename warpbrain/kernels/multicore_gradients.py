@@ -17,9 +17,8 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import KernelSet
+from warpbrain.kernels.module import SINGLE, KernelSet, Precision
 from warpbrain.kernels.multicore import PAUSE
-from warpbrain.kernels.precision import SINGLE, Precision
 
 #: Rows that are summed before anything is added to them.
 CHUNK = 64

@@ -17,8 +17,7 @@ from typing import Any
 import warp as wp
 
 from warpbrain.kernels.invariants import cofactor
-from warpbrain.kernels.module import KernelSet
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import KernelSet, Precision
 from warpbrain.kernels.ten_nodes import FAR, NEAR, POINTS, UNROLL, add_forces, gradient_at, shape_gradient
 
 

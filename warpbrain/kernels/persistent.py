@@ -27,8 +27,7 @@ from warp.sparse import BsrMatrix
 
 from warpbrain.arrays import Int32s
 from warpbrain.errors import SolveError
-from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision, compiled_module
 
 #: Threads of a block that have rows, and how many of them may share one: the most with which all rows are under way at
 #: once. One more warp adds up the sums of all blocks.

@@ -25,7 +25,7 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.kernels.tetrahedron import ElementKernels, law_kernels
 
 #: Jacobi converges quadratically; six sweeps reach round-off for any 3 x 3 matrix that an element can have.

@@ -17,7 +17,7 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.kernels.tetrahedron import DeviceLaw, ElementKernels, Stencil, element_kernels
 
 #: Quadrature points of an element; their barycentric coordinates are `NEAR` at one corner and `FAR` at the others.

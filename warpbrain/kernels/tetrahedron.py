@@ -15,8 +15,7 @@ from typing import Any, Protocol
 
 import warp as wp
 
-from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision, compiled_module
 
 #: Local node pairs (a, b) of the ten stored blocks, in storage order.
 PAIRS = ((0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3))

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Bools, Floats, Int32s
 from warpbrain.kernels.extra_energy import extra_kernels
 from warpbrain.kernels.following_pressure import triangles_struct
+from warpbrain.kernels.module import Precision
 from warpbrain.kernels.multicore import launch
-from warpbrain.kernels.precision import Precision
 from warpbrain.kernels.ten_nodes import TEN_NODES
 from warpbrain.kernels.tetrahedron import FOUR_NODES
 from warpbrain.mesh import QuadraticMesh, TetMesh

@@ -11,7 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats, Int32s
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.mesh import TetMesh
 
 T = TypeVar("T")

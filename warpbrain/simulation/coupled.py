@@ -32,8 +32,7 @@ import warp as wp
 from warpbrain.arrays import Floats
 from warpbrain.kernels.linear import LinearResult, LinearSolver
 from warpbrain.physics.term import Term
-from warpbrain.simulation.factored import KeptFactors
-from warpbrain.simulation.sparse_factors import SparseFactors
+from warpbrain.simulation.factors import KeptFactors, SparseFactors
 from warpbrain.threads import one_thread_of_blas
 
 if TYPE_CHECKING:

@@ -23,8 +23,8 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.assembly import dynamics_kernels
 from warpbrain.kernels.linear import LinearResult
+from warpbrain.kernels.module import Precision
 from warpbrain.kernels.multicore import Graph, launch
-from warpbrain.kernels.precision import Precision
 from warpbrain.seconds import Seconds
 from warpbrain.simulation.system import System
 

@@ -22,7 +22,7 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.kernels.linear import LinearResult
 from warpbrain.simulation.dynamics import PhaseClock
-from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.factors import KeptFactors
 from warpbrain.simulation.model import require_held
 from warpbrain.simulation.multisecant import Multisecant
 from warpbrain.simulation.system import System

@@ -16,7 +16,7 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.simulation.dynamics import PhaseClock
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver, NewtonStep
-from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.factors import KeptFactors
 from warpbrain.simulation.model import require_held
 from warpbrain.simulation.system import System
 

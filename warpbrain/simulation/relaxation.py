@@ -16,7 +16,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import SolveError, require_kind
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.simulation.dynamics import STEP_TOLERANCE, PhaseClock, Simulator
 from warpbrain.simulation.model import require_held
 from warpbrain.simulation.swing import Momentum, Swing

@@ -18,9 +18,8 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.linear import LinearSolver, conjugate_gradient, solver_kernels
-from warpbrain.kernels.module import begin_loading, find_device
+from warpbrain.kernels.module import begin_loading, find_device, find_precision
 from warpbrain.kernels.multicore import launch
-from warpbrain.kernels.precision import find_precision
 from warpbrain.kernels.ten_nodes import quadratic_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels
 from warpbrain.mesh.surface import EDGES
@@ -31,7 +30,7 @@ from warpbrain.physics.term import T, Term
 from warpbrain.simulation.assembly import Assembly
 from warpbrain.simulation.averaged import PART, AveragedTerm, Patches, averaged_modulus, own_modulus, patches_of
 from warpbrain.simulation.coupled import CoupledSolver
-from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.factors import KeptFactors
 from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
 from warpbrain.simulation.model import Material, Model
 

@@ -20,9 +20,8 @@ import numpy as np
 import warp as wp
 
 from warpbrain.kernels.batched.parts import ENDS, Parts, Pattern, parts_of
-from warpbrain.kernels.module import compiled_module
+from warpbrain.kernels.module import Precision, compiled_module
 from warpbrain.kernels.persistent import blocks_stay, shared_memory
-from warpbrain.kernels.precision import Precision
 
 #: Blocks of a cluster, of which the fewest that have room are taken; and threads of a block.
 SIZES, THREADS = (1, 2, 4, 8, 16), 384

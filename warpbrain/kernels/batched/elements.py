@@ -6,8 +6,7 @@ from typing import Any, TypeAlias
 import warp as wp
 
 from warpbrain.kernels.batched.layout import narrowed, samples_struct, store_tangent, store_vector, vector_of
-from warpbrain.kernels.module import KernelSet
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import KernelSet, Precision
 from warpbrain.kernels.tetrahedron import DeviceLaw
 
 #: Blocks of 128 threads that share a multiprocessor at least: of more of them registers spill, and elements of

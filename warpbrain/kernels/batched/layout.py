@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 
 #: Rows of the mesh that one thread works through; their share of a sum is added up on the way.
 ROWS = 4

@@ -25,7 +25,7 @@ from warpbrain.kernels.batched.cluster import ClusterSolve
 from warpbrain.kernels.batched.layout import stages
 from warpbrain.kernels.batched.parts import Parts, Pattern
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 
 
 class BatchedConjugateGradient:

@@ -21,8 +21,7 @@ from warpbrain.kernels.batched.layout import (
     vector_of,
     widened,
 )
-from warpbrain.kernels.module import KernelSet
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import KernelSet, Precision
 
 
 @cache

@@ -22,7 +22,7 @@ from warpbrain.kernels.batched.patch_kernels import (
     sum_kernel,
 )
 from warpbrain.kernels.batched.patches import Patches, patches_of
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.kernels.tetrahedron import DeviceLaw
 
 

@@ -15,8 +15,7 @@ from typing import Any
 import warp as wp
 
 from warpbrain.kernels.batched.patches import FIRST, SPOKES
-from warpbrain.kernels.module import KernelSet, compiled_module
-from warpbrain.kernels.precision import DOUBLE, Precision
+from warpbrain.kernels.module import DOUBLE, KernelSet, Precision, compiled_module
 from warpbrain.kernels.tetrahedron import DeviceLaw
 
 #: Threads of a block, how many of these are at a round's elements, and blocks that share a multiprocessor: of these and

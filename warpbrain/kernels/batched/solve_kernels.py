@@ -14,8 +14,7 @@ from warpbrain.kernels.batched.layout import (
     symmetric_of,
     vector_of,
 )
-from warpbrain.kernels.module import KernelSet
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import KernelSet, Precision
 
 
 @cache

@@ -16,7 +16,7 @@ from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision
 from warpbrain.kernels.tetrahedron import ElementKernels
 
 

@@ -32,8 +32,7 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.kernels.distance_field import distance_kernels, smooth_distance
-from warpbrain.kernels.module import compiled_module, threads_of_block
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision, compiled_module, threads_of_block
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.mesh.quality import extent
 from warpbrain.mesh.surface import feature_normals

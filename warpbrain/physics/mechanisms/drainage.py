@@ -45,8 +45,7 @@ import warp as wp
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.invariants import cofactor
-from warpbrain.kernels.module import KernelSet
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import KernelSet, Precision
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.expectation import Expectation

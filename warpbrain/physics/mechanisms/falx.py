@@ -17,8 +17,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpbrain.kernels.following_pressure import triangles_struct
-from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision, compiled_module
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import all_faces
 from warpbrain.physics.expectation import Expectation

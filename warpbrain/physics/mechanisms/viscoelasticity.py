@@ -26,8 +26,7 @@ import warp as wp
 
 from warpbrain.arrays import Floats
 from warpbrain.kernels.invariants import cofactor
-from warpbrain.kernels.module import compiled_module
-from warpbrain.kernels.precision import Precision
+from warpbrain.kernels.module import Precision, compiled_module
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
 from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter

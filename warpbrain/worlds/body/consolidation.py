@@ -24,7 +24,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import Coupling, Term
-from warpbrain.simulation.sparse_factors import SparseFactors
+from warpbrain.simulation.factors import SparseFactors
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors

@@ -24,7 +24,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import SolveError
-from warpbrain.simulation.sparse_factors import SparseFactors
+from warpbrain.simulation.factors import SparseFactors
 from warpbrain.threads import fill_columns
 
 #: Matrices of the size of the dense one for which there has to be memory, and columns that are solved together.

@@ -30,7 +30,7 @@ from warpbrain.physics.composition import CompositionError
 from warpbrain.physics.mechanism import Following, Mechanism
 from warpbrain.physics.proposal import Patch
 from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
-from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.factors import KeptFactors
 from warpbrain.simulation.locking import elements_of_fits
 from warpbrain.simulation.model import Material, all_substituted
 from warpbrain.simulation.of_case import model_of

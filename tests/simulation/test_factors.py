@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from warpbrain.simulation.sparse_factors import SparseFactors
+from warpbrain.simulation.factors import SparseFactors
 
 
 def _matrix(n: int = 400):

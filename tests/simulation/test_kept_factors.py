@@ -11,7 +11,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.drainage import Drainage
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.simulation.equilibrium import EquilibriumOptions
-from warpbrain.simulation.factored import KeptFactors
+from warpbrain.simulation.factors import KeptFactors
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
