@@ -39,8 +39,8 @@ def _pressure_at(p: wp.array[Any], patches: wp.array2d[int], e: int, point: int,
 
 
 @cache
-def nodal_volume_kernels(precision: Precision) -> tuple[Any, Any, KernelSet]:
-    """Make (once) what the kernels of a precision know of patches and of the couplings in these, and the kernels."""
+def nodal_volume_kernels(precision: Precision) -> tuple[Any, KernelSet]:
+    """Make (once) what the kernels of a precision know of elements and patches, and the kernels."""
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"nodal_volume_{precision.name}", unroll=UNROLL)
     share = wp.constant(scalar(1.0 / POINTS))
@@ -63,9 +63,6 @@ def nodal_volume_kernels(precision: Precision) -> tuple[Any, Any, KernelSet]:
         ratio: wp.array[scalar]
         p: wp.array[scalar]
         c: wp.array[scalar]
-
-    @wp.struct
-    class Couplings:
         # `g` has a row for each node of each patch, the sum of some parts of elements; `by_node` is in that of nodes
         part_first: wp.array[int]
         parts: wp.array[int]
@@ -73,14 +70,13 @@ def nodal_volume_kernels(precision: Precision) -> tuple[Any, Any, KernelSet]:
         by_node: wp.array[vec3]
         # of each patch: its nodes, and how much its pressure changes
         patch_first: wp.array[int]
-        nodes: wp.array[int]
-        c: wp.array[scalar]
+        patch_nodes: wp.array[int]
         change: wp.array[scalar]
-        # of each node: its rows of `g`, and the patch of each
+        # of each node: its rows of `g`, the patch of each, and which block of an element has its diagonal one
         node_first: wp.array[int]
         entries: wp.array[int]
-        patches: wp.array[int]
-        blocks: wp.array2d[mat33]
+        node_patches: wp.array[int]
+        diagonal: wp.array[int]
 
     @kernels.add
     def moments(v: Volumes, u: wp.array[vec3]):
@@ -157,39 +153,39 @@ def nodal_volume_kernels(precision: Precision) -> tuple[Any, Any, KernelSet]:
                     blocks[e, block] = K
 
     @kernels.add
-    def gather(k: Couplings, of_elements: wp.array[vec3]):
+    def gather(v: Volumes, of_elements: wp.array[vec3]):
         """One thread for a node of a patch: `g_ab`."""
         row = wp.tid()
         total = vec3()
-        for part in range(k.part_first[row], k.part_first[row + 1]):
-            total += of_elements[k.parts[part]]
-        k.g[row] = total
+        for part in range(v.part_first[row], v.part_first[row + 1]):
+            total += of_elements[v.parts[part]]
+        v.g[row] = total
 
     @kernels.add
-    def diagonal(k: Couplings):
-        """One thread for a node: its rows of `g` in its own order, and its diagonal block."""
+    def diagonal(v: Volumes, blocks: wp.array[mat33]):
+        """One thread for a node: its rows of `g` one after the other, and its diagonal block, added to an element's."""
         b = wp.tid()
-        total = mat33()
-        for i in range(k.node_first[b], k.node_first[b + 1]):
-            g_ab = k.g[k.entries[i]]
+        total = blocks[v.diagonal[b]]
+        for i in range(v.node_first[b], v.node_first[b + 1]):
+            g_ab = v.g[v.entries[i]]
             # every product with a vector reads this, one after the other
-            k.by_node[i] = g_ab
-            total += wp.outer(k.c[k.patches[i]] * g_ab, g_ab)
-        k.blocks[b, 0] = total
+            v.by_node[i] = g_ab
+            total += wp.outer(v.c[v.node_patches[i]] * g_ab, g_ab)
+        blocks[v.diagonal[b]] = total
 
     @kernels.add
-    def taken_up(k: Couplings, columns: wp.array[vec3], x: wp.array[vec3]):
+    def taken_up(v: Volumes, columns: wp.array[vec3], x: wp.array[vec3]):
         """One thread for a patch: the change of `p_a`."""
         a = wp.tid()
         total = scalar(0.0)
-        for i in range(k.patch_first[a], k.patch_first[a + 1]):
-            b = k.nodes[i]
-            total += wp.dot(k.g[i], wp.cw_mul(columns[b], x[b]))
-        k.change[a] = k.c[a] * total
+        for i in range(v.patch_first[a], v.patch_first[a + 1]):
+            b = v.patch_nodes[i]
+            total += wp.dot(v.g[i], wp.cw_mul(columns[b], x[b]))
+        v.change[a] = v.c[a] * total
 
     @kernels.add
     def push(
-        k: Couplings,
+        v: Volumes,
         columns: wp.array[vec3],
         rows: wp.array[vec3],
         x: wp.array[vec3],
@@ -199,9 +195,11 @@ def nodal_volume_kernels(precision: Precision) -> tuple[Any, Any, KernelSet]:
     ):
         """One thread for a node: what that does to it without its diagonal block, added to `y`."""
         b = wp.tid()
-        force = -(k.blocks[b, 0] * wp.cw_mul(columns[b], x[b]))
-        for i in range(k.node_first[b], k.node_first[b + 1]):
-            force += k.change[k.patches[i]] * k.by_node[i]
+        own = wp.cw_mul(columns[b], x[b])
+        force = vec3()
+        for i in range(v.node_first[b], v.node_first[b + 1]):
+            a = v.node_patches[i]
+            force += (v.change[a] - v.c[a] * wp.dot(v.by_node[i], own)) * v.by_node[i]
         y[b] += factor * scale[0] * wp.cw_mul(rows[b], force)
 
-    return Volumes, Couplings, kernels
+    return Volumes, kernels

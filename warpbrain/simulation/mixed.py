@@ -31,28 +31,22 @@ from warpbrain.kernels.nodal_volume import nodal_volume_kernels
 from warpbrain.physics.term import Body, Term
 
 
-class _PatchTerm(Term):
-    """Of the material itself."""
-
-    in_full = True
-
-    def _ints(self, values: NDArray[Any]) -> wp.array:
-        return self.array(np.ascontiguousarray(values, dtype=np.int32), int)
-
-
-class NodalVolumeTerm(_PatchTerm):
+class NodalVolumeTerm(Term):
     """Forces and blocks of the pressure in each element, and the energy of all patches, on a body of quadratic
     elements.
 
+    How pressures follow the displacement, `sum_a c_a g_ab (x) g_ac`, has its diagonal in blocks, the rest is in none.
     `logarithmic` (m,) says whether `U = (ln J)^2 / 2` in an element (laws of the coupled formulation), or `(J - 1)^2 /
     2`; `kinds` (m,) are `warpbrain.simulation.model.Model.element_kinds`.
     """
 
+    in_full = True
+
     def __init__(self, body: Body, logarithmic: Bools, kinds: Ints) -> None:
         assert body.quadratic is not None
         super().__init__(body, body.quadratic.elements)
-        p, mesh = body.precision, body.mesh
-        made, _, self._kernels = nodal_volume_kernels(p)
+        p, mesh, size = body.precision, body.mesh, len(body.quadratic.points)
+        made, self._kernels = nodal_volume_kernels(p)
         count, corners = len(mesh.tetrahedra), self.stencils[:, :4]
         keys, patches = np.unique(corners * (kinds.max() + 1) + kinds[:, None], return_inverse=True)
         patches = patches.reshape(count, 4)
@@ -69,15 +63,26 @@ class NodalVolumeTerm(_PatchTerm):
         v.first = self._ints(np.searchsorted(patches.ravel()[order], np.arange(self.count + 1)))
         v.corners, v.logarithmic = self._ints(order), self._ints(of_patch)
         v.moments = self.zeros(count, 4)
-        v.volumes, v.moduli, v.ratio, v.p = (self.zeros(self.count) for _ in range(4))
-        #: `c_a` and what each element adds to `g_ab`, row by row.
-        self.curvature = v.c = self.zeros(self.count)
-        self.of_elements = self.zeros(count, 40, dtype=p.vec3)
+        v.volumes, v.moduli, v.ratio, v.p, v.c, v.change = (self.zeros(self.count) for _ in range(6))
+        # what each element adds to `g_ab`, row by row, by patch and node
+        self._of_elements = self.zeros(count, 40, dtype=p.vec3)
+        keys = (patches[:, :, None] * size + self.stencils.astype(np.int64)[:, None, :]).ravel()
+        parts = np.argsort(keys, kind="stable")
+        starts = np.flatnonzero(np.diff(keys[parts], prepend=-1))
+        owners, nodes = np.divmod(keys[parts][starts], size)
+        entries = np.argsort(nodes, kind="stable")
+        v.part_first, v.parts = self._ints(np.r_[starts, len(parts)]), self._ints(parts)
+        v.patch_first = self._ints(np.searchsorted(owners, np.arange(self.count + 1)))
+        v.node_first = self._ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
+        v.patch_nodes, v.entries, v.node_patches = map(self._ints, (nodes, entries, owners[entries]))
+        element, place = np.divmod(np.unique(self.stencils, return_index=True)[1], 10)
+        v.diagonal = self._ints(55 * element + place * (19 - place) // 2 + place)
+        # in the order of patches, and in that of nodes
+        v.g, v.by_node = (self.zeros(len(starts), dtype=p.vec3) for _ in range(2))
+        self._one = self.array(np.ones(1), p.scalar)
 
-    @property
-    def patches(self) -> Ints:
-        """The patch at each corner of each element (m, 4)."""
-        return self._patches
+    def _ints(self, values: NDArray[Any]) -> wp.array:
+        return self.array(np.ascontiguousarray(values, dtype=np.int32), int)
 
     def set_elements(self, modulus: Floats, weight: Floats, growth: Floats) -> None:
         """Take what the elements (m,) have: volumetric modulus [Pa] of the law, factor on the energy, and how many
@@ -105,8 +110,10 @@ class NodalVolumeTerm(_PatchTerm):
         self.launch(self._kernels.forces, self._evaluate(u), self._on_device, u, self.forces)
 
     def evaluate_tangents(self, u: wp.array) -> None:
-        outputs = self.forces, self.blocks, self.of_elements
-        self.launch(self._kernels.tangents, self._evaluate(u), self._on_device, u, *outputs)
+        v, outputs = self._on_device, (self.forces, self.blocks, self._of_elements)
+        self.launch(self._kernels.tangents, self._evaluate(u), v, u, *outputs)
+        self.launch(self._kernels.gather, len(v.g), v, self._of_elements.flatten())
+        self.launch(self._kernels.diagonal, len(v.diagonal), v, self.blocks.flatten())
 
     def energy(self, u: wp.array) -> float:
         self._evaluate(u)
@@ -121,71 +128,24 @@ class NodalVolumeTerm(_PatchTerm):
         self._evaluate(u)
         return np.asarray(self._on_device.p.numpy().astype(np.float64)[self._patches].mean(axis=1))
 
-
-class PatchStiffnessTerm(_PatchTerm):
-    """`sum_a c_a g_ab (x) g_ac`: how pressures follow the displacement. Its diagonal is in blocks, the rest is not.
-
-    Its tangents are evaluated after those of `volumes`.
-    """
-
-    def __init__(self, volumes: NodalVolumeTerm) -> None:
-        body = volumes.body
-        assert body.quadratic is not None
-        size = len(body.quadratic.points)
-        super().__init__(body, np.arange(size)[:, None])
-        p = body.precision
-        _, made, self._kernels = nodal_volume_kernels(p)
-        self._volumes = volumes
-        nodes = np.repeat(volumes.stencils.astype(np.int64)[:, None, :], 4, axis=1)
-        keys = (volumes.patches[:, :, None] * size + nodes).ravel()
-        parts = np.argsort(keys, kind="stable")
-        starts = np.flatnonzero(np.r_[True, np.diff(keys[parts]) != 0])
-        patches, nodes = np.divmod(keys[parts][starts], size)
-        entries = np.argsort(nodes, kind="stable")
-
-        self._on_device = k = made()
-        k.part_first, k.parts = self._ints(np.r_[starts, len(parts)]), self._ints(parts)
-        k.patch_first = self._ints(np.searchsorted(patches, np.arange(volumes.count + 1)))
-        k.node_first = self._ints(np.searchsorted(nodes[entries], np.arange(size + 1)))
-        k.nodes, k.entries, k.patches = self._ints(nodes), self._ints(entries), self._ints(patches[entries])
-        # in the order of patches, and in that of nodes
-        k.g, k.by_node = (self.zeros(len(starts), dtype=p.vec3) for _ in range(2))
-        k.c, k.change = volumes.curvature, self.zeros(volumes.count)
-        self._one = self.array(np.ones(1), p.scalar)
-
-    def place(self, forces: wp.array, blocks: wp.array) -> None:
-        super().place(forces, blocks)
-        self._on_device.blocks = blocks
-
-    def evaluate_forces(self, u: wp.array) -> None:
-        self.forces.zero_()
-
-    def evaluate_tangents(self, u: wp.array) -> None:
-        self.forces.zero_()
-        k = self._on_device
-        self.launch(self._kernels.gather, len(k.g), k, self._volumes.of_elements.flatten())
-        self.launch(self._kernels.diagonal, len(self.stencils), k)
-
     def add_stiffness(
         self, x: wp.array, factor: float, y: wp.array, columns: wp.array, rows: wp.array, scale: wp.array | None = None
     ) -> None:
         """See `Term.add_stiffness`; `scale` (1,) is one more factor, which a captured graph reads."""
-        k, scale = self._on_device, self._one if scale is None else scale
-        self.launch(self._kernels.taken_up, self._volumes.count, k, columns, x)
+        v, scale = self._on_device, self._one if scale is None else scale
+        self.launch(self._kernels.taken_up, self.count, v, columns, x)
         inputs = columns, rows, x, self.body.precision.scalar(factor), scale, y
-        self.launch(self._kernels.push, len(self.stencils), k, *inputs)
+        self.launch(self._kernels.push, len(v.diagonal), v, *inputs)
 
     def stiffness(self) -> Any:
         """What is not in blocks, as a SciPy matrix (3 n, 3 n) [N/m]."""
         from scipy.sparse import block_diag, csr_matrix, diags
 
-        k = self._on_device
-        g = k.by_node.numpy().astype(np.float64)
-        columns = 3 * k.nodes.numpy()[k.entries.numpy(), None] + np.arange(3)
-        shape = (self._volumes.count, 3 * len(self.stencils))
-        G = csr_matrix((g.ravel(), (np.repeat(k.patches.numpy(), 3), columns.ravel())), shape)
-        diagonal = block_diag(list(self.blocks.numpy()[:, 0].astype(np.float64)))
-        return G.T @ diags(self._volumes.curvature.numpy().astype(np.float64)) @ G - diagonal
-
-    def energy(self, u: wp.array) -> float:
-        return 0.0
+        v = self._on_device
+        g, c = v.by_node.numpy().astype(np.float64), v.c.numpy().astype(np.float64)
+        owners, starts = v.node_patches.numpy(), v.node_first.numpy()
+        nodes = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        columns = 3 * nodes[:, None] + np.arange(3)
+        G = csr_matrix((g.ravel(), (np.repeat(owners, 3), columns.ravel())), (self.count, 3 * (len(starts) - 1)))
+        diagonal = np.add.reduceat(c[owners, None, None] * g[:, :, None] * g[:, None, :], starts[:-1])
+        return G.T @ diags(c) @ G - block_diag(list(diagonal))

@@ -31,7 +31,7 @@ from warpbrain.simulation.assembly import Assembly
 from warpbrain.simulation.averaged import PART, AveragedTerm, Patches, averaged_modulus, own_modulus, patches_of
 from warpbrain.simulation.coupled import CoupledSolver
 from warpbrain.simulation.factors import KeptFactors
-from warpbrain.simulation.mixed import NodalVolumeTerm, PatchStiffnessTerm
+from warpbrain.simulation.mixed import NodalVolumeTerm
 from warpbrain.simulation.model import Material, Model
 
 
@@ -122,15 +122,12 @@ class System:
         self.groups = self._group_elements()
         self.terms += [term for group in self.groups for term in group.averaged]
         self._volumes_at_nodes: NodalVolumeTerm | None = None
-        self._beyond_blocks: PatchStiffnessTerm | None = None
         if self._mixes:
             logarithmic = {label: m.formulation == "coupled" for label, m in model.materials.items()}
             self._volumes_at_nodes = NodalVolumeTerm(
                 self, self._by_element(logarithmic).astype(bool), model.element_kinds
             )
-            # in this order: the second takes its numbers from the first
-            self._beyond_blocks = PatchStiffnessTerm(self._volumes_at_nodes)
-            self.terms += [self._volumes_at_nodes, self._beyond_blocks]
+            self.terms.append(self._volumes_at_nodes)
         self._coupled = [term for term in self.terms if term.coupling is not None]
         self._place_pattern()
         self._place_fields()
@@ -413,7 +410,7 @@ class System:
         to it `coupling` times, if that is given.
         """
         scalar = self.precision.scalar
-        if self._beyond_blocks is not None:
+        if self._volumes_at_nodes is not None:
             self._stiffness_factor.fill_(k)
         self.coupling_factor = k if coupling is None else coupling
         self._launch(
@@ -432,7 +429,7 @@ class System:
         # the values are gathered into the same array again
         values = self.matrix.values.numpy().astype(np.float64)
         K = bsr_matrix((values, self.matrix.columns.numpy(), self.matrix.offsets.numpy()))
-        return K if self._beyond_blocks is None else K + self._beyond_blocks.stiffness()
+        return K if self._volumes_at_nodes is None else K + self._volumes_at_nodes.stiffness()
 
     def skew_stiffness(self) -> Any:
         """What `stiffness` lacks at `u`: the skew part of terms without a potential, SciPy; None if there is none."""
@@ -453,12 +450,12 @@ class System:
     @property
     def assembled(self) -> bool:
         """Whether all of the stiffness is in blocks, unknowns of a term's own apart."""
-        return self._beyond_blocks is None
+        return self._volumes_at_nodes is None
 
     def _add_beyond_blocks(self, x: wp.array, factor: float, y: wp.array) -> None:
         """Add to `y` a factor times what is not in the matrix of the last `assemble`, but for couplings."""
-        assert self._beyond_blocks is not None
-        self._beyond_blocks.add_stiffness(x, factor, y, self.free, self.free, self._stiffness_factor)
+        assert self._volumes_at_nodes is not None
+        self._volumes_at_nodes.add_stiffness(x, factor, y, self.free, self.free, self._stiffness_factor)
 
     def subtract_constrained_load(self, increment: wp.array, k: float, coupling: float | None = None) -> None:
         """`load -= k K increment` on the free components, for increments of the constrained ones.
