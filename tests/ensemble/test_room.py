@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from warpbrain.ensemble.room import ResultRoom
+from warpbrain.ensemble.batch import ResultRoom
 
 
 def test_room_is_of_one_taker() -> None:

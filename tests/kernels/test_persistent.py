@@ -91,7 +91,7 @@ def test_blocks_that_give_up_are_told(cuda: str) -> None:
         system.matrix, system.diagonal, system.load, system.solution, DOUBLE,
         max_iterations=1000, watch=False,
     )  # fmt: skip
-    solver._meetings.control.assign([0, 1])
+    solver._solve.control.assign([0, 1])
     solver.launch(1e-6)
     with pytest.raises(SolveError, match="waited two seconds for each other"):
         solver.outcome()

@@ -116,33 +116,6 @@ def share_rows(offsets: Int32s, blocks: int) -> tuple[Int32s, int, int]:
     return starts, lanes, -(-blocks * _SUMS // 32)
 
 
-class Meetings:
-    """Where blocks leave what others read."""
-
-    def __init__(self, rows: int, blocks: int, device: wp.Device) -> None:
-        self._device = device
-        # two places that take turns, and one for the solution, with four numbers a row
-        self.exchange = wp.zeros(12 * rows, dtype=wp.float64, device=device)
-        # two places that take turns, with a message for each sum of a block
-        self.messages = wp.zeros(4 * _SUMS * blocks, dtype=wp.uint64, device=device)
-        # what has no room on the chip
-        self.scratch = wp.zeros(_NUMBERS * rows, dtype=wp.float64, device=device)
-        # the number of the last meeting, and whether one failed
-        self.control = wp.zeros(2, dtype=int, device=device)
-
-    def check(self) -> None:
-        """Raise `SolveError` if a block did not hear from another; the next solve may then try again."""
-        if not self.control.numpy()[1]:
-            return
-        self.control.zero_()
-        self.messages.zero_()
-        self.exchange.zero_()
-        raise SolveError(
-            f"conjugate gradients on {self._device.name}: its blocks waited two seconds for each other, because "
-            "something else holds a part of it; with WARPBRAIN_PERSISTENT=0 in the environment they need not wait"
-        )
-
-
 class PersistentSolve:
     """Solves ``matrix x = b`` by one launch; its parameters are those of `warpbrain.kernels.linear.ConjugateGradient`.
 
@@ -164,12 +137,18 @@ class PersistentSolve:
         self._blocks = max(1, min(device.sm_count, _MOST_BLOCKS, n // _LEAST_ROWS))
         starts, lanes, messages = share_rows(matrix.offsets.numpy(), self._blocks)
         made, self._kernel = persistent_kernel(precision, shared_memory(device), lanes, messages)
-        self._meetings = m = Meetings(n, self._blocks, device)
         self._solve = s = made()
         s.offsets, s.columns, s.values, s.diagonal = matrix.offsets, matrix.columns, matrix.values, diagonal
         s.starts, s.b, s.x = wp.array(starts, dtype=int, device=device), b, x
         s.max_iterations, s.watch = max_iterations, int(watch)
-        s.exchange, s.messages, s.scratch, s.control = m.exchange, m.messages, m.scratch, m.control
+        # where blocks leave what others read: two places that take turns, and one for the solution, with four numbers a
+        # row; two places that take turns, with a message for each sum of a block
+        s.exchange = wp.zeros(12 * n, dtype=wp.float64, device=device)
+        s.messages = wp.zeros(4 * _SUMS * self._blocks, dtype=wp.uint64, device=device)
+        # what has no room on the chip
+        s.scratch = wp.zeros(_NUMBERS * n, dtype=wp.float64, device=device)
+        # the number of the last meeting, and whether one failed
+        s.control = wp.zeros(2, dtype=int, device=device)
         s.outcome = wp.zeros(4, dtype=wp.float64, device=device)
         self._device = device
 
@@ -186,8 +165,15 @@ class PersistentSolve:
     def outcome(self) -> tuple[int, float, float, float]:
         """Iterations, residual, the norm that was to be reached and the smallest curvature of the last solve.
 
-        `SolveError` if a block did not hear from another.
+        `SolveError` if a block did not hear from another; the next solve may then try again.
         """
-        self._meetings.check()
-        iterations, residual, goal, curvature = self._solve.outcome.numpy()
+        s = self._solve
+        if s.control.numpy()[1]:
+            for array in (s.control, s.messages, s.exchange):
+                array.zero_()
+            raise SolveError(
+                f"conjugate gradients on {self._device.name}: its blocks waited two seconds for each other, because "
+                "something else holds a part of it; with WARPBRAIN_PERSISTENT=0 in the environment they need not wait"
+            )
+        iterations, residual, goal, curvature = s.outcome.numpy()
         return int(iterations), float(residual), float(goal), float(curvature)
