@@ -68,6 +68,15 @@ def _uncoupled_derivatives(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any]
     return d1, d2, dJ, zero, zero, d1J, zero, d2J, dJJ
 
 
+def device_code(name: str, *, second_invariant: bool = True) -> dict[str, InvariantLaw]:
+    """Device code of a law by its formulations, of the parameters `C1` and `C2`; without `second_invariant` of `C1`."""
+    coupled, uncoupled = (_coupled_energy, _coupled_derivatives), (_uncoupled_energy, _uncoupled_derivatives)
+    return {
+        "coupled": InvariantLaw(f"{name}_coupled", *coupled, second_invariant),
+        "uncoupled": InvariantLaw(f"{name}_uncoupled", *uncoupled, second_invariant),
+    }
+
+
 @dataclass(frozen=True)
 class MooneyRivlin(Law):
     """Mooney-Rivlin law.
@@ -86,12 +95,7 @@ class MooneyRivlin(Law):
     C1: float
     C2: float
     name: ClassVar[str] = "mooney-rivlin"
-    device: ClassVar[Mapping[str, InvariantLaw]] = {
-        "coupled": InvariantLaw("mooney_rivlin_coupled", _coupled_energy, _coupled_derivatives, second_invariant=True),
-        "uncoupled": InvariantLaw(
-            "mooney_rivlin_uncoupled", _uncoupled_energy, _uncoupled_derivatives, second_invariant=True
-        ),
-    }
+    device: ClassVar[Mapping[str, InvariantLaw]] = device_code("mooney_rivlin")
     keys: ClassVar[Mapping[str, LawKey]] = {
         "C1": LawKey("First Mooney-Rivlin modulus."),
         "C2": LawKey("Second Mooney-Rivlin modulus."),

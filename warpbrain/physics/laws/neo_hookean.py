@@ -6,59 +6,15 @@ uncoupled  Psi = mu/2 (J^(-2/3) I1 - 3) + K/2 (J - 1)^2
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-import warp as wp
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.laws.device import InvariantLaw
 from warpbrain.physics.laws.law import MODULUS, Coordinate, Law, LawKey, require_finite
-
-
-@wp.func
-def _coupled_energy(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
-    lam = parameters[e, 0]
-    mu = parameters[e, 1]
-    log_J = wp.log(J)
-    half = type(J)(0.5)
-    return half * mu * (I1 - type(J)(3.0)) - mu * log_J + half * lam * log_J * log_J
-
-
-@wp.func
-def _coupled_derivatives(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
-    lam = parameters[e, 0]
-    mu = parameters[e, 1]
-    zero = type(J)(0.0)
-    pressure = lam * wp.log(J) - mu
-    return (
-        type(J)(0.5) * mu, zero, pressure / J,
-        zero, zero, zero, zero, zero, (lam - pressure) / (J * J),
-    )  # fmt: skip
-
-
-@wp.func
-def _uncoupled_energy(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
-    K = parameters[e, 0]
-    mu = parameters[e, 1]
-    root = wp.cbrt(J)
-    dilation = J - type(J)(1.0)
-    return type(J)(0.5) * (mu * (I1 / (root * root) - type(J)(3.0)) + K * dilation * dilation)
-
-
-@wp.func
-def _uncoupled_derivatives(I1: Any, I2: Any, J: Any, parameters: wp.array2d[Any], e: int):
-    K = parameters[e, 0]
-    mu = parameters[e, 1]
-    zero = type(J)(0.0)
-    root = wp.cbrt(J)
-    d1 = type(J)(0.5) * mu / (root * root)
-    d1J = type(J)(-2.0) / type(J)(3.0) * d1 / J
-    return (
-        d1, zero, d1J * I1 + K * (J - type(J)(1.0)),
-        zero, zero, d1J, zero, zero, type(J)(-5.0) / type(J)(3.0) * d1J * I1 / J + K,
-    )  # fmt: skip
+from warpbrain.physics.laws.mooney_rivlin import device_code
 
 
 @dataclass(frozen=True)
@@ -78,12 +34,7 @@ class NeoHookean(Law):
 
     mu: float
     name: ClassVar[str] = "neo-hookean"
-    device: ClassVar[Mapping[str, InvariantLaw]] = {
-        "coupled": InvariantLaw("neo_hookean_coupled", _coupled_energy, _coupled_derivatives, second_invariant=False),
-        "uncoupled": InvariantLaw(
-            "neo_hookean_uncoupled", _uncoupled_energy, _uncoupled_derivatives, second_invariant=False
-        ),
-    }
+    device: ClassVar[Mapping[str, InvariantLaw]] = device_code("neo_hookean", second_invariant=False)
     keys: ClassVar[Mapping[str, LawKey]] = {"mu": LawKey("Shear modulus.")}
     coordinates: ClassVar[tuple[Coordinate, ...]] = (MODULUS,)
 
@@ -99,6 +50,10 @@ class NeoHookean(Law):
     @classmethod
     def of_shear_modulus(cls, mu: float) -> "NeoHookean":
         return cls(mu)
+
+    def parameters(self) -> tuple[float, ...]:
+        """Of Mooney-Rivlin's device code: `C1 = mu/2` and no `C2`."""
+        return 0.5 * self.mu, 0.0
 
     def energy(self, stretches: Floats) -> Floats:
         return 0.5 * self.mu * (np.sum(stretches**2, axis=-1) - 3.0)
