@@ -234,6 +234,33 @@ def element_kernels(
     return Group, forces, forces_and_tangents, energy
 
 
+def of_elastic_part(stress: Any, energy: Any, tangents: Any, precision: Precision) -> tuple[Any, Any, Any]:
+    """Device functions, as those of `ElementKernels`, of tissue that has grown or shrunk by itself.
+
+    With `F = F_e F_g`, `F_g = s I` (Rodriguez et al. 1994), only `F_e = F/s` is elastic, and the energy is that of the
+    grown volume, `Psi_g(F) = s^3 Psi(F/s)`. So `P = s^2 P_e` and `dP/dF = s dP_e/dF_e`. `s` is the last parameter.
+    """
+    scalar, mat33 = precision.scalar, precision.mat33
+
+    @wp.func
+    def stress_of(F: mat33, parameters: wp.array2d[scalar], e: int):
+        s = parameters[e, parameters.shape[1] - 1]
+        return s * s * stress(F / s, parameters, e)
+
+    @wp.func
+    def energy_of(F: mat33, parameters: wp.array2d[scalar], e: int):
+        s = parameters[e, parameters.shape[1] - 1]
+        return s * s * s * energy(F / s, parameters, e)
+
+    @wp.func
+    def tangents_of(F: mat33, G: mat33, V: scalar, parameters: wp.array2d[scalar], e: int):
+        s = parameters[e, parameters.shape[1] - 1]
+        VP, K11, K12, K13, K22, K23, K33 = tangents(F / s, G, s * V, parameters, e)
+        return s * VP, K11, K12, K13, K22, K23, K33
+
+    return stress_of, energy_of, tangents_of
+
+
 def law_kernels(key: str, stress_of: Any, energy_of: Any, tangents_of: Any, precision: Precision) -> ElementKernels:
     """The kernels of a law on linear tetrahedra, and those at given `F`."""
     scalar, mat33 = precision.scalar, precision.mat33

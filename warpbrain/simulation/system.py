@@ -21,10 +21,10 @@ from warpbrain.kernels.linear import LinearSolver, conjugate_gradient, solver_ke
 from warpbrain.kernels.module import begin_loading, find_device, find_precision
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.ten_nodes import quadratic_kernels
-from warpbrain.kernels.tetrahedron import ElementKernels
+from warpbrain.kernels.tetrahedron import DeviceLaw, ElementKernels
 from warpbrain.mesh.surface import EDGES
 from warpbrain.physics.laws import Law
-from warpbrain.physics.laws.device import grown
+from warpbrain.physics.laws.device import GrownLaw
 from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import T, Term
 from warpbrain.simulation.assembly import Assembly
@@ -174,8 +174,8 @@ class System:
         groups = []
         for (law_type, formulation), materials in self._grouped(self.model).items():
             members = np.flatnonzero(np.isin(self.mesh.tissue, list(materials)))
-            device_law = law_type.device_law(formulation)
-            device_law = grown(device_law) if self.model.growing else device_law
+            law = law_type.device_law(formulation)
+            device_law: DeviceLaw = GrownLaw(law) if self.model.growing else law
             linear = self.quadratic is None
             kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
             averaged = [AveragedTerm(self, patches, kernels) for patches in self._patches(list(materials))]
