@@ -1,4 +1,4 @@
-// Native functions of the kernel that assembles a patch of a sample's mesh; patch_kernels.py says what they are for
+// Native functions of the kernel that assembles a patch of a sample's mesh; patch_assembly.py says what they are for
 // and what their arguments are. REAL, THREADS, WIDTH, FIRST, BITS and SPOKES are put before each, and what all of them have:
 
 //// all
