@@ -16,52 +16,27 @@ import warp as wp
 
 from warpbrain.kernels.module import Precision, compiled_module
 
+#: Barycentric coordinates below this are rounding.
+_ON_SIDE = 1e-6
+
 
 @wp.func
-def closest_on_triangle(x: Any, a: Any, b: Any, c: Any):
-    """Closest point and its feature: 0 (inside), 1 to 3 (edges ab, bc, ca) and 4 to 6 (corners).
-
-    Regions as in Ericson, Real-Time Collision Detection (2005), section 5.1.5.
-    """
+def _feature(u: float, v: float, w: float):
+    """What of a triangle a point is on: 0 the inside, 1 to 3 edges ab, bc, ca, 4 to 6 corners."""
     feature = 0
-    zero = a.dtype(0.0)
-    one = a.dtype(1.0)
-    ab = b - a
-    ac = c - a
-    ax = x - a
-    bx = x - b
-    cx = x - c
-    d1 = wp.dot(ab, ax)
-    d2 = wp.dot(ac, ax)
-    d3 = wp.dot(ab, bx)
-    d4 = wp.dot(ac, bx)
-    d5 = wp.dot(ab, cx)
-    d6 = wp.dot(ac, cx)
-    va = d3 * d6 - d5 * d4
-    vb = d5 * d2 - d1 * d6
-    vc = d1 * d4 - d3 * d2
-    p = a
-    if d1 <= zero and d2 <= zero:
-        feature = 4
-    elif d3 >= zero and d4 <= d3:
-        p = b
-        feature = 5
-    elif d6 >= zero and d5 <= d6:
-        p = c
-        feature = 6
-    elif vc <= zero and d1 >= zero and d3 <= zero:
-        p = a + d1 / (d1 - d3) * ab
+    if w < _ON_SIDE:
         feature = 1
-    elif vb <= zero and d2 >= zero and d6 <= zero:
-        p = a + d2 / (d2 - d6) * ac
-        feature = 3
-    elif va <= zero and (d4 - d3) >= zero and (d5 - d6) >= zero:
-        p = b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b)
+    if u < _ON_SIDE:
         feature = 2
-    else:
-        share = one / (va + vb + vc)
-        p = a + vb * share * ab + vc * share * ac
-    return p, feature
+    if v < _ON_SIDE:
+        feature = 3
+    if v < _ON_SIDE and w < _ON_SIDE:
+        feature = 4
+    if w < _ON_SIDE and u < _ON_SIDE:
+        feature = 5
+    if u < _ON_SIDE and v < _ON_SIDE:
+        feature = 6
+    return feature
 
 
 @cache
@@ -138,7 +113,7 @@ def smooth_distance(precision: Precision) -> Any:
 def distance_kernels(precision: Precision) -> tuple[Any, Any]:
     """Kernels that fill a grid with signed distances, and that evaluate the spline at points.
 
-    ``(mesh, points, corners, normals, rim, origin, spacing, reach) -> grid``, one thread for each of its nodes, and
+    ``(mesh, points, corners, normals, rim, spacing, reach) -> grid``, points from its origin, and
     ``(points, coefficients, origin, spacing) -> distances, directions``.
     """
     scalar, vec3 = precision.scalar, precision.vec3
@@ -152,21 +127,23 @@ def distance_kernels(precision: Precision) -> tuple[Any, Any]:
         corners: wp.array[wp.vec3i],
         normals: wp.array2d[vec3],
         rim: wp.array2d[wp.bool],
-        origin: vec3,
         spacing: scalar,
         reach: scalar,
         grid: wp.array3d[scalar],
     ):
         i, j, k = wp.tid()
-        x = origin + spacing * vec3(scalar(i), scalar(j), scalar(k))
-        # which triangle is found in single precision; where on it, in the precision of everything else
+        x = spacing * vec3(scalar(i), scalar(j), scalar(k))
+        # where it is nearest is found in single precision: a distance changes with the square of an error of that
         query = wp.mesh_query_point_no_sign(mesh, wp.vec3f(x), wp.float32(reach))
         c = corners[query.face]
-        p, feature = closest_on_triangle(x, points[c[0]], points[c[1]], points[c[2]])
+        u = scalar(query.u)
+        v = scalar(query.v)
+        p = u * points[c[0]] + v * points[c[1]] + (scalar(1.0) - u - v) * points[c[2]]
+        feature = _feature(query.u, query.v, 1.0 - query.u - query.v)
         away = x - p
         along = wp.dot(away, normals[query.face, feature])
         # beyond a rim the wall goes on as the plane of its last triangle
-        if not rim[query.face, feature]:
+        if feature > 0 and not rim[query.face, feature]:
             along = wp.where(along < scalar(0.0), -wp.length(away), wp.length(away))
         grid[i, j, k] = along
 

@@ -317,7 +317,7 @@ class DistanceField:
         self.spacing = max(spacing, float(np.prod(size + 2 * _MARGIN * spacing) / LARGEST_GRID) ** (1.0 / 3.0))
         low = low - _MARGIN * self.spacing
         shape = tuple(int(n) for n in np.ceil(size / self.spacing) + 2 * _MARGIN + 1)
-        self.origin = precision.vec3(*low)
+        self.origin, surface = precision.vec3(*low), surface - low
         self.coefficients = wp.zeros(shape, dtype=precision.scalar, device=device)
         self._fill, self._evaluate = distance_kernels(precision)
         tree = wp.Mesh(
@@ -332,7 +332,6 @@ class DistanceField:
             wp.array(corners, dtype=wp.vec3i, device=device),
             wp.array(normals, dtype=precision.vec3, device=device),
             wp.array(rim, dtype=wp.bool, device=device),
-            self.origin,
             precision.scalar(self.spacing),
             precision.scalar(reach),
             self.coefficients,
