@@ -135,7 +135,10 @@ def bytes_per_slot(system: System) -> int:
         elements += m * TANGENT
         vectors += 3 * 3 * n + 6 * n
     sums = 2 * n
-    return 8 * displacements + system.precision.numpy.itemsize * (elements + matrix + vectors + sums)
+    # and these are in either precision
+    parameters = sum(1 + len(material.law.parameters()) for material in system.model.materials.values())
+    others = elements + matrix + vectors + sums + parameters
+    return 8 * (displacements + parameters) + system.precision.numpy.itemsize * others
 
 
 def free_bytes(system: System) -> int:
