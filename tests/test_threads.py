@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from warpbrain.threads import MOST, beside, fill_columns, in_threads, processors, thread_count
+from warpbrain.threads import MOST, beside, fill_columns, in_threads, is_working_beside, processors, thread_count
 
 
 @pytest.mark.parametrize(
@@ -99,3 +99,12 @@ def test_columns_are_filled_some_at_a_time(monkeypatch, count):
     fill_columns(found, work, 3)
     np.testing.assert_array_equal(found, [np.arange(7.0), -np.arange(7.0)])
     assert sorted(asked) == [0, 3, 6]
+
+
+def test_what_works_beside_is_known_until_it_is_done(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    done = threading.Event()
+    wait = beside(lambda: done.wait(30.0))
+    assert is_working_beside()
+    done.set()
+    assert wait() and not is_working_beside()

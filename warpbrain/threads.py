@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any, TypeVar
@@ -16,6 +16,8 @@ Made = TypeVar("Made")
 #: Threads at most: factors are read by all of them, and memory is no faster for more.
 MOST = 16
 
+#: What was begun beside other work, and may not be done.
+_begun: list[Future[Any]] = []
 #: Of each thread, whether it is one of those below.
 _here = threading.local()
 
@@ -73,7 +75,13 @@ def beside(work: Callable[[], Made]) -> Callable[[], Made]:
     pool = ThreadPoolExecutor(1, initializer=_become_part)
     begun = pool.submit(work)
     pool.shutdown(wait=False)
+    _begun[:] = [begun, *(other for other in _begun if not other.done())]
     return begun.result
+
+
+def is_working_beside() -> bool:
+    """Whether what `beside` has begun is not done yet, for which Python waits before it ends."""
+    return any(not begun.done() for begun in _begun)
 
 
 @cache

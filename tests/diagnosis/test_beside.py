@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from sinking_block import OPTIONS, write_sinking
 
@@ -27,8 +28,31 @@ def test_one_is_found_with_its_size(small_diagnosis: Diagnosis) -> None:
     assert small_diagnosis.named[0].detectability > 20.0
 
 
-def test_a_pressure_on_a_set_that_touches_what_is_held_is_named_beside_it(pressed: Case) -> None:
-    found = Diagnosing(pressed, OPTIONS, "cpu").run()
+@pytest.fixture(scope="module")
+def in_one_and_two_threads(pressed: Case) -> list[Diagnosis]:
+    found = []
+    for count in ("1", "2"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("OMP_NUM_THREADS", count)
+            found.append(Diagnosing(pressed, replace(OPTIONS, mesh_error=True), "cpu").run())
+    return found
+
+
+def test_it_is_the_same_to_the_bit_in_one_thread_and_in_two(in_one_and_two_threads: list[Diagnosis]) -> None:
+    one, two = in_one_and_two_threads
+    assert one.decision == two.decision and one.rejected == two.rejected and one.p_value == two.p_value
+    pairs = zip(one.search.weighted_sets, two.search.weighted_sets, strict=True)
+    for first, second in pairs:
+        assert first.names == second.names
+        assert first.hypothesis.log_evidence == second.hypothesis.log_evidence
+        np.testing.assert_array_equal(first.best_residual, second.best_residual)
+    assert one.search.base.states.solves == two.search.base.states.solves and one.confusion.rows == two.confusion.rows
+
+
+def test_a_pressure_on_a_set_that_touches_what_is_held_is_named_beside_it(
+    in_one_and_two_threads: list[Diagnosis],
+) -> None:
+    _, found = in_one_and_two_threads
     assert found.verdict in (NAMED, NAMED_AND_REST)
     assert {one.kind for one in found.named} == {"gravity", "pressure"}
     [side] = [one for one in found.named if one.kind == "pressure"]

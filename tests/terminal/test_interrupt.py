@@ -143,3 +143,21 @@ def test_nothing_is_changed_by_a_run_that_is_not_interrupted():
         pass
     assert signal.getsignal(signal.SIGINT) is before
     assert signal.set_wakeup_fd(-1) == -1
+
+
+def test_a_thread_that_works_beside_is_not_waited_for() -> None:
+    program = """
+import time
+from warpbrain.terminal.command import exit_status
+from warpbrain.threads import beside
+
+def call():
+    beside(lambda: time.sleep(120.0))
+    print("begun", flush=True)
+    time.sleep(120.0)
+
+raise SystemExit(exit_status("warpbrain", call))
+"""
+    with started("-c", program, OMP_NUM_THREADS="2") as process:
+        wait_for("begun", process)
+        assert "interrupted" in interrupt(process)

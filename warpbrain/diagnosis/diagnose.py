@@ -34,7 +34,7 @@ from warpbrain.inference.decide import (
 from warpbrain.inference.predict import Prediction
 from warpbrain.physics.words import Measurement
 from warpbrain.seconds import Seconds
-from warpbrain.threads import one_thread_of_blas
+from warpbrain.threads import beside, one_thread_of_blas
 from warpbrain.worlds.body.causes import RESISTANCE
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, require_observable, screened
 from warpbrain.worlds.body.sources import without_sources
@@ -130,6 +130,7 @@ class Diagnosing:
             fit = self._fit(confirming, weighted_sets, predictions, checked.confirmations)
             ranking = Ranking(search, confirming)
             ranked = ranking.all()
+        confusing = beside(lambda: imitations(search.causes, nothing.marginal.model))
         with self.seconds.of("where"):
             where = map_of_search(search, options.draws, random, options.alpha)
             unknown, base, model = None, search.base, best.marginal.model
@@ -142,7 +143,7 @@ class Diagnosing:
                 without, error = (apart.error(confirming.predict(each, apart)) for each in (nothing, fitted))
                 unknown = replace(unknown, source=FittedSource.of(fitted, without, error))
         with self.seconds.of("what would be seen"):
-            confusion = imitations(search.causes, nothing.marginal.model)
+            confusion = confusing()
             seen = smallest(search.causes, nothing.marginal.model, confusion)
         self.listener.stage("what to measure next")
         with self.seconds.of("next measurement"):

@@ -19,7 +19,7 @@ from typing import NoReturn
 
 from warpbrain import __version__
 from warpbrain.errors import InputError, SolveError
-from warpbrain.terminal.interrupt import clear_up, leave_compiler, stop_promptly
+from warpbrain.terminal.interrupt import clear_up, leave_threads, stop_promptly
 from warpbrain.terminal.quiet import reason_of
 from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import release
@@ -76,7 +76,7 @@ def exit_status(program: str, call: Callable[[], None], record: Record | None = 
     except KeyboardInterrupt:
         clear_up()
         print(f"\n{program}: interrupted; nothing half-written was left", file=sys.stderr)
-        leave_compiler()
+        leave_threads()
         # `python -m` ends by the signal itself, whatever status is returned, if the interrupt fell into text that was
         # executed, as dataclasses and Warp do, and no other text has been executed since
         exec("")

@@ -20,6 +20,7 @@ from pathlib import Path
 
 from warpbrain.atomic import remove_unfinished
 from warpbrain.terminal.result_folder import release
+from warpbrain.threads import is_working_beside
 
 #: Seconds that Python is given to stop by itself.
 _GRACE = 0.6
@@ -37,13 +38,13 @@ def clear_up() -> None:
             shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def leave_compiler() -> None:
-    """End the process with the status of an interrupted one if kernels are being compiled in a thread of their own.
+def leave_threads() -> None:
+    """End the process with the status of an interrupted one if a thread compiles kernels or works beside this one.
 
-    Python would wait for that thread, which finds the folder gone that it writes to.
+    Python would wait for that thread, and a compiler finds the folder gone that it writes to.
     """
     module = sys.modules.get("warpbrain.kernels.module")
-    if module is not None and module.is_compiling():
+    if is_working_beside() or (module is not None and module.is_compiling()):
         sys.stderr.flush()
         os._exit(130)
 

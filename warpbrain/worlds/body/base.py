@@ -22,6 +22,7 @@ from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
 from warpbrain.inference.noise import noise_factor, outliers, scales
+from warpbrain.mesh.refinement import finer_mesh
 from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
 from warpbrain.worlds.body.effects import Effect, Effects, SolvedSwitches
@@ -104,7 +105,9 @@ class BaseFinder:
         self.states = states
         # drawn from the generative model in a thread, while the first state is solved
         self._prior = beside(lambda: prior or tissue_prior(states.case, states.parameters))
-        self._spacing, self._mesh_error, self._without_nuisances = spacing, mesh_error, without_nuisances
+        # elements of half the size, that a state's error is computed with
+        self._finer = beside(lambda: finer_mesh(states.case.remaining[0])) if mesh_error else None
+        self._spacing, self._without_nuisances = spacing, without_nuisances
         self._listener = listener
         self._remarks = on_linear_elements(states.case.poisson, "a diagnosis")
 
@@ -199,9 +202,10 @@ class BaseFinder:
         return Hypothesis(theta, field)
 
     def _errors_of_mesh(self, state: SolvedState) -> MeshErrors | None:
-        if not self._mesh_error:
+        if self._finer is None:
             return None
         try:
+            self._finer()
             return FinerStates(self.states).errors(state, other_volume(self.states), self.prior)
         except (SolveError, InputError) as error:
             self._remarks.append(f"the error of the mesh is not known: {error}")

@@ -18,7 +18,7 @@ from warpbrain.physics.composition import CompositionError, require_composable
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
-from warpbrain.threads import in_threads
+from warpbrain.threads import beside, in_threads
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
@@ -166,19 +166,31 @@ def candidates_at(
 
     Kinds that cannot be simulated are rejected with a reason.
     """
-    by_kind: dict[str, tuple[Effect, ...]] = {}
     rejected = dict(dictionary.rejected)
+    switches = {
+        kind: [proposal for proposal in proposals if proposal.is_there_or_not]
+        for kind, proposals in dictionary.proposals.items()
+    }
+
+    def switched() -> dict[str, list[Effect | InputError | SolveError]]:
+        return {kind: switch_effects(effects, proposals) for kind, proposals in switches.items()}
+
+    # states and dense solutions of their own; on a GPU what one thread captures would be launched by the other
+    results = beside(switched) if effects.at.system.device.is_cpu else switched
+    found: dict[str, list[Effect]] = {}
     for kind, proposals in dictionary.proposals.items():
         if on_kind is not None:
             on_kind(kind)
-        of_this_kind: list[Effect] = []
         smooth = [proposal for proposal in proposals if not proposal.is_there_or_not]
         try:
-            of_this_kind.extend(effects.of(smooth))
+            found[kind] = effects.of(smooth)
         except SolveError as error:
+            found[kind] = []
             rejected[kind] = f"{smooth[0].region}: cannot be simulated here: {error}"
-        switches = [proposal for proposal in proposals if proposal.is_there_or_not]
-        for proposal, result in zip(switches, switch_effects(effects, switches), strict=True):
+    by_kind: dict[str, tuple[Effect, ...]] = {}
+    for kind, of_switches in results().items():
+        of_this_kind = found[kind]
+        for proposal, result in zip(switches[kind], of_switches, strict=True):
             if isinstance(result, Effect):
                 of_this_kind.append(result)
             else:

@@ -9,7 +9,8 @@ a surface, press on it alone: three components of a traction that are independen
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -185,16 +186,17 @@ def unit_stresses(corners: Floats) -> Floats:
 
 def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]) -> dict[str, Floats]:
     """Columns of every field by its name. `lengths` [m]. `forces` (n, k): `body_forces` of these lengths."""
-    columns_by_name = {}
+    made: dict[str, Callable[[], Floats]] = {}
     for length, columns in zip(lengths, forces, strict=True):
         # in bodies of any size
         size = f"{number(1e3 * length)} mm"
-        columns_by_name[f"body force, {size}"] = columns
-        columns_by_name[f"eigenstress, {size}"] = eigenstresses(at, length)
+        made[f"body force, {size}"] = partial(np.asarray, columns)
+        made[f"eigenstress, {size}"] = partial(eigenstresses, at, length)
         if _free_of_surface(at).any():
-            columns_by_name[f"traction, {size}"] = tractions(at, length)
-            columns_by_name[f"pressure, {size}"] = pressures(at, length)
-    return {name: columns for name, columns in columns_by_name.items() if columns.shape[1]}
+            made[f"traction, {size}"] = partial(tractions, at, length)
+            made[f"pressure, {size}"] = partial(pressures, at, length)
+    columns_by_name = zip(made, in_threads(lambda each: each(), list(made.values())), strict=True)
+    return {name: columns for name, columns in columns_by_name if columns.shape[1]}
 
 
 def _visible_modes(columns: Floats, rows: Bools) -> Floats:
