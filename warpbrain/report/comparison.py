@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.atomic import write_csv
 from warpbrain.cases.case import Case
 from warpbrain.physics.words import tabled
 from warpbrain.recordings.comparison import Comparison, Error
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
-from warpbrain.report.files import MILLIMETRES, picked, write_csv
+from warpbrain.report.files import MILLIMETRES, picked
 from warpbrain.simulation.mesh_error import MeshError
 from warpbrain.simulation.observation import Observed
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from warpbrain.atomic import write_csv
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import INTERVALS, Marginal, OverallErrors, Posterior, Prediction
@@ -16,7 +17,7 @@ from warpbrain.estimation.registration import registration_of
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report.comparison import SHOWN, error_text
 from warpbrain.report.diagnosis.files import seen
-from warpbrain.report.files import MILLIMETRES, body_file, fingerprints, picked, write_body, write_csv
+from warpbrain.report.files import MILLIMETRES, body_file, fingerprints, picked, write_body
 from warpbrain.report.page import lines
 from warpbrain.report.summary import machine
 from warpbrain.worlds.body.uncertainty import AveragedTissue

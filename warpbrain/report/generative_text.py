@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from warpbrain.atomic import write_csv
 from warpbrain.gp.asymmetry import Asymmetry
 from warpbrain.gp.sampling import CURVES, DrawnLaws, Fit, Moduli, rejection_rate
-from warpbrain.report.files import write_csv
 from warpbrain.report.page import lines
 
 

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.atomic import write_csv
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.report import views
-from warpbrain.report.files import MILLIMETRES, picked, write_csv
+from warpbrain.report.files import MILLIMETRES, picked
 from warpbrain.report.summary import describe_case
 from warpbrain.report.views import BLACK, BLUE, VERMILLION
 from warpbrain.simulation.locking import largest_poisson, locking_sentences
