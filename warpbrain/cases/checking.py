@@ -105,7 +105,9 @@ def _look_again(case: Case, quality: Quality) -> list[str]:
             remarks.append(f"recording '{recording.name}': a point moves {1000.0 * largest:.3g} mm: is the unit right?")
         if largest < SMALLEST_SHIFT:
             remarks.append(f"recording '{recording.name}': no point moves more than {1000.0 * largest:.2g} mm")
-        if _wandering(recording):
+        starts = zip(recording.ids or (), recording.points.tolist(), strict=recording.ids is not None)
+        # an id that has more than one: the place at the time was given where the first place belongs
+        if len({(name, *place) for name, place in starts}) > len(set(recording.ids or ())):
             remarks.append(f"recording '{recording.name}': one id starts at several places; x, y, z are where it began")
         if len(np.unique(recording.points, axis=0)) < len(recording.points) and recording.time is None:
             remarks.append(f"recording '{recording.name}': a point is recorded twice")
@@ -126,13 +128,3 @@ def _nothing_there(case: Case) -> list[str]:
     if not case.recordings:
         remarks.append("no [[recording]]: there is nothing to compare a simulation with")
     return remarks
-
-
-def _wandering(recording: PointsRecording) -> bool:
-    """Whether an id has more than one start: the place at the time was given where the first place belongs."""
-    if recording.ids is None:
-        return False
-    starts: dict[str, object] = {}
-    return any(
-        starts.setdefault(name, tuple(x)) != tuple(x) for name, x in zip(recording.ids, recording.points, strict=True)
-    )

@@ -134,9 +134,8 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     case = find_case(options.case, options.tissue)
     if options.model is not None:
         case = case.with_law(options.model)
-    every, by_label = options.moduli
-    moduli: Mapping[int, float] = by_label if every is None else dict.fromkeys(case.tissues, every)
-    case = case.with_shear_moduli(moduli)
+    moduli = options.moduli
+    case = case.with_shear_moduli(dict.fromkeys(case.tissues, moduli[None]) if None in moduli else moduli)
     if options.poisson is not None:
         case = replace(case, poisson=options.poisson)
     for text in options.assumed:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -230,14 +230,6 @@ def remarks_of(posterior: Posterior) -> list[str]:
         for prediction in posterior.predictions
         if prediction.gross.mean() > _UNEXPLAINED
     ]
-
-
-def recorded_points(posterior: Posterior, surfaces: bool = True) -> Iterator[tuple[Prediction, Any]]:
-    """Predictions at places, with their recordings: of points, and of surfaces unless these are left out."""
-    recordings = {recording.name: recording for recording in posterior.case.recordings}
-    for prediction in posterior.predictions:
-        if isinstance(recordings[prediction.name], PointsRecording | SurfaceRecording if surfaces else PointsRecording):
-            yield prediction, recordings[prediction.name]
 
 
 # as printed and on the page -------------------------------------------------------------------------------------------

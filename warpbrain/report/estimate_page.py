@@ -13,10 +13,11 @@ from warpbrain.arrays import Floats
 from warpbrain.atomic import write_text
 from warpbrain.estimation.posterior import Marginal, Posterior, Prediction
 from warpbrain.inference.calibration import percent
+from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view, fields_of, known_displacement
 from warpbrain.report.comparison import SHOWN, Explained, explained
-from warpbrain.report.estimate import averaged_row, parameter_row, prediction_row, recorded_points
+from warpbrain.report.estimate import averaged_row, parameter_row, prediction_row
 from warpbrain.report.files import MILLIMETRES, read_state
 from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import NARROW, inlined
@@ -35,15 +36,6 @@ _KNOWN = (
 )
 
 
-def moved_of(posterior: Posterior) -> Moved:
-    """Points that were recorded, and where the estimate, with its nuisances, has them."""
-    points = [
-        np.column_stack([recording.points[prediction.rows], prediction.before, prediction.before - prediction.after])
-        for prediction, recording in recorded_points(posterior, surfaces=False)
-    ]
-    return Moved(*np.split(np.concatenate([np.zeros((0, 9)), *points]), 3, axis=1))
-
-
 def judged_of(summary: Mapping[str, Any]) -> Explained:
     """Whether an estimate explains its recordings better than no motion at all."""
     entries = [
@@ -59,7 +51,9 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     Returns the pictures, or why there are none.
     """
     case, judged, nothing = summary["case"], judged_of(summary), summary["nothing_else"]
-    whole, state, moved = posterior.case.mesh, read_state(folder / "state.vtu"), moved_of(posterior)
+    whole, state = posterior.case.mesh, read_state(folder / "state.vtu")
+    # where the estimate, with its nuisances, has points that were recorded
+    moved = Moved.of(posterior.case.recordings, ((p.name, p.rows, p.before, p.after) for p in posterior.predictions))
     titles = {label: tissue.name for label, tissue in posterior.case.tissues.items()}
     subtitles = ["the most probable state of the estimate", *judged.sentences]
     begun = begin_pictures(whole, state.mesh, state.u, titles, moved)
@@ -202,12 +196,12 @@ def _draw_pairs(axes: Any, predictions: Sequence[Prediction], unit: str, columns
 def residuals_figure(posterior: Posterior) -> Any:
     """How far each recorded point is from its prediction, on the outlines of the anatomy from three sides."""
     whole, mesh = posterior.case.mesh, posterior.case.remaining[0]
-    residuals = [
-        (recording.points[prediction.rows], MILLIMETRES * np.linalg.norm(prediction.after, axis=1))
-        for prediction, recording in recorded_points(posterior)
-    ]
-    points = np.concatenate([np.empty((0, 3)), *(where for where, _ in residuals)])
-    lengths = np.concatenate([np.empty(0), *(sizes for _, sizes in residuals)])
+    recordings, rows = {recording.name: recording for recording in posterior.case.recordings}, [np.empty((0, 4))]
+    for prediction in posterior.predictions:
+        if isinstance(recording := recordings[prediction.name], PointsRecording | SurfaceRecording):
+            left = MILLIMETRES * np.linalg.norm(prediction.after, axis=1)
+            rows.append(np.column_stack([recording.points[prediction.rows], left]))
+    points, lengths = np.split(np.concatenate(rows), [3], axis=1)
     order, top = np.argsort(lengths), max(float(np.percentile(lengths, 98)), 1e-3) if len(lengths) else 1.0
     figure, axes = views.panels(1, 3, (13.5, 5.0))
     shown: Any = None

@@ -43,7 +43,8 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     """
     case, described, solution = summary["case"], summary["result"], summary["solution"]
     judged, result, whole = explained_of(summary["recordings"]["compared"]), run.result, run.case.mesh
-    moved = Moved.of(run.case.recordings, run.observed.comparisons)
+    compared = ((c.name, c.rows, c.residuals_before, c.residuals_after) for c in run.observed.comparisons)
+    moved = Moved.of(run.case.recordings, compared)
     names = {label: tissue.name for label, tissue in run.case.tissues.items()}
     left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
     subtitles = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
