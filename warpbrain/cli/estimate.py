@@ -28,7 +28,7 @@ from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
 from warpbrain.gp.trained import find_model
 from warpbrain.kernels.module import find_device
-from warpbrain.recordings.registration import Registration
+from warpbrain.recordings.base import Registration
 from warpbrain.report import views
 from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
 from warpbrain.report.estimate_page import agreement_figure, densities_figure, residuals_figure, write_estimate_page
