@@ -17,7 +17,7 @@ from warpbrain.report.run_page import write_specimen_page
 from warpbrain.report.specimen import write_tests_picture
 from warpbrain.report.summary import describe_opening, machine
 from warpbrain.simulation.observation import Observed
-from warpbrain.simulation.specimen import SpecimenRunning
+from warpbrain.simulation.specimen import SHOWN, SpecimenRunning
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import results_in
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     with Progress("tests", options.quiet) as progress:
         done = running.run(progress.show).tests
     seconds |= rig.solver.clock.seconds
-    say(*lines("run.txt", "tests", text.test_rows(done)), sep="\n")
+    say(*lines("run.txt", "tests", done, SHOWN), sep="\n")
     say(*lines("run.txt", "times", seconds, rig.solver.clock.counts), sep="\n")
 
     [material] = system.model.materials.values()

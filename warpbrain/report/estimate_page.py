@@ -19,7 +19,7 @@ from warpbrain.report.body_sections import before_and_after, body_view, fields_o
 from warpbrain.report.comparison import SHOWN, Explained, explained
 from warpbrain.report.estimate import averaged_row, parameter_row, prediction_row
 from warpbrain.report.files import MILLIMETRES, read_state
-from warpbrain.report.page import Top, document, lines, sections_of
+from warpbrain.report.page import Top, document, sections_of
 from warpbrain.report.page.figures import NARROW, inlined
 from warpbrain.report.picture import Moved, Pictures, begin_pictures, draw
 from warpbrain.report.run_page import BADGES
@@ -71,7 +71,6 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     sections = sections_of(
         "estimate.html", summary=summary, agreement=agreement,
         tissue=tissue,
-        tied=lines("estimate.txt", "tied", summary), checks=lines("estimate.txt", "checks", summary),
         densities=inlined(
             lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
             "Each parameter before (dashed, filled) and after (line); dotted: the ends of its 95 % interval.",
@@ -201,7 +200,7 @@ def residuals_figure(posterior: Posterior) -> Any:
         if isinstance(recording := recordings[prediction.name], PointsRecording | SurfaceRecording):
             left = MILLIMETRES * np.linalg.norm(prediction.after, axis=1)
             rows.append(np.column_stack([recording.points[prediction.rows], left]))
-    points, lengths = np.split(np.concatenate(rows), [3], axis=1)
+    points, lengths = np.concatenate(rows)[:, :3], np.concatenate(rows)[:, 3]
     order, top = np.argsort(lengths), max(float(np.percentile(lengths, 98)), 1e-3) if len(lengths) else 1.0
     figure, axes = views.panels(1, 3, (13.5, 5.0))
     shown: Any = None

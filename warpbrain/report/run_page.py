@@ -14,7 +14,7 @@ from warpbrain.atomic import write_text
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view
 from warpbrain.report.comparison import IN_PART, NEARER, NO_NEARER, UNKNOWN, WORSE, explained_of, recorded_rows
-from warpbrain.report.page import Top, document, lines, sections_of
+from warpbrain.report.page import Top, document, sections_of
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
 from warpbrain.report.picture import Moved, Pictures, begin_pictures, draw
@@ -58,12 +58,6 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     places = views.places(whole)
     view = body_view(result.mesh, result.u, fields, moved, places)
     pictures = draw(folder / "deformation.png", begun, run.case.title, subtitles)
-    solved = [f"{solution['kind']}, {len(solution['history'])} recorded steps"]
-    if "time_s" in solution:
-        solved.append(f"until {solution['time_s']:.4g} s")
-    if "relative_residual" in solution:
-        residual = f"{solution['relative_residual']:.1e} (goal {solution['tolerance']:.0e})"
-        solved.append(f"relative out-of-balance force {residual}")
     largest = described["displacement_mm"]["all nodes"]["largest"]
     facts = [("largest displacement", f"{largest:.3g} mm")]
     if judged.before is not None:
@@ -74,8 +68,6 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
         pictures=before_and_after(pictures),
         view=view,
         displacements=displacement_rows(described),
-        mesh_error=lines("run.txt", "mesh_error", summary["mesh_error"]) if "mesh_error" in summary else [],
-        solution=solved,
     )  # fmt: skip
     return pictures
 
@@ -110,10 +102,9 @@ def write_specimen_page(path: Path, summary: Mapping[str, Any], tests: Sequence[
 
 def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> None:
     case = summary["case"]
-    nothing = {"tests": "", "pictures": "", "view": "", "displacements": [], "mesh_error": [], "solution": []}
     sections = sections_of(
-        "run.html", summary=summary, **{**nothing, **values},
-        recorded=[row[:9] for row in recorded_rows(summary["recordings"]["compared"])],
+        "run.html", summary=summary, **values,
+        recorded=recorded_rows(summary["recordings"]["compared"]),
         tissues=[
             [label, tissue["name"], f"{tissue['law']} ({tissue['formulation']})", f"{tissue['shear_modulus_Pa']:g}"]
             for label, tissue in case["tissues"].items()

@@ -106,22 +106,6 @@ def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
     return described
 
 
-def test_rows(tests: Sequence[Tested]) -> list[dict[str, Any]]:
-    """Cells of the table of tests: name, mode, rows, role, root mean square before and after with its unit, R2, states,
-    Newton iterations and least volume ratio; and in how many iterations the tangent was indefinite."""
-    rows = []
-    for test in tests:
-        recording, result, compared = test.recording, test.result, test.comparison
-        scale, unit = SHOWN[recording.answer[0]]
-        errors = (scale * error.root_mean_square for error in (compared.before, compared.after))
-        states = (len(result.imposed), int(result.newton.sum()), float(result.min_J.min()))
-        head = (recording.name, recording.mode, compared.count, recording.role)
-        rows.append(
-            {"cells": [*head, *errors, unit, result.r_squared, *states], "unstable": result.unstable_iterations}
-        )
-    return rows
-
-
 def write_tests(path: Path, tests: Sequence[Tested]) -> None:
     """Write every row of every test: what was imposed, recorded and computed, and the difference."""
     rows: list[list[Any]] = [

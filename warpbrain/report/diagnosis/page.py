@@ -53,7 +53,6 @@ def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], s
         summary=summary,
         pictures=defaultdict(str, _pictures(diagnosis, summary, recorded, state)),
         shown=shown,
-        candidates=[row[:7] for row in shown["candidates"]],
         aside=[] if recorded is None else recorded.aside,
         chances={candidate["mechanism"]: candidate["probability"] for candidate in summary["ranking"]},
     )

@@ -59,7 +59,7 @@ def _environment() -> Environment:
         undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     environment.filters |= {"percent": percent, "tabled": tabled, "wrapped": _wrapped}
-    environment.globals |= {"table": table, "asset": asset}
+    environment.globals |= {"table": table, "asset": asset, "lines": lines}
     return environment
 
 
