@@ -14,7 +14,7 @@ from warpbrain.atomic import write_text
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view
 from warpbrain.report.comparison import IN_PART, NEARER, NO_NEARER, UNKNOWN, WORSE, explained_of, recorded_rows
-from warpbrain.report.page import Top, document, sections_of
+from warpbrain.report.page import Top, document, lines, sections_of
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
 from warpbrain.report.picture import Moved, Pictures, begin_pictures, draw
@@ -47,7 +47,7 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     moved = Moved.of(run.case.recordings, compared)
     names = {label: tissue.name for label, tissue in run.case.tissues.items()}
     left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
-    subtitles = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
+    subtitles = [*lines("run.txt", "subtitle", case, solution), *summary["recordings"]["in_words"], *left_out]
     begun = begin_pictures(whole, result.mesh, result.u, names, moved)
     fields = [
         Field(
@@ -70,19 +70,6 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
         displacements=displacement_rows(described),
     )  # fmt: skip
     return pictures
-
-
-def _subtitle(case: Mapping[str, Any], outcome: Mapping[str, Any]) -> str:
-    laws = ", ".join(
-        f"{tissue['name']} {tissue['law']} {tissue['shear_modulus_Pa']:g} Pa" for tissue in case["tissues"].values()
-    )
-    state = outcome["kind"]
-    if state == "motion":
-        state = f"after {1000 * outcome['time_s']:.0f} ms"
-    elif state == "slow change":
-        state = f"after {outcome['time_s']:g} s"
-    stand_in = "stand-in, not the patient's images; " if case["origin"] == "stand-in" else ""
-    return f"{stand_in}{laws}; {state}"
 
 
 def write_specimen_page(path: Path, summary: Mapping[str, Any], tests: Sequence[Tested]) -> None:
