@@ -79,9 +79,9 @@ def _wrapped(sentence: str, following: str) -> str:
     return textwrap.fill(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
 
 
-def part(name: str, *values: Any) -> Markup:
-    """A macro of `parts.html` with its values."""
-    return Markup(getattr(_environment().get_template("parts.html").module, name)(*values))
+def part(name: str, *values: Any, template: str = "parts.html") -> Markup:
+    """A macro of a template of HTML with its values."""
+    return Markup(getattr(_environment().get_template(template).module, name)(*values))
 
 
 def sections_of(template: str, **values: Any) -> list[Section]:
