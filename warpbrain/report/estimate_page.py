@@ -68,8 +68,8 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
         )
     causes = [] if nothing is None else [cause for cause in nothing["causes"] if cause["probability"] >= _LIKELY]
     pictures = draw(folder / "deformation.png", begun, case["title"], subtitles)
-    sections = sections_of(
-        "estimate.html", summary=summary, agreement=agreement,
+    sections, facts = sections_of(
+        "estimate.html", summary=summary, judged=judged, agreement=agreement,
         tissue=tissue,
         densities=inlined(
             lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
@@ -88,15 +88,6 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
         seconds=[[name, f"{value:.1f}"] for name, value in summary["seconds"].items()],
         files=[[name, Markup("<code>{}</code>").format(value)] for name, value in summary["inputs_sha256"].items()],
     )  # fmt: skip
-    facts = [
-        (f"{name}, {parameter}", f"{estimate} Pa ({interval})")
-        for name, parameter, estimate, _, interval, *_, unit in tissue
-        if unit == "Pa"
-    ]
-    if judged.before is not None:
-        facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
-    if nothing is not None:
-        facts.append(("probability that nothing else acts", percent(nothing["probability"])))
     sentences = [*summary["identifiability"]["sentences"], *judged.sentences]
     top = Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts)
     write_text(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))

@@ -41,7 +41,7 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
 
     Returns the pictures, or why there are none.
     """
-    case, described, solution = summary["case"], summary["result"], summary["solution"]
+    case, solution = summary["case"], summary["solution"]
     judged, result, whole = explained_of(summary["recordings"]["compared"]), run.result, run.case.mesh
     compared = ((c.name, c.rows, c.residuals_before, c.residuals_after) for c in run.observed.comparisons)
     moved = Moved.of(run.case.recordings, compared)
@@ -58,16 +58,13 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     places = views.places(whole)
     view = body_view(result.mesh, result.u, fields, moved, places)
     pictures = draw(folder / "deformation.png", begun, run.case.title, subtitles)
-    largest = described["displacement_mm"]["all nodes"]["largest"]
-    facts = [("largest displacement", f"{largest:.3g} mm")]
-    if judged.before is not None:
-        facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
     sentences = judged.sentences or ["Nothing was recorded of this case that the simulation could be compared with."]
     _write(
-        folder / "report.html", summary, Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts),
+        folder / "report.html", summary, judged.verdict, BADGES[judged.verdict], sentences,
         pictures=before_and_after(pictures),
         view=view,
-        displacements=displacement_rows(described),
+        judged=judged,
+        displacements=displacement_rows(summary["result"]),
     )  # fmt: skip
     return pictures
 
@@ -81,15 +78,19 @@ def write_specimen_page(path: Path, summary: Mapping[str, Any], tests: Sequence[
     )
     worse = explained_of(summary["recordings"]["compared"]).sentences
     sentences = worse or ["Every test is nearer to this simulation than to none."]
-    top = Top(
-        summary["case"]["title"], "tests of a specimen", (BLUE, "#ffffff"), sentences, [("tests", f"{len(tests)}")]
-    )
-    _write(path, summary, top, tests=figure)
+    _write(path, summary, "tests of a specimen", (BLUE, "#ffffff"), sentences, tests=figure)
 
 
-def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> None:
+def _write(
+    path: Path,
+    summary: Mapping[str, Any],
+    badge: str,
+    colours: tuple[str, str],
+    sentences: Sequence[str],
+    **values: Any,
+) -> None:
     case = summary["case"]
-    sections = sections_of(
+    sections, facts = sections_of(
         "run.html", summary=summary, **values,
         recorded=recorded_rows(summary["recordings"]["compared"]),
         tissues=[
@@ -98,4 +99,5 @@ def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> N
         ],
         seconds=[[name, f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()],
     )  # fmt: skip
+    top = Top(case["title"], badge, colours, sentences, facts)
     write_text(path, document(f"{case['name']}: {case['title']}", top, sections))

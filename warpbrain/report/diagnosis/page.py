@@ -8,7 +8,6 @@ from typing import Any
 
 from warpbrain.atomic import write_text
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.report.body_sections import known_displacement
 from warpbrain.report.diagnosis import pictures, text
@@ -48,7 +47,7 @@ def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], s
     """The page; `summary` is its `diagnosis.json`, `state` its `state.vtu`: how well the displacement is known."""
     recorded = Recorded.of(diagnosis) if isinstance(diagnosis, Diagnosis) else None
     shown = text.shown_of(summary)
-    sections = sections_of(
+    sections, facts = sections_of(
         "diagnosis.html",
         summary=summary,
         pictures=defaultdict(str, _pictures(diagnosis, summary, recorded, state)),
@@ -57,7 +56,7 @@ def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], s
         chances={candidate["mechanism"]: candidate["probability"] for candidate in summary["ranking"]},
     )
     title, verdict = summary["case"]["title"], summary["verdict"]
-    top = Top(title, verdict, _BADGES[verdict], [summary["sentence"]], _facts(summary))
+    top = Top(title, verdict, _BADGES[verdict], [summary["sentence"]], facts)
     return document(f"{verdict}: {title}", top, sections)
 
 
@@ -84,19 +83,3 @@ def _pictures(
     if summary["confusion"]["rows"]:
         drawn["confusion"] = pictures.confusion_figure(summary["confusion"]["rows"])
     return drawn
-
-
-def _facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
-    facts = [("p-value if nothing were missing", f"{summary['p_value']:.2g}")]
-    if named := summary["mechanisms"]:
-        facts.insert(0, ("mechanism", " and ".join(mechanism["mechanism"] for mechanism in named)))
-        facts.append(("probability", " and ".join(percent(mechanism["probability"]) for mechanism in named)))
-    suffix, factor, unit = text.unit_of(summary)
-    held = summary["fit"][f"heldout_rmse_{suffix}"]
-    errors = [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None]
-    if errors:
-        facts.append(("held-out error", f"{' → '.join(errors)} {unit}"))
-    if improvement := summary["fit"]["improvement"]:
-        low, high = (100.0 * value for value in improvement["interval_95"])
-        facts.append(("of it gone (95 %)", f"{100.0 * improvement['part']:.0f} % ({low:.0f} to {high:.0f})"))
-    return facts

@@ -25,12 +25,15 @@ def diagnosis_lines(summary: Summary) -> list[str]:
 
 def shown_of(summary: Summary) -> dict[str, Any]:
     """What templates of printed lines and of the page show: rows of tables, sentences, and the unit of errors."""
+    suffix, factor, unit = unit_of(summary)
+    held = summary["fit"][f"heldout_rmse_{suffix}"]
     return {
-        "unit": unit_of(summary)[2],
+        "unit": unit,
         "sets": _set_rows(summary),
         "candidates": _candidate_rows(summary),
         "rejected": [[c["mechanism"], c["rejected_because"]] for c in summary["ranking"] if c["log_evidence"] is None],
         "fit": _fit_rows(summary),
+        "held_out": [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None],
         "placebos": _placebo_sentences(summary),
         "smallest": _smallest_rows(summary),
         "measurements": [[m["what"], f"{m['expected_nats']:.1f}"] for m in summary["next_measurement"]],

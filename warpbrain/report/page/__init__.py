@@ -84,16 +84,21 @@ def part(name: str, *values: Any, template: str = "parts.html") -> Markup:
     return Markup(getattr(_environment().get_template(template).module, name)(*values))
 
 
-def sections_of(template: str, **values: Any) -> list[Section]:
-    """The sections that a template makes of values: words of these are no markup."""
+def sections_of(template: str, **values: Any) -> tuple[list[Section], list[tuple[str, str]]]:
+    """The sections that a template makes of values, and the facts that it puts on top: words of these are no markup."""
     sections: list[Section] = []
+    facts: list[tuple[str, str]] = []
 
     def section(title: str, caller: Callable[[], str]) -> str:
         sections.append(Section(title, str(caller()).strip()))
         return ""
 
-    _environment().get_template(template).render(section=section, **values)
-    return sections
+    def fact(name: str, value: str) -> str:
+        facts.append((name, value))
+        return ""
+
+    _environment().get_template(template).render(section=section, fact=fact, **values)
+    return sections, facts
 
 
 def document(title: str, top: Top, sections: Sequence[Section]) -> str:
