@@ -26,13 +26,7 @@ def bench(options: argparse.Namespace) -> None:
     for alias in devices:
         device = wp.get_device(alias)
         tolerance = finest_tolerance(options.tol, find_precision(options.precision))
-        print(
-            f"{device.name} ({alias}), {options.precision} precision, CG to {tolerance:.2g}, h = 1 ms, "
-            f"from rest again every {RESTART} steps; {command.release(versions)}"
-        )
-        print(f"mean (sd) ms of {options.steps} steps after {options.warmup}; 'paper' and 'x faster' from its Table 3;")
-        print(f"pre-processing: from a mesh in memory, {BODIES} meshes that no cache has seen, kernels loaded;")
-        print("each linear solve starts from the change of velocity of the step before")
+        command.say("steps", device, options, tolerance, RESTART, BODIES, command.release(versions))
         progress = Progress("bench")
         for number, name in enumerate(names):
             progress.show(number / len(names), f"{name} on {alias}")
