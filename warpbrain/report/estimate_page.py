@@ -29,11 +29,6 @@ from warpbrain.simulation.of_case import model_of
 
 #: Causes that are less probable are not listed.
 _LIKELY = 0.01
-#: What the standard deviation of the displacement is of.
-_KNOWN = (
-    "It is what is not known of the tissue, to first order about this state: what else may act is not in it, nor the "
-    "error of the mesh."
-)
 
 
 def judged_of(summary: Mapping[str, Any]) -> Explained:
@@ -59,22 +54,15 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     begun = begin_pictures(whole, state.mesh, state.u, titles, moved)
     places = views.places(whole)
     tissue = [parameter_row(parameter) for parameter in summary["parameters"]]
-    names = ", ".join(f"{row[0]}, {row[1]}" for row in tissue)
-    agreement = Markup()
+    agreement = None
     if any(prediction.kind != "surface" for prediction in posterior.predictions):
-        words = "Every component that was recorded beside what the estimate makes of it; on the line they agree."
-        agreement = inlined(
-            lambda narrow: agreement_figure(posterior, narrow), "Observed beside predicted components.", words
-        )
+        agreement = inlined(lambda narrow: agreement_figure(posterior, narrow))
     causes = [] if nothing is None else [cause for cause in nothing["causes"] if cause["probability"] >= _LIKELY]
     pictures = draw(folder / "deformation.png", begun, case["title"], subtitles)
     sections, facts = sections_of(
         "estimate.html", summary=summary, judged=judged, agreement=agreement,
         tissue=tissue,
-        densities=inlined(
-            lambda narrow: densities_figure(posterior, narrow), f"Prior and posterior of {names}.",
-            "Each parameter before (dashed, filled) and after (line); dotted: the ends of its 95 % interval.",
-        ),
+        densities=inlined(lambda narrow: densities_figure(posterior, narrow)),
         causes=[[cause["name"], percent(cause["probability"])] for cause in causes],
         averaged=[] if nothing is None else [
             [f"{tissue}, {name}", middle, interval, unit]
@@ -82,7 +70,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
         ],
         recorded=[prediction_row(prediction) for prediction in summary["predictions"]],
         pictures=before_and_after(pictures),
-        known=known_displacement(state, whole, places, _KNOWN),
+        known=known_displacement(state, whole, places),
         view=body_view(state.mesh, state.u, fields_of(state), moved, places),
         left_out=left_out(model_of(posterior.case)),
         seconds=[[name, f"{value:.1f}"] for name, value in summary["seconds"].items()],

@@ -71,11 +71,7 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
 
 def write_specimen_page(path: Path, summary: Mapping[str, Any], tests: Sequence[Tested]) -> None:
     """Write the page of tests; `summary` is what `summary.json` holds."""
-    figure = inlined(
-        lambda narrow: tests_figure(tests, 1 if narrow else 2),
-        f"Recorded and simulated curves of {len(tests)} tests.",
-        "Each test as it was recorded and as it is simulated. What is marked check is not to be fitted.",
-    )
+    figure = inlined(lambda narrow: tests_figure(tests, 1 if narrow else 2))
     worse = explained_of(summary["recordings"]["compared"]).sentences
     sentences = worse or ["Every test is nearer to this simulation than to none."]
     _write(path, summary, "tests of a specimen", (BLUE, "#ffffff"), sentences, tests=figure)

@@ -29,12 +29,6 @@ _BADGES = {
     CANNOT_SAY: (QUIET, "#ffffff"),
 }
 
-#: What the standard deviation of the displacement is of.
-_KNOWN = (
-    "It is what is not known of tissue, of the case's loads and of what is named, to first order about the state with "
-    "all that is named: what is left without a name is not in it, nor the error of the mesh."
-)
-
 
 def write_page(
     path: Path, diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None
@@ -65,19 +59,20 @@ def _pictures(
     summary: dict[str, Any],
     recorded: Recorded | None,
     state: SavedState | None,
-) -> dict[str, str]:
+) -> dict[str, Any]:
     """Figures and the 3-D view by name; of what was not recorded there are none."""
     if recorded is None or not isinstance(diagnosis, Diagnosis):
         return {"curves": pictures.curves_figure(diagnosis)} if isinstance(diagnosis, SpecimenDiagnosis) else {}
     anatomy = pictures.Anatomy(diagnosis, summary)
-    drawn, points = {"map": pictures.map_figure(anatomy)}, recorded.lengths.any() and not recorded.vectors.aside.all()
+    drawn: dict[str, Any] = {"map": pictures.map_figure(anatomy)}
+    points = recorded.lengths.any() and not recorded.vectors.aside.all()
     if points:
         drawn["residuals"] = pictures.residuals_figure(anatomy, recorded)
     if recorded.counted.any():
         drawn["agreement"] = pictures.agreement_figure(summary, recorded)
     if state is not None:
         places = [float(anatomy.centre[view.axis]) for view in VIEWS]
-        drawn["known"] = known_displacement(state, anatomy.mesh, places, _KNOWN)
+        drawn["known"] = known_displacement(state, anatomy.mesh, places)
     view = pictures.view_of(anatomy, recorded if points else None)
     drawn["view"] = viewer(view, "what is left", "Arrows go from the computed to the observed place.")
     if summary["confusion"]["rows"]:
