@@ -45,12 +45,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     say(*lines("run.txt", "tests", done, SHOWN), sep="\n")
     say(*lines("run.txt", "times", seconds, rig.solver.clock.counts), sep="\n")
 
-    [material] = system.model.materials.values()
-    acting = ", ".join(mechanism.kind for mechanism in system.model.mechanisms) or "elastic"
-    subtitle = (
-        f"{rig.specimen.grips} ends, {material.law.name}, mu = {material.law.shear_modulus:g} Pa, "
-        f"nu = {material.poisson:g}; {acting}"
-    )
+    [subtitle] = lines("run.txt", "subtitle_of_tests", rig.specimen.grips, system.model)
     summary = {
         **describe_opening(case, described, prior, system, options.precision),
         "solution": {"kind": "tests", "tolerance": rig.solver.tolerance, "tests": text.describe_tests(done)},

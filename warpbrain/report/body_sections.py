@@ -30,20 +30,12 @@ _NO_POINTS = Moved(*np.zeros((3, 0, 3)))
 def before_and_after(pictures: Pictures | str) -> Markup:
     """The rendered body; without pictures, why there are none."""
     if isinstance(pictures, str):
-        return Markup(
-            '<p class="note">The body is not drawn here: {}. The view below needs a browser only.</p>'
-        ).format(pictures)
+        return part("no_pictures", pictures)
     scene = pictures.scene
     stops = ", ".join(f"rgb({r} {g} {b})" for r, g, b in scene.table[[*range(0, 256, 32), 255]].tolist())
-    caption = (
-        "The body before, and after with a corner cut out; three cuts, each plane drawn where it went. Red: where "
-        "the body was before. Black arrows go from where tissue was to where it went."
-    )
-    if len(scene.where):
-        caption += f" {len(scene.where)} points were recorded: how far they moved, and how far they move here."
     legend = [*views.tissue_legend(pictures.names, pictures.whole, pictures.resected), *arrow_colours(scene).items()]
     drawn = [_panel(pictures, name) for name in pictures.images]
-    return part("pictures", drawn, f"{scene.top:.3g}", stops, legend, caption)
+    return part("pictures", drawn, f"{scene.top:.3g}", stops, legend, len(scene.where))
 
 
 def _panel(pictures: Pictures, name: str) -> dict[str, Any]:

@@ -34,7 +34,6 @@ def shown_of(summary: Summary) -> dict[str, Any]:
         "rejected": [[c["mechanism"], c["rejected_because"]] for c in summary["ranking"] if c["log_evidence"] is None],
         "fit": _fit_rows(summary),
         "held_out": [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None],
-        "placebos": _placebo_sentences(summary),
         "smallest": _smallest_rows(summary),
         "measurements": [[m["what"], f"{m['expected_nats']:.1f}"] for m in summary["next_measurement"]],
         "where": summary["where"] and _where_in_words(summary["where"]),
@@ -115,16 +114,6 @@ def _smallest_rows(summary: Summary) -> list[list[str]]:
         of_size = named is not None and effect["unit"] != "of being there"
         rows.append([kind, effect["says"], f"{named:.2g} {effect['unit']}" if of_size else ""])
     return rows
-
-
-def _placebo_sentences(summary: Summary) -> list[str]:
-    """How often patterns that mean nothing do as well as what was added."""
-    fit, words = summary["fit"], "pattern that means nothing does as well with p ="
-    together = [] if fit.get("placebo_p") is None else [f"A {words} {fit['placebo_p']:.2g}."]
-    return together or [
-        f"{confirmation['mechanism']}: a {words} {confirmation['placebo_p']:.2g}."
-        for confirmation in fit["confirmations"]
-    ]
 
 
 def _where_in_words(where: Summary) -> str:
