@@ -51,22 +51,12 @@ def _lines(measured: dict[str, Any]) -> list[str]:
     first, *others = columns.items()
     # a body's first step is replayed once it is captured: both stand between a mesh in memory and that step
     both = [sum(pair) for pair in zip(first[1][0], measured["milliseconds"]["capture"], strict=True)]
-    rows = [
-        (label, statistics.fmean(samples), statistics.pstdev(samples), paper)
-        for label, (samples, paper) in (first, ("and capture of the step", (both, first[1][1])), *others)
-    ]
-    medians = statistics.median(measured["cg_iterations"]), statistics.median(columns[STEP][0])
-    return lines("bench.txt", "row", measured, rows, *medians)
+    rows = first, ("and capture of the step", (both, first[1][1])), *others
+    return lines("bench.txt", "row", measured, rows, columns[STEP][0], statistics)
 
 
 def _table(results: list[dict[str, Any]]) -> list[str]:
     """The paper's table again: a line for each row, each cell our mean (sd) | the paper's mean = how often faster."""
     heads = [label.removeprefix("step ") for label in _columns(results[0])]
-    rows = []
-    for measured in results:
-        cells = [
-            (statistics.fmean(samples), statistics.pstdev(samples), paper)
-            for samples, (paper, _) in _columns(measured).values()
-        ]
-        rows.append((measured, statistics.median(measured["cg_iterations"]), cells))
-    return lines("bench.txt", "table", heads, rows)
+    rows = [(measured, _columns(measured).values()) for measured in results]
+    return lines("bench.txt", "table", heads, rows, statistics)
