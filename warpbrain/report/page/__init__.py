@@ -3,8 +3,8 @@
 The macros of a text template (`run.txt`, `estimate.txt`, ...) make what is printed. A template of a page (`run.html` of
 runs and tests of specimens, `estimate.html`, `diagnosis.html`) makes sections of a result, with what is said of their
 figures, and the facts on top; `document` puts them below a verdict and a table of contents into the frame, with
-`page.css`. Macros of `parts.html` make what pages share, those of `notebook.html` what a notebook shows; `figures` makes
-still figures, `scene` with `scene.js` the view in three dimensions.
+`page.css`. Macros of `parts.html` make what pages share, those of `notebook.html` what a notebook shows; `figures`
+makes still figures, `scene` with `scene.js` the view in three dimensions.
 """
 
 from __future__ import annotations
