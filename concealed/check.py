@@ -21,7 +21,7 @@ from concealed.sealing import fingerprint, open_sealed, read_sealed
 from concealed.trial import Trial
 from concealed.truth_mesh import fingerprint as mesh_fingerprint
 from concealed.truth_mesh import truth_mesh
-from warpbrain.cases.building.recipes import RECIPES
+from warpbrain.cases.building.pipeline import RECIPES
 
 #: A remade recording differs from the published one by no more than this [m].
 SAME = 5e-6

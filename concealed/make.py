@@ -25,7 +25,7 @@ from concealed.targets import draw_targets
 from concealed.trial import CoarseTrial, Trial
 from concealed.truth_mesh import truth_mesh
 from concealed.tuning import Tuned, Unreachable, first_guess, tune
-from warpbrain.cases.building.recipes import RECIPES
+from warpbrain.cases.building.pipeline import RECIPES
 from warpbrain.errors import SolveError
 from warpbrain.mesh import read_mesh
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from concealed.body import Floats
 from concealed.observing import SIGMA, WALLS
-from warpbrain.cases.building.recipes import RECIPES
+from warpbrain.cases.building.pipeline import RECIPES
 
 _CASE = """\
 # Stand-in for clinical case {name}, not a patient: the patient's images are not public. The anatomy is the MNI template

@@ -13,7 +13,7 @@ from concealed.observing import WALLS, rms
 from concealed.places import CASES, published_hash
 from concealed.publish import read_recording
 from concealed.published import NAMES
-from warpbrain.cases.building.recipes import RECIPES
+from warpbrain.cases.building.pipeline import RECIPES
 
 HEAD = ("case", "side", "points: ventricles / cavity", "fluid level, mm", "ventricles, mm", "cavity, mm", "hash")
 

@@ -12,8 +12,7 @@ import numpy as np
 from warpbrain.cases.building.cleaning import finished
 from warpbrain.cases.building.errors import BuildError
 from warpbrain.cases.building.mmg import Size, fit_size, remesh
-from warpbrain.cases.building.pipeline import discretise, named_mesh
-from warpbrain.cases.building.recipes import RECIPES
+from warpbrain.cases.building.pipeline import RECIPES, discretise, named_mesh
 from warpbrain.cases.building.template import template_anatomy
 from warpbrain.mesh import TetMesh, read_mesh, write_mesh
 

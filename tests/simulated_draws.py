@@ -28,9 +28,9 @@ from warpbrain.inference.noise import noise_covariance, noise_factor, outliers, 
 from warpbrain.mesh import TetMesh, nodes_of
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.recordings.base import Registration
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import PointsRecording
-from warpbrain.recordings.registration import Registration
 
 Floats = NDArray[np.float64]
 

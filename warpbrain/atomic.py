@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 import errno
 import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from warpbrain.errors import InputError
 
@@ -54,6 +56,12 @@ def write_text(path: Path, text: str) -> None:
     """Write a text as UTF-8, whole; see `whole_file`."""
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_csv(path: Path, rows: Iterable[Iterable[Any]], lineterminator: str = "\r\n") -> None:
+    """Write rows, the names of the columns first, whole."""
+    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator=lineterminator).writerows(rows)
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.cases.writing import write_case
 from warpbrain.estimation.options import Listener
 from warpbrain.physics.laws import NeoHookean
-from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.report.diagnosis.description import describe
 from warpbrain.report.diagnosis.files import write_curves, write_explained

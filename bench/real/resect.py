@@ -27,7 +27,7 @@ from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.estimation.registration import moved_back, registration_of
 from warpbrain.inference.predict import predict
-from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.recordings.recording import PointsRecording
 from warpbrain.worlds.body.effects import width_of
 from warpbrain.worlds.body.weighted_set import WeightedSet

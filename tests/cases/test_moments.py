@@ -8,8 +8,7 @@ from changing_block import DOWN, block, falling, level, recorded, without
 
 from warpbrain.cases.boundary import Displaced, Forced
 from warpbrain.cases.case import Case
-from warpbrain.cases.checking import check_case
-from warpbrain.cases.enough import numbers_to_fit, too_few_to_diagnose
+from warpbrain.cases.checking import check_case, numbers_to_fit, too_few_to_diagnose
 from warpbrain.cases.moments import Moments, case_at, recorded_times
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.writing import write_case

@@ -15,7 +15,7 @@ from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh, write_mesh
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
-from warpbrain.recordings.registration import Registration
+from warpbrain.recordings.base import Registration
 from warpbrain.simulation.of_case import model_of
 from warpbrain.worlds.body.states import stiffness_modes
 

@@ -17,8 +17,8 @@ from warpbrain.estimation.posterior import Posterior
 from warpbrain.gp.prior import Prior
 from warpbrain.mesh.refinement import refined
 from warpbrain.physics.laws import Law, MooneyRivlin, NeoHookean, Ogden
+from warpbrain.recordings.base import Registration
 from warpbrain.recordings.recording import PointsRecording
-from warpbrain.recordings.registration import Registration
 
 EXACT = EstimationOptions(discretisation=None, registration=False, samples=25)
 WITH_ERROR_OF_MESH = EstimationOptions(registration=False, samples=25)

@@ -18,8 +18,8 @@ from warpbrain.estimation.problem import Nuisances, Point, Problem
 from warpbrain.inference.noise import outliers
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanisms.asymmetry import Asymmetry
+from warpbrain.recordings.base import Registration
 from warpbrain.recordings.location import locate
-from warpbrain.recordings.registration import Registration
 
 THETA = np.log([1200.0, 1100.0])
 

@@ -19,7 +19,7 @@ from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Gaussian, PriorMode
 from warpbrain.estimation.problem import Nuisances, Problem
 from warpbrain.estimation.registration import moved_back, moved_back_columns, realigned, rigid_columns
-from warpbrain.recordings.registration import Registration
+from warpbrain.recordings.base import Registration
 from warpbrain.worlds.body.nuisances import nuisances_at
 from warpbrain.worlds.body.states import States
 

@@ -10,7 +10,6 @@ from shapes import cube, distorted
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.free_surfaces import faces_of_set
-from warpbrain.recordings.agreement import root_mean_square
 from warpbrain.recordings.comparison import (
     Comparison,
     Error,
@@ -18,6 +17,7 @@ from warpbrain.recordings.comparison import (
     compare_points,
     compare_surface,
     legacy_error,
+    root_mean_square,
 )
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, SurfaceRecording

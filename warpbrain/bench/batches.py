@@ -40,43 +40,29 @@ def bench(options: argparse.Namespace) -> None:
     versions, device = command.start(options), find_device(options.device)
     if batches is None:
         batches = [1, 4, 16, 32, 64, 128, 256, 512] if device.is_cuda else [1, 2, 4, 8]
-    print(
-        f"{device.name} ({device.alias}), {options.precision} precision, coarse phantom of one tissue, draws of its "
-        f"prior, {STEPS} steps of 1 ms from rest; {command.release(versions)}"
-    )
+    command.say("ensemble", device, options.precision, STEPS, command.release(versions))
     written: dict[str, Any] = {"versions": versions, "device": device.name, "precision": options.precision}
     progress = Progress("bench")
     progress.show(0.0, "single runs")
     single = measure_single(device.alias, options.precision)
     progress.clear()
-    print(f"single run: {single:.3f} ms a step")
-    print(" batch  ms a step and sample  x single     CG  MB a step    GB/s  GB held")
+    command.say("single", single)
     written |= {"single_milliseconds": single, "batches": []}
     for measured in measure_batches(batches, device.alias, options.precision):
-        best, moved = min(measured["milliseconds"]), measured["bytes_per_step"]
-        print(
-            f"{measured['slots']:>6} {best:>21.4f} {single / best:>9.1f} {measured['cg_iterations']:>6.1f} "
-            f"{moved / 1e6:>10.1f} {moved / best / 1e6:>7.0f} {measured['memory'] / 1e9:>8.2f}"
-            + (f"   {measured['failed']} failed" if measured["failed"] else ""),
-            flush=True,
-        )
+        command.say("batch", measured, single)
         written["batches"].append(measured)
     rates: dict[str, float] = {}
     for count in processes:
         progress.show(0.5, f"{count} processes")
         rates[str(count)] = rate = measure_processes(count, options.samples, options.precision)
         progress.clear()
-        print(
-            f"{count} processes: {rate:.2f} samples a second, {rate / next(iter(rates.values())):.2f} times the first"
-        )
+        command.say("processes", count, rate, next(iter(rates.values())))
     written["samples_a_second_by_processes"] = rates
     if options.sweep is not None:
         progress.show(0.9, "sweep")
-        seconds, samples, failed, iterations = measure_sweep(options.sweep, device.alias, options.precision)
+        written["sweep"] = measure_sweep(options.sweep, device.alias, options.precision)
         progress.clear()
-        print(f"the paper's sweep to rest, {options.sweep}: {samples} samples in {seconds:.1f} s, {failed} failed, "
-              f"{iterations} CG iterations")  # fmt: skip
-        written["sweep"] = {"seconds": seconds, "samples": samples, "failed": failed, "cg_iterations": iterations}
+        command.say("sweep", options.sweep, written["sweep"])
     command.write(options.json, written)
 
 
@@ -153,14 +139,15 @@ def measure_processes(count: int, samples: int, precision: str) -> float:
     return (done - first) / (time.perf_counter() - start)
 
 
-def measure_sweep(tissue: str, device: str, precision: str) -> tuple[float, int, int, int]:
+def measure_sweep(tissue: str, device: str, precision: str) -> dict[str, float]:
     """The paper's sweep on the coarse phantom, to rest: seconds, samples, how many failed, and CG iterations."""
     case = find_case("phantom", tissue)
     job = Job(model_of(case), tuple(chosen_samples(case, "grid")), precision=precision)
     start = time.perf_counter()
     outcomes = [outcome for ended in Here(device, None).outcomes(job) for outcome in ended]
     seconds = time.perf_counter() - start
-    return seconds, len(outcomes), sum(o.failed for o in outcomes), sum(o.cg_iterations for o in outcomes)
+    failed, iterations = sum(o.failed for o in outcomes), sum(o.cg_iterations for o in outcomes)
+    return {"seconds": seconds, "samples": len(outcomes), "failed": failed, "cg_iterations": iterations}
 
 
 def count_bytes(system: System, cg_iterations: float) -> int:

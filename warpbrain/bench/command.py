@@ -43,6 +43,13 @@ def write(path: Path | None, measured: Any) -> None:
         print(f"written to {path}")
 
 
+def say(macro: str, *values: Any) -> None:
+    """Print what a macro of `bench.txt` makes of values, at once."""
+    from warpbrain.report.page import lines
+
+    print(*lines("bench.txt", macro, *values), sep="\n", flush=True)
+
+
 def start(options: argparse.Namespace) -> dict[str, str]:
     """Check that a file or folder for what is measured can be written, and start Warp; returns the versions."""
     from warpbrain.atomic import check_writable, output_folder

@@ -31,16 +31,10 @@ def bench(options: argparse.Namespace) -> None:
     finally:
         progress.clear()
     assert diagnosis is not None
-    sensors, equilibria = len(diagnosis.base.at.sensors), diagnosis.base.states.solves
-    print(f"{case.name}, {sensors} numbers that were recorded, on {device.name} ({device.alias}); {today}")
-    print(f"{equilibria} equilibria; seconds of each run; {command.release(versions)}")
-    width = max(len(stage) for stage in runs[0])
-    for stage in runs[0]:
-        print(f"  {stage:<{width}}" + "".join(f"{run[stage]:10.2f}" for run in runs))
     measured = {
         "case": case.name,
-        "numbers": sensors,
-        "equilibria": equilibria,
+        "numbers": len(diagnosis.base.at.sensors),
+        "equilibria": diagnosis.base.states.solves,
         "device": f"{device.name} ({device.alias})",
         "processor": platform.processor() or platform.machine(),
         "date": today,
@@ -48,5 +42,6 @@ def bench(options: argparse.Namespace) -> None:
         "verdict": diagnosis.verdict,
         "seconds": runs,
     }
+    command.say("diagnoses", measured, command.release(versions))
     name = f"diagnose_{safe_name(device.alias)}_{today}.json"
     command.write(options.out and options.out / name, measured)

@@ -48,12 +48,7 @@ def bench(options: argparse.Namespace) -> None:
     known = mechanisms()
     kinds = command.chosen("--kinds", options.kinds, list(known))
     versions, device, today = command.start(options), find_device(options.device), date.today().isoformat()
-    print(
-        f"{device.name} ({device.alias}), {options.precision} precision, {BASE}: a step of 1 ms, {options.steps} of "
-        f"each; an iteration of Newton's method, {options.equilibria} equilibria of each; {command.release(versions)}"
-    )
-    print("median of the ratios with / without, which take turns")
-    print(f"{'':<18} {'step':>6} {'ms':>8} {'CG':>9} {'Newton':>7} {'ms':>8} {'count':>7}")
+    command.say("mechanisms", device, BASE, options, command.release(versions))
     case, progress = find_case(BASE), Progress("bench")
     rows: list[dict[str, Any]] = []
     for number, kind in enumerate([PLAIN, *kinds]):
@@ -62,23 +57,12 @@ def bench(options: argparse.Namespace) -> None:
         cost = measure_cost(case, kind, example, device.alias, options.precision, options.steps, options.equilibria)
         progress.clear()
         rows.append(cost)
-        print(_line(rows[-1]), flush=True)
+        command.say("mechanism", cost, ratio, median)
     short = "cpu" if device.is_cpu else safe_name(device.name.lower().removeprefix("nvidia "))
     name = command.processor() if device.is_cpu else device.name
     measured = {"versions": versions, "device": name, "date": today, "precision": options.precision, "case": BASE}
     path = options.out and options.out / f"mechanisms_{short}_{today}.json"
     command.write(path, {**measured, "rows": rows})
-
-
-def _line(row: dict[str, Any]) -> str:
-    def both(samples: dict[str, list[int]]) -> str:
-        return f"{median(samples['with']):g}/{median(samples['plain']):g}"
-
-    return (
-        f"{row['kind']:<18} {ratio(row['step']):>6.2f} {median(row['step']['with']):>8.3f} "
-        f"{both(row['cg_iterations']):>9} {ratio(row['newton']):>7.2f} {median(row['newton']['with']):>8.3f} "
-        f"{both(row['newton_iterations']):>7}"
-    )
 
 
 def measure_cost(

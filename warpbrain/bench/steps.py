@@ -26,13 +26,7 @@ def bench(options: argparse.Namespace) -> None:
     for alias in devices:
         device = wp.get_device(alias)
         tolerance = finest_tolerance(options.tol, find_precision(options.precision))
-        print(
-            f"{device.name} ({alias}), {options.precision} precision, CG to {tolerance:.2g}, h = 1 ms, "
-            f"from rest again every {RESTART} steps; {command.release(versions)}"
-        )
-        print(f"mean (sd) ms of {options.steps} steps after {options.warmup}; 'paper' and 'x faster' from its Table 3;")
-        print(f"pre-processing: from a mesh in memory, {BODIES} meshes that no cache has seen, kernels loaded;")
-        print("each linear solve starts from the change of velocity of the step before")
+        command.say("steps", device, options, tolerance, RESTART, BODIES, command.release(versions))
         progress = Progress("bench")
         for number, name in enumerate(names):
             progress.show(number / len(names), f"{name} on {alias}")
@@ -57,22 +51,12 @@ def _lines(measured: dict[str, Any]) -> list[str]:
     first, *others = columns.items()
     # a body's first step is replayed once it is captured: both stand between a mesh in memory and that step
     both = [sum(pair) for pair in zip(first[1][0], measured["milliseconds"]["capture"], strict=True)]
-    rows = [
-        (label, statistics.fmean(samples), statistics.pstdev(samples), paper)
-        for label, (samples, paper) in (first, ("and capture of the step", (both, first[1][1])), *others)
-    ]
-    medians = statistics.median(measured["cg_iterations"]), statistics.median(columns[STEP][0])
-    return lines("bench.txt", "row", measured, rows, *medians)
+    rows = first, ("and capture of the step", (both, first[1][1])), *others
+    return lines("bench.txt", "row", measured, rows, columns[STEP][0], statistics)
 
 
 def _table(results: list[dict[str, Any]]) -> list[str]:
     """The paper's table again: a line for each row, each cell our mean (sd) | the paper's mean = how often faster."""
     heads = [label.removeprefix("step ") for label in _columns(results[0])]
-    rows = []
-    for measured in results:
-        cells = [
-            (statistics.fmean(samples), statistics.pstdev(samples), paper)
-            for samples, (paper, _) in _columns(measured).values()
-        ]
-        rows.append((measured, statistics.median(measured["cg_iterations"]), cells))
-    return lines("bench.txt", "table", heads, rows)
+    rows = [(measured, _columns(measured).values()) for measured in results]
+    return lines("bench.txt", "table", heads, rows, statistics)

@@ -36,16 +36,12 @@ def bench(options: argparse.Namespace) -> None:
     counts = usual if options.counts is None else command.numbers("--counts", options.counts, MOST)
 
     versions, where = command.start(options), command.host()
-    print(
-        f"{where['processor']}, {processors()} processors; median ms of {options.turns} turns, times as fast as one, "
-        "and least processor ms, which other work on the machine changes less"
-    )
+    command.say("threads", where["processor"], processors(), options.turns)
     measured = []
     for name, turn in (("a step", _steps(TABLE3[options.row])), ("equilibrium of 0529", _equilibria())):
         milliseconds, worked = _in_turns(turn, counts, options.turns)
         medians = {count: median(samples) for count, samples in milliseconds.items()}
-        for count, value in medians.items():
-            print(f"  {name:<20}{count:4d} threads{value:10.2f}{medians[counts[0]] / value:8.2f}{worked[count]:10.2f}")
+        command.say("turns", name, medians, worked)
         measured.append({"what": name, "milliseconds": milliseconds, "medians": medians, "processor": worked})
     command.write(options.json, {"versions": versions, "host": where, "row": options.row, "measured": measured})
 

@@ -18,8 +18,8 @@ from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import LAWS, Law
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.resection import Resection
+from warpbrain.recordings.base import Registration
 from warpbrain.recordings.recording import Recording
-from warpbrain.recordings.registration import Registration
 from warpbrain.shown import Shown
 
 

@@ -1,21 +1,25 @@
-"""Checks a case completely: what is wrong with it, how good its mesh is, and what a person should look at again."""
+"""Checks a case completely: what is wrong with it, how good its mesh is, what a person should look at again, and
+whether its recordings hold enough numbers: the one count that all commands share."""
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
-from warpbrain.cases.enough import too_few_for_noise, too_few_to_diagnose
 from warpbrain.cases.reading import examine_case
 from warpbrain.errors import require_kind
 from warpbrain.mesh import Quality, measure
 from warpbrain.mesh.quality import extent
 from warpbrain.problems import Problem, Problems
-from warpbrain.recordings.recording import PointsRecording
+from warpbrain.recordings.points import distinct_rows
+from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording
+from warpbrain.recordings.times import compared_rows
 
 #: Volumes [cm3] of brains without their ventricles: the paper's Table 4 has 1060 to 1609; heads differ.
 BRAIN = (800.0, 1800.0)
@@ -105,7 +109,9 @@ def _look_again(case: Case, quality: Quality) -> list[str]:
             remarks.append(f"recording '{recording.name}': a point moves {1000.0 * largest:.3g} mm: is the unit right?")
         if largest < SMALLEST_SHIFT:
             remarks.append(f"recording '{recording.name}': no point moves more than {1000.0 * largest:.2g} mm")
-        if _wandering(recording):
+        starts = zip(recording.ids or (), recording.points.tolist(), strict=recording.ids is not None)
+        # an id that has more than one: the place at the time was given where the first place belongs
+        if len({(name, *place) for name, place in starts}) > len(set(recording.ids or ())):
             remarks.append(f"recording '{recording.name}': one id starts at several places; x, y, z are where it began")
         if len(np.unique(recording.points, axis=0)) < len(recording.points) and recording.time is None:
             remarks.append(f"recording '{recording.name}': a point is recorded twice")
@@ -128,11 +134,49 @@ def _nothing_there(case: Case) -> list[str]:
     return remarks
 
 
-def _wandering(recording: PointsRecording) -> bool:
-    """Whether an id has more than one start: the place at the time was given where the first place belongs."""
-    if recording.ids is None:
-        return False
-    starts: dict[str, object] = {}
-    return any(
-        starts.setdefault(name, tuple(x)) != tuple(x) for name, x in zip(recording.ids, recording.points, strict=True)
+#: Noise can be estimated from no fewer numbers than this.
+_FOR_NOISE = 10
+#: Numbers below which nothing but registration and stiffness can be told: a dozen, and one point more.
+_TO_DIAGNOSE = 15
+
+
+def numbers_in(case: Case, recording: Recording) -> int:
+    """Numbers of a recording that tell of a body: every component of every row, at all times; copies tell no more.
+
+    The resultant of a boundary whose force the case gives tells nothing.
+    """
+    if isinstance(recording, ForceRecording) and isinstance(case.boundary(recording.boundary), Forced):
+        return 0
+    rows = compared_rows(recording)
+    if isinstance(recording, PointsRecording):
+        rows, _ = distinct_rows(recording, rows)
+    return recording.components * len(rows)
+
+
+def numbers_to_fit(case: Case) -> int:
+    """Numbers of all recordings to which a body is fitted."""
+    return sum(numbers_in(case, recording) for recording in case.recordings if recording.role == "fit")
+
+
+def too_few_for_noise(case: Case, recording: Recording) -> str:
+    """Why the noise of a recording cannot be estimated; empty if it can, or is declared."""
+    declared = recording.sigma is not None or getattr(recording, "sigmas", None) is not None
+    count = numbers_in(case, recording)
+    if declared or not 0 < count < _FOR_NOISE:
+        return ""
+    return (
+        f"recording '{recording.name}' holds {count} numbers: too few to estimate their noise from, which takes "
+        f"{_FOR_NOISE}; give its sigma"
+    )
+
+
+def too_few_to_diagnose(case: Case) -> str:
+    """Why nothing can be concluded from what a body's case has to fit; empty if something can."""
+    count = numbers_to_fit(case)
+    if count >= _TO_DIAGNOSE:
+        return ""
+    points = math.ceil((_TO_DIAGNOSE - count) / 3)
+    return (
+        f"[[recording]] role = 'fit': {count} numbers: too few for any conclusion, since registration and stiffness "
+        f"alone take a dozen; {points} more tracked points, spread over the body, or as many more times would do"
     )

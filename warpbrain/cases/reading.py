@@ -19,7 +19,7 @@ from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
 from warpbrain.physics.composition import CompositionError, require_composable, require_left
 from warpbrain.problems import Problems, nearest
-from warpbrain.recordings.registration import Registration
+from warpbrain.recordings.base import Registration
 
 
 def read_case(path: str | os.PathLike[str]) -> Case:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,6 +30,7 @@ from warpbrain.report.ensemble import (
     write_table,
 )
 from warpbrain.report.files import fingerprints, write_body, write_summary
+from warpbrain.report.page import lines
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.of_case import model_of
 from warpbrain.terminal.progress import Progress
@@ -56,12 +56,8 @@ def ensemble(options: argparse.Namespace) -> None:
     job = Job(model, tuple(samples), steps=options.steps, tolerance=options.tolerance, precision=options.precision)
     described = tables.describe_case(case, model)
     course = "to rest" if options.steps is None else f"{options.steps} steps of 1 ms"
-    say(described["title"])
-    say(f"  mesh      {described['nodes']} nodes, {described['tetrahedra']} tetrahedra")
-    say(*(f"  assumed   {sentence}" for sentence in case.assumptions), sep="\n")
-    say(*(f"  left out  {sentence}" for sentence in tables.left_out(model, "an ensemble has no others")), sep="\n")
-    say(f"  samples   {len(samples)}: {chosen}; {course}, {options.precision} precision")
-
+    left_out, how = tables.left_out(model, "an ensemble has no others"), f"{chosen}; {course}, {options.precision}"
+    say(*lines("ensemble.txt", "opening", described, left_out, len(samples), how), sep="\n")
     if options.steps is None:
         _warn(model, samples, options, say)
     # the same command goes on with what is there, so its folder is that of before
@@ -158,17 +154,9 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
 
 def _warn(model: Model, samples: list[Sample], options: argparse.Namespace, say: Callable[..., None]) -> None:
     """Say what is likely to fail before it is computed."""
-    device = None if options.dask is not None else options.device
-    load = overloaded(model, samples, device)
-    soft = load.numbers
-    if soft:
-        which = ", ".join(str(number) for number in soft[:_NAMED]) + (", ..." if len(soft) > _NAMED else "")
-        borne = f"; all bear {100.0 * load.share:.2g} % of it" if math.isfinite(load.share) else ""
-        say(
-            f"  note      the load may be too much for {len(soft)} of {len(samples)} samples ({which}): in a linear "
-            f"estimate it presses tissue to nothing{borne}. They may fail; percentiles are then of the rest "
-            "(docs/ensembles.md)"
-        )
+    load = overloaded(model, samples, None if options.dask is not None else options.device)
+    if load.numbers:
+        say(*lines("ensemble.txt", "overloaded", load, len(samples), _NAMED), sep="\n")
 
 
 def _compute(

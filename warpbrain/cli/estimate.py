@@ -28,11 +28,12 @@ from warpbrain.estimation.posterior import Posterior
 from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
 from warpbrain.gp.trained import find_model
 from warpbrain.kernels.module import find_device
-from warpbrain.recordings.registration import Registration
+from warpbrain.recordings.base import Registration
 from warpbrain.report import views
 from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
 from warpbrain.report.estimate_page import agreement_figure, densities_figure, residuals_figure, write_estimate_page
 from warpbrain.report.files import fingerprint_of, read_state, write_summary
+from warpbrain.report.page import lines
 from warpbrain.report.rendering import ready_to_render
 from warpbrain.report.sweep import (
     TABLE,
@@ -54,8 +55,6 @@ from warpbrain.worlds.options import DiagnosisOptions
 
 #: Nodes up to which it is said unasked what else may act: its cost grows faster than that of an estimate.
 _LARGEST = 20_000
-#: Steps of Gauss-Newton, as printed.
-_HEADER = "  step    objective   to go [sd]    taken   Newton"
 
 
 def estimate(options: argparse.Namespace) -> None:
@@ -121,13 +120,10 @@ def _posterior(
 
     def on_stage(text: str) -> None:
         progress.clear()
-        say("", text, *([_HEADER] if text.startswith("Gauss-Newton") else []), sep="\n")
+        say(*lines("estimate.txt", "stage", text), sep="\n")
 
     def on_step(step: GaussNewtonStep) -> None:
-        say(
-            f"  {step.iteration:>4} {step.objective:>12.3f} {step.decrement:>12.4f} {step.step:>8.3g} "
-            f"{step.newton_iterations:>8}"
-        )
+        say(*lines("estimate.txt", "gauss_newton_step", step))
 
     model = find_model(options.gp or "hierarchical")
     with Progress("equilibria", options.quiet) as progress:

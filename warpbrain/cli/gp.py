@@ -52,20 +52,13 @@ def show(options: argparse.Namespace) -> None:
     laws = (options.model,) if options.model else _LAWS[:1] if options.group is None else _LAWS
     wanted = [(group, law) for group in groups for law in laws]
     studies = [study for study in model.studies if study.group in groups]
-    print(
-        f"{model.name} model of the literature as {model.variant}: {len(studies)} studies of {len(groups)} group"
-        + "s" * (len(groups) > 1)
-    )
+    print(*lines("gp.txt", "learnt", model, len(studies), len(groups)), sep="\n")
     rows = []
     with Progress("moduli") as bar:
         for index, (group, law) in enumerate(wanted):
             bar.show(index / len(wanted), f"{group}, {law}")
             rows.append(moduli(model, group, law, options.draws, options.seed, options.poisson))
-    print("", *moduli_lines(rows), sep="\n")
-    if any(reason for row in rows for reason in row.unstable):
-        print("(a modulus in brackets is of a law that is unstable)")
-    error = 100.0 * max(row.median_error for row in rows)
-    print(f"{options.draws} draws each: their medians are known to {error:.0f} % or better")
+    print("", *moduli_lines(rows), *lines("gp.txt", "known", rows, options.draws), sep="\n")
     curved = [group for group in groups if group.startswith("hyperelastic/")]
     if curved and isinstance(model, Hierarchical):
         papers = asymmetries_of_papers(model.studies)

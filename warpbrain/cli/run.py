@@ -62,30 +62,24 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError(f"--seed {options.seed}: means nothing without --sample")
 
 
-def parse_moduli(values: list[str]) -> tuple[float | None, dict[int, float]]:
-    """Read the values of ``--mu``: one number for every tissue, or LABEL=PA for some.
+def parse_moduli(values: list[str]) -> dict[int | None, float]:
+    """Moduli by label, of ``--mu``: one number for every tissue, whose label is None, or LABEL=PA for some.
 
     `InputError` if a value is neither, is not positive, or both ways are mixed.
     """
-    every: float | None = None
-    by_label: dict[int, float] = {}
+    moduli: dict[int | None, float] = {}
     for value in values:
         label, equals, number = value.rpartition("=")
         try:
-            mu = float(number)
-            key = int(label) if equals else None
+            key, mu = int(label) if equals else None, float(number)
         except ValueError:
             raise InputError(f"--mu {value}: expected a number [Pa] or LABEL=PA") from None
         if not (math.isfinite(mu) and mu > 0.0):
             raise InputError(f"--mu {value}: the shear modulus must be a positive number [Pa]")
-        if key is not None:
-            if key in by_label:
-                raise InputError(f"--mu {' '.join(values)}: tissue {key} is given twice")
-            by_label[key] = mu
-        elif every is None:
-            every = mu
-        else:
-            raise InputError(f"--mu {' '.join(values)}: expected one number for every tissue, or LABEL=PA for each")
-    if every is not None and by_label:
+        if key in moduli:
+            once = "expected one number for every tissue, or LABEL=PA for each"
+            raise InputError(f"--mu {' '.join(values)}: {once if key is None else f'tissue {key} is given twice'}")
+        moduli[key] = mu
+    if None in moduli and len(moduli) > 1:
         raise InputError(f"--mu {' '.join(values)}: give one number for every tissue or LABEL=PA for some, not both")
-    return every, by_label
+    return moduli

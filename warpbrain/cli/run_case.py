@@ -21,7 +21,6 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
 from warpbrain.kernels.module import is_compiling
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
-from warpbrain.physics.words import tabled
 from warpbrain.report import summary as tables
 from warpbrain.report import views
 from warpbrain.report.comparison import describe_comparisons, describe_mesh_error, recorded_rows, write_comparisons
@@ -44,7 +43,6 @@ from warpbrain.terminal.result_folder import choose_folder, results_in
 
 #: Newton iterations that are printed one by one.
 _LONG_HISTORY = 16
-_INDENT = 12 * " "
 
 
 def run_case(options: argparse.Namespace) -> None:
@@ -134,9 +132,8 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     case = find_case(options.case, options.tissue)
     if options.model is not None:
         case = case.with_law(options.model)
-    every, by_label = options.moduli
-    moduli: Mapping[int, float] = by_label if every is None else dict.fromkeys(case.tissues, every)
-    case = case.with_shear_moduli(moduli)
+    moduli = options.moduli
+    case = case.with_shear_moduli(dict.fromkeys(case.tissues, moduli[None]) if None in moduli else moduli)
     if options.poisson is not None:
         case = replace(case, poisson=options.poisson)
     for text in options.assumed:
@@ -206,14 +203,12 @@ def _mesh_error(
 def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[Watching]:
     """Who is told of the steps, after the head of their table is printed."""
     if options.until is not None:
-        name, columns = "slow change", "     time [s]   Newton    CG   min J   largest [mm]"
+        name = "slow change"
     elif options.steps is not None:
-        name, columns = "motion", "        time [ms]     CG   min J   kinetic energy [mJ]"
-    elif options.to_rest:
-        name, columns = "to rest", "        time [s]  step [s]   residual    CG   min J"
+        name = "motion"
     else:
-        name, columns = "equilibrium", "   load   Newton   residual    CG   step   min J"
-    say("", name + columns, sep="\n")
+        name = "to rest" if options.to_rest else "equilibrium"
+    say(*lines("run.txt", "steps", name), sep="\n")
     count = 0
     length = 0.0
 
@@ -222,13 +217,7 @@ def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[
         count += 1
         # a long history is told by its load steps, not by every iteration
         if count <= _LONG_HISTORY or step.iteration == 1:
-            row(
-                f"{100 * step.load:>5.1f} % {step.iteration:>6}   {step.residual:>8.1e} "
-                f"{step.cg_iterations:>5}  {step.step:>5.3g}   {step.min_J:>5.3f}"
-                + ("   indefinite tangent" if step.indefinite else "")
-            )
-        if count == _LONG_HISTORY:
-            say(_INDENT + "(from here on, the first iteration of each load step)")
+            row("newton_step", step, count == _LONG_HISTORY)
         progress.show(step.load, f"Newton {step.iteration}")
 
     def on_relaxation(step: RelaxationStep) -> None:
@@ -236,33 +225,26 @@ def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[
         count, length = 0 if step.time_step != length else count + 1, step.time_step
         # of steps of one length, which there are many of, one in fifty
         if count % 50 == 0:
-            row(
-                f"{step.time:>11.3g} {step.time_step:>9.3g}   {step.residual:>8.1e} {step.cg_iterations:>5}   "
-                f"{step.min_J:>5.3f}"
-            )
+            row("step_to_rest", step)
         decades = math.log10(max(step.residual, 1e-300)) / math.log10(options.tolerance)
         progress.show(min(1.0, max(0.0, decades)), f"{step.time:.3g} s")
 
     def on_motion(number: int, time: float, noted: dict[str, Any] | None) -> None:
         if noted is not None:
-            energy = f"{1000 * noted['kinetic_J']:.4g}"
-            row(f"{1000 * time:>11.4g} {noted['cg_iterations']:>6}   {noted['min_J']:>5.3f}   {energy}")
+            row("step_of_motion", noted)
         progress.show(number / options.steps, f"{1000 * time:.0f} ms")
 
     def on_moment(number: int, moments: int, noted: dict[str, Any]) -> None:
         if number % max(1, moments // 10) == 0 or number == moments:
-            row(
-                f"{noted['time_s']:>12.4g} {noted['newton_iterations']:>8} {noted['cg_iterations']:>5}"
-                f"   {noted['min_J']:>5.3f}   {tabled(noted['largest_displacement_mm']):>9}"
-            )
+            row("slow_step", noted)
         progress.show(number / moments, f"{noted['time_s']:.3g} s")
 
     def on_slow_newton(part: float, step: NewtonStep) -> None:
         progress.show(part, f"Newton {step.iteration}")
 
-    def row(text: str) -> None:
+    def row(macro: str, *values: Any) -> None:
         progress.clear()
-        say(_INDENT + text)
+        say(*lines("run.txt", macro, *values), sep="\n")
 
     with Progress(name, options.quiet) as progress:
         yield Watching(on_newton, on_relaxation, on_motion, on_slow_newton, on_moment)

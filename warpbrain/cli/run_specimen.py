@@ -17,7 +17,7 @@ from warpbrain.report.run_page import write_specimen_page
 from warpbrain.report.specimen import write_tests_picture
 from warpbrain.report.summary import describe_opening, machine
 from warpbrain.simulation.observation import Observed
-from warpbrain.simulation.specimen import SpecimenRunning
+from warpbrain.simulation.specimen import SHOWN, SpecimenRunning
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import results_in
@@ -42,15 +42,10 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
     with Progress("tests", options.quiet) as progress:
         done = running.run(progress.show).tests
     seconds |= rig.solver.clock.seconds
-    say(*lines("run.txt", "tests", text.test_rows(done)), sep="\n")
+    say(*lines("run.txt", "tests", done, SHOWN), sep="\n")
     say(*lines("run.txt", "times", seconds, rig.solver.clock.counts), sep="\n")
 
-    [material] = system.model.materials.values()
-    acting = ", ".join(mechanism.kind for mechanism in system.model.mechanisms) or "elastic"
-    subtitle = (
-        f"{rig.specimen.grips} ends, {material.law.name}, mu = {material.law.shear_modulus:g} Pa, "
-        f"nu = {material.poisson:g}; {acting}"
-    )
+    [subtitle] = lines("run.txt", "subtitle_of_tests", rig.specimen.grips, system.model)
     summary = {
         **describe_opening(case, described, prior, system, options.precision),
         "solution": {"kind": "tests", "tolerance": rig.solver.tolerance, "tests": text.describe_tests(done)},

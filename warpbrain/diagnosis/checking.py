@@ -25,7 +25,7 @@ from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import Confirmation
 from warpbrain.inference.predict import Prediction, along_own_axes, p_value, predict, predict_with, predictive_p
 from warpbrain.inference.subsets import Blocks
-from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import width_of
 from warpbrain.worlds.body.fit_columns import with_shapes_about

@@ -23,7 +23,7 @@ from warpbrain.estimation.registration import registration_of
 from warpbrain.estimation.sampling import Proposal, Target, importance_sampling, run_chain
 from warpbrain.gp.prior import Prior
 from warpbrain.gp.process import Process
-from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.seconds import Seconds
 from warpbrain.simulation.locking import elements_of_fits, on_linear_elements
 

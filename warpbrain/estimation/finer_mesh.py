@@ -39,7 +39,7 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import Forward, State
 from warpbrain.inference.beliefs import belief
-from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.mesh_error import FinerCase, restricted
 from warpbrain.simulation.model import Material, Model

@@ -25,7 +25,7 @@ from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.inference.noise import Outliers, log_scale_density, noise_factor, outliers, scales
-from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.recordings.comparison import root_mean_square
 
 #: An undeclared noise is no smaller [m] or [N]: below this it is rounding of the computation.
 LEAST_SIGMA = 1e-9

@@ -19,7 +19,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
-from warpbrain.cases.enough import too_few_for_noise
+from warpbrain.cases.checking import too_few_for_noise
 from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns

@@ -20,8 +20,7 @@ from warpbrain.estimation.registration import realigned
 from warpbrain.estimation.sampling import Chain, Importance
 from warpbrain.gp.prior import Prior
 from warpbrain.physics.words import enumerated
-from warpbrain.recordings.agreement import by_unit
-from warpbrain.recordings.comparison import Comparison
+from warpbrain.recordings.comparison import Comparison, by_unit
 from warpbrain.shown import Shown
 from warpbrain.simulation.observation import observe
 from warpbrain.simulation.result import NodalState

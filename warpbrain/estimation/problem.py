@@ -21,7 +21,7 @@ from warpbrain.estimation.observations import Observations, Sensors
 from warpbrain.estimation.parameters import Gaussian, Parameters, PriorMode
 from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
 from warpbrain.inference.least_squares import minimise
-from warpbrain.recordings.registration import Registration
+from warpbrain.recordings.base import Registration
 
 #: Nuisances are at their best when the next step is shorter than this [standard deviations].
 _AT_BEST = 1e-5

@@ -15,8 +15,8 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
+from warpbrain.recordings.base import Registration
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
-from warpbrain.recordings.registration import Registration
 
 #: Names of the six numbers.
 NAMES = (*(f"shift {axis} [m]" for axis in "xyz"), *(f"turn about {axis} [rad]" for axis in "xyz"))

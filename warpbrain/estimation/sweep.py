@@ -22,7 +22,7 @@ from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.posterior import compared
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import law_of_curve
-from warpbrain.recordings.agreement import by_unit
+from warpbrain.recordings.comparison import by_unit
 
 #: Steps of each tissue.
 Steps = tuple[float, ...]

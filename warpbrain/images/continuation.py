@@ -18,6 +18,8 @@ LENGTH = 20.0
 #: many, up to `_MOST` (cascadic: Bornemann and Deuflhard 1996, Numerische Mathematik 75, 135). The equation is then
 #: solved to about 3 % of the largest displacement.
 _ITERATIONS, _MOST = 8, 200
+#: Of what is left at first, what is small enough; iterations end sooner there.
+_EXACT = 1e-6
 #: Edge [voxels] of the grid from which on none coarser is made.
 _COARSEST = 12
 
@@ -25,34 +27,37 @@ _COARSEST = 12
 def continued(values: Singles, known: Bools, voxel: Floats, length: float = LENGTH) -> Singles:
     """Continue values (i, j, k, c) beyond where they are known (i, j, k), on voxels with edges (3,) [mm]; what is known
     stays as it is."""
-    start = np.where(known[..., None], values, np.float32(0.0)).astype(np.float32)
-    return _solved(start, known, np.asarray(voxel, dtype=np.float64), length, _ITERATIONS)
+    start, edges = np.where(known[..., None], values, np.float32(0.0)), np.asarray(voxel, dtype=np.float64)
+    parts = [_solved(part, known, edges, length, _ITERATIONS) for part in np.moveaxis(start, -1, 0)]
+    return np.stack(parts, axis=-1)
 
 
 def _solved(values: Singles, known: Bools, voxel: Floats, length: float, iterations: int) -> Singles:
     """Conjugate gradients from the solution on a grid of twice the edges."""
+    from scipy.ndimage import zoom
+    from scipy.sparse.linalg import LinearOperator, cg
+
     start = np.zeros_like(values)
     if min(known.shape) > _COARSEST:
-        more = min(2 * iterations, _MOST)
-        start = _finer(_solved(*_coarser(values, known), 2.0 * voxel, length, more), known.shape)
+        coarse = _solved(*_coarser(values, known), 2.0 * voxel, length, min(2 * iterations, _MOST))
+        # linear between the centres of voxels, zero beyond the grid
+        start = zoom(coarse, 2, order=1, mode="grid-constant", grid_mode=True)[tuple(map(slice, known.shape))]
     else:
         iterations = _MOST
     start[known] = values[known]
     weights = 1.0 / voxel**2
     factors = (weights / (2.0 * weights.sum() + 1.0 / length**2)).astype(np.float32)
-    left = _neighbours(start, factors) - start
-    left[known] = 0.0
-    direction, square = left.copy(), _dots(left, left)
-    for _ in range(iterations):
-        product = direction - _neighbours(direction, factors)
-        product[known] = 0.0
-        step = (square / np.maximum(_dots(direction, product), 1e-30)).astype(np.float32)
-        start += step * direction
-        left -= step * product
-        before, square = square, _dots(left, left)
-        direction *= (square / np.maximum(before, 1e-30)).astype(np.float32)
-        direction += left
-    return start
+
+    def left(field: Singles) -> Singles:
+        """What the equation leaves of a field where it is to be solved."""
+        rest = _neighbours(field, factors) - field
+        rest[known] = 0.0
+        return rest
+
+    size = (known.size, known.size)
+    operator = LinearOperator(size, matvec=lambda x: -left(x.reshape(known.shape)).ravel(), dtype=np.float32)
+    change, _ = cg(operator, left(start).ravel(), rtol=_EXACT, maxiter=iterations)
+    return np.asarray(start + change.reshape(known.shape))
 
 
 def _neighbours(values: Singles, factors: Singles) -> Singles:
@@ -67,29 +72,12 @@ def _neighbours(values: Singles, factors: Singles) -> Singles:
     return total
 
 
-def _dots(a: Singles, b: Singles) -> Floats:
-    """Inner products (c,) of two fields of c components."""
-    return np.einsum("nc,nc->c", a.reshape(-1, a.shape[3]), b.reshape(-1, b.shape[3]), dtype=np.float64)
-
-
 def _coarser(values: Singles, known: Bools) -> tuple[Singles, Bools]:
     """Means of what is known in blocks of two voxels along each axis."""
     edges = [(0, n % 2) for n in known.shape]
     i, j, k = ((n + 1) // 2 for n in known.shape)
-    blocks = (i, 2, j, 2, k, 2)
-    counts = np.pad(known, edges).reshape(blocks).sum(axis=(1, 3, 5), dtype=np.float32)
-    sums = np.pad(values, [*edges, (0, 0)]).reshape(*blocks, values.shape[3]).sum(axis=(1, 3, 5))
-    return sums / np.maximum(counts, 1.0)[..., None], counts > 0
-
-
-def _finer(coarse: Singles, shape: tuple[int, ...]) -> Singles:
-    """Linear interpolation to a grid of half the voxels' edges, zero beyond the coarse one."""
-    for axis, n in enumerate(shape):
-        edges = [(1, 1) if a == axis else (0, 0) for a in range(coarse.ndim)]
-        wide = np.moveaxis(np.pad(coarse, edges), axis, 0)
-        here = np.float32(0.75) * wide[1:-1]
-        fine = np.empty((2 * len(here), *here.shape[1:]), dtype=np.float32)
-        fine[0::2] = here + np.float32(0.25) * wide[:-2]
-        fine[1::2] = here + np.float32(0.25) * wide[2:]
-        coarse = np.moveaxis(fine[:n], 0, axis)
-    return np.ascontiguousarray(coarse)
+    counts, sums = (
+        np.pad(field, edges).reshape(i, 2, j, 2, k, 2).sum(axis=(1, 3, 5), dtype=np.float32)
+        for field in (known, values)
+    )
+    return sums / np.maximum(counts, 1.0), counts > 0

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats
-from warpbrain.atomic import whole_file, write_text
+from warpbrain.atomic import write_csv, write_text
 from warpbrain.errors import InputError
 from warpbrain.images.displacement import DisplacementField
 from warpbrain.images.grid import MILLIMETRES
@@ -20,7 +19,7 @@ from warpbrain.mesh.quadratic import quadratic_interpolant
 from warpbrain.problems import Problems, Unreadable
 from warpbrain.recordings.electrodes import is_electrodes, read_electrodes
 from warpbrain.recordings.location import locate
-from warpbrain.recordings.markups import ENDINGS, is_markup, read_markup
+from warpbrain.recordings.markups import ENDINGS, Markup, is_markup, read_markup
 
 _HEADER = (
     *("file", "label", "x_mm", "y_mm", "z_mm", "moved_x_mm", "moved_y_mm", "moved_z_mm"),
@@ -33,9 +32,7 @@ class PointFile:
     """A file of points."""
 
     path: Path
-    labels: tuple[str, ...]
-    points: Floats  # (n, 3), before [mm, RAS]
-    moved_text: Callable[[Floats], str]  # from positions after (n, 3) [mm, RAS] to the text of the file that has them
+    markup: Markup  # its points before
     remarks: tuple[str, ...]
 
     @property
@@ -53,6 +50,7 @@ class MovedPoints:
     """Points of a file and where they have gone."""
 
     file: PointFile
+    before: Floats  # (n, 3) [mm, RAS]
     points: Floats  # (n, 3), after [mm, RAS]
     outside: Floats  # (n,), how far outside the mesh they were before [mm]
     beyond: Bools  # (n,), beyond the grid: they are taken not to move
@@ -70,13 +68,9 @@ def read_point_file(path: Path) -> PointFile:
         raise InputError(f"{path}: found ending '{path.suffix}', expected .mrk.json, .fcsv or a BIDS electrodes.tsv")
     problems = Problems()
     with suppress(Unreadable):
-        file = read_electrodes(path, problems) if is_electrodes(path) else read_markup(path, problems)
+        markup = read_electrodes(path, problems) if is_electrodes(path) else read_markup(path, problems)
     problems.stop()
-    moved_text = file.moved_text
-    remarks = tuple(problems.remarks)
-    return PointFile(
-        path, file.labels, MILLIMETRES * file.points, lambda after: moved_text(after / MILLIMETRES), remarks
-    )
+    return PointFile(path, markup, tuple(problems.remarks))
 
 
 def move_points(
@@ -84,38 +78,27 @@ def move_points(
 ) -> MovedPoints:
     """Move points along: inside the mesh as its elements do (`u` and `middles` as of `displacement_field`), outside as
     the field that continues it."""
-    points = file.points / MILLIMETRES
-    place = locate(mesh.points, mesh.tetrahedra, points)
+    before = MILLIMETRES * file.markup.points
+    place = locate(mesh.points, mesh.tetrahedra, file.markup.points)
     displacement = MILLIMETRES * place.interpolate(u)
     if middles is not None:
         # outside corners have another order: there the field takes over
         displacement = MILLIMETRES * quadratic_interpolant(place.weights, u[place.nodes], middles[place.element])
-    outside, of_field = place.distance > 0.0, field.at(file.points)
-    displacement[outside] = of_field[outside]
-    return MovedPoints(
-        file,
-        file.points + displacement,
-        MILLIMETRES * place.distance,
-        ~field.grid.contains(file.points),
-        np.linalg.norm(displacement - of_field, axis=1),
-    )
+    outside, of_field = MILLIMETRES * place.distance, field.at(before)
+    displacement[outside > 0.0] = of_field[outside > 0.0]
+    apart = np.linalg.norm(displacement - of_field, axis=1)
+    return MovedPoints(file, before, before + displacement, outside, ~field.grid.contains(before), apart)
 
 
 def write_moved(folder: Path, moved: Sequence[MovedPoints]) -> list[str]:
     """Write each file with its points moved, and all of them in `moved.csv` [mm, RAS]; returns the names."""
-    names = []
+    rows: list[Sequence[str]] = [_HEADER]
     for points in moved:
-        name = points.file.moved_name
-        text = points.file.moved_text(points.points)
-        write_text(folder / name, text)
-        names.append(name)
-    with whole_file(folder / "moved.csv") as scratch, scratch.open("w", encoding="utf-8", newline="") as stream:
-        rows = csv.writer(stream)
-        rows.writerow(_HEADER)
-        for points in moved:
-            sizes = np.linalg.norm(points.points - points.file.points, axis=1)
-            columns = (points.file.labels, points.file.points, points.points, sizes, points.outside, points.apart)
-            for label, before, after, size, outside, apart in zip(*columns, strict=True):
-                numbers = [f"{value:.4f}" for value in (*before, *after, size, outside, apart)]
-                rows.writerow([points.file.path.name, label, *numbers])
-    return [*names, "moved.csv"]
+        markup = points.file.markup
+        write_text(folder / points.file.moved_name, markup.moved_text(points.points / MILLIMETRES))
+        sizes = np.linalg.norm(points.points - points.before, axis=1)
+        numbers = np.column_stack([points.before, points.points, sizes, points.outside, points.apart])
+        for label, values in zip(markup.labels, numbers.tolist(), strict=True):
+            rows.append([points.file.path.name, label, *(f"{value:.4f}" for value in values)])
+    write_csv(folder / "moved.csv", rows)
+    return [*(points.file.moved_name for points in moved), "moved.csv"]

@@ -2,6 +2,6 @@
 
 A kind (`points`, `surface`, `force`, `test`) says what `case.toml` may say of it, reads and checks its file with
 `tables`, `markups`, `tags`, `surfaces` or `vtp`, and writes it; `recording` lists the kinds. `times` says which rows a
-state is compared with, `location` and `closest` where they are in the mesh, `comparison` how far they are from the
-state, and `agreement` makes one number of that. `electrodes` are points that are moved only.
+state is compared with, `location` and `closest` where they are in the mesh, and `comparison` how far they are from the
+state. `electrodes` are points that are moved only.
 """

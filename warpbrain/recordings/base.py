@@ -1,8 +1,10 @@
-"""What all recordings have and do; a file for each kind says the rest: keys, data, reading, writing, checks."""
+"""What all recordings have and do, and how well they are registered; a file for each kind says the rest: keys, data,
+reading, writing, checks."""
 
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -161,6 +163,27 @@ class TrackedPoints:
     #: (n,), noise of one component of each point [m]; takes precedence over that of the recording.
     sigmas: Floats | None = None
     weights: Floats | None = None  # (n,)
+
+
+@dataclass(frozen=True)
+class Registration:
+    """How far a registration may be wrong: one standard deviation each, normal.
+
+    `InputError` if one is not a positive number.
+    """
+
+    shift: float  # of each component of a shift [m]
+    turn: float  # of each component of a rotation vector [rad]
+
+    def __post_init__(self) -> None:
+        for name, value in (("shift", self.shift), ("turn", self.turn)):
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"registration: {name} = {value}: expected a positive number")
+
+    @property
+    def deviations(self) -> Floats:
+        """Standard deviations of the six numbers, shape (6,)."""
+        return np.repeat([self.shift, self.turn], 3)
 
 
 def write_columns(path: Path, columns: Columns) -> None:

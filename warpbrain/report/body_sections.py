@@ -30,20 +30,12 @@ _NO_POINTS = Moved(*np.zeros((3, 0, 3)))
 def before_and_after(pictures: Pictures | str) -> Markup:
     """The rendered body; without pictures, why there are none."""
     if isinstance(pictures, str):
-        return Markup(
-            '<p class="note">The body is not drawn here: {}. The view below needs a browser only.</p>'
-        ).format(pictures)
+        return part("no_pictures", pictures)
     scene = pictures.scene
     stops = ", ".join(f"rgb({r} {g} {b})" for r, g, b in scene.table[[*range(0, 256, 32), 255]].tolist())
-    caption = (
-        "The body before, and after with a corner cut out; three cuts, each plane drawn where it went. Red: where "
-        "the body was before. Black arrows go from where tissue was to where it went."
-    )
-    if len(scene.where):
-        caption += f" {len(scene.where)} points were recorded: how far they moved, and how far they move here."
     legend = [*views.tissue_legend(pictures.names, pictures.whole, pictures.resected), *arrow_colours(scene).items()]
     drawn = [_panel(pictures, name) for name in pictures.images]
-    return part("pictures", drawn, f"{scene.top:.3g}", stops, legend, caption)
+    return part("pictures", drawn, f"{scene.top:.3g}", stops, legend, len(scene.where))
 
 
 def _panel(pictures: Pictures, name: str) -> dict[str, Any]:
@@ -109,29 +101,19 @@ def body_view(
     return viewer(view, "points", "Motion as large as it is: 1 times; before: 0 times.")
 
 
-def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float], known: str) -> Markup:
-    """Where the displacement is known and how well; nothing where nothing is known of it.
+def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float]) -> dict[str, Any] | None:
+    """Where the displacement is known and how well, as the macro `known` of a page takes it; None where nothing is
+    known of it.
 
-    `whole` is the anatomy before anything was resected, `places` [m] as of `body_view`, and `known` a sentence: what
-    the standard deviation is of.
+    `whole` is the anatomy before anything was resected, `places` [m] as of `body_view`.
     """
     if state.deviation is None or not state.deviation.any():
-        return Markup()
-    at = int(state.deviation.argmax())
-    moves = float(np.linalg.norm(state.u[at]))
-    words = (
-        f"Standard deviation of the displacement: at most {MILLIMETRES * state.deviation[at]:.2g} mm, where the body "
-        f"moves by {MILLIMETRES * moves:.2g} mm. {known}"
-    )
+        return None
+    values, volumes = MILLIMETRES * state.deviation, state.mesh.node_volumes
+    moves = MILLIMETRES * np.linalg.norm(state.u[values.argmax()])
+    trust = None
     if state.trust is not None:
-        volumes = state.mesh.node_volumes
-        unseen, left = (100.0 * volumes[state.trust == value].sum() / volumes.sum() for value in (UNSEEN, LEFT))
-        words += (
-            f" Hatched: {TRUST[UNSEEN]} of a force there, {unseen:.0f} % of the body. Dotted: {TRUST[LEFT]}, "
-            f"{left:.0f} % of it."
-        )
-    words += " With --image: displacement_sd.nii.gz" + (" and trust.nii.gz." if state.trust is not None else ".")
-    values = MILLIMETRES * state.deviation
+        trust = [(TRUST[k], 100.0 * volumes[state.trust == k].sum() / volumes.sum()) for k in (UNSEEN, LEFT)]
 
     def draw(narrow: bool) -> Any:
         figure, axes = panels(narrow, 3.4, 3)
@@ -149,7 +131,7 @@ def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float
         colour_bar(figure, drawn, axes, narrow, "standard deviation of the displacement [mm]")
         return figure
 
-    return inlined(draw, "Three cuts with the deviation.", words)
+    return inlined(draw, deviation=values.max(), moves=moves, trust=trust)
 
 
 def window(state: SavedState, exaggeration: float | None) -> Any:

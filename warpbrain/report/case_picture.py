@@ -65,10 +65,6 @@ class _Scene:
     def mesh(self) -> TetMesh:
         return self.case.mesh
 
-    @property
-    def views(self) -> tuple[View, ...]:
-        return views.VIEWS if self.case.specimen is None else _SPECIMEN_VIEWS
-
     @cached_property
     def resected(self) -> Bools:
         resection = self.case.resection
@@ -138,7 +134,8 @@ def write_case_picture(path: Path, case: Case) -> str:
     """Draw a case as PNG; returns why the body from outside is not in it, empty if it is."""
     scene = _Scene(case)
     figure, panels = views.panels(2, 2, (15.0, 11.6))
-    for axes, view, place in zip(panels[:3], scene.views, views.places(case.mesh, scene.resected), strict=True):
+    cuts = views.VIEWS if case.specimen is None else _SPECIMEN_VIEWS
+    for axes, view, place in zip(panels[:3], cuts, views.places(case.mesh, scene.resected), strict=True):
         _draw_cut(axes, scene, view, place)
     missing = _draw_open(panels[3], scene)
     _draw_legend(figure, scene)

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.atomic import write_csv
 from warpbrain.cases.case import Case
 from warpbrain.physics.words import tabled
-from warpbrain.recordings.comparison import Comparison, Error
+from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
-from warpbrain.report.files import MILLIMETRES, picked, write_csv
+from warpbrain.report.files import MILLIMETRES, picked
 from warpbrain.simulation.mesh_error import MeshError
 from warpbrain.simulation.observation import Observed
 
@@ -51,9 +52,7 @@ def describe_comparisons(observed: Observed) -> dict[str, Any]:
 def _describe(comparison: Comparison) -> dict[str, Any]:
     factor, unit = SHOWN[comparison.unit]
 
-    def error(value: Error | None) -> dict[str, Any] | None:
-        if value is None:
-            return None
+    def error(value: Any) -> dict[str, Any]:
         sizes = {key: factor * getattr(value, key) for key in ("root_mean_square", "percentile_95", "largest")}
         return sizes if value.legacy is None else {**sizes, "legacy_sqrt_mm": value.legacy}
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import whole_file, write_csv
 from warpbrain.ensemble.results import EnsembleResult, Fields, Row, Spread
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
-from warpbrain.report.files import MILLIMETRES, body_file, sets_of, write_csv
+from warpbrain.report.files import MILLIMETRES, body_file, sets_of
 from warpbrain.report.page import lines
 from warpbrain.report.summary import SET_TITLES, sizes_mm
 

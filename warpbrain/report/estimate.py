@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from warpbrain.atomic import write_csv
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import INTERVALS, Marginal, OverallErrors, Posterior, Prediction
@@ -16,7 +17,7 @@ from warpbrain.estimation.registration import registration_of
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report.comparison import SHOWN, error_text
 from warpbrain.report.diagnosis.files import seen
-from warpbrain.report.files import MILLIMETRES, body_file, fingerprints, picked, write_body, write_csv
+from warpbrain.report.files import MILLIMETRES, body_file, fingerprints, picked, write_body
 from warpbrain.report.page import lines
 from warpbrain.report.summary import machine
 from warpbrain.worlds.body.uncertainty import AveragedTissue
@@ -229,14 +230,6 @@ def remarks_of(posterior: Posterior) -> list[str]:
         for prediction in posterior.predictions
         if prediction.gross.mean() > _UNEXPLAINED
     ]
-
-
-def recorded_points(posterior: Posterior, surfaces: bool = True) -> Iterator[tuple[Prediction, Any]]:
-    """Predictions at places, with their recordings: of points, and of surfaces unless these are left out."""
-    recordings = {recording.name: recording for recording in posterior.case.recordings}
-    for prediction in posterior.predictions:
-        if isinstance(recordings[prediction.name], PointsRecording | SurfaceRecording if surfaces else PointsRecording):
-            yield prediction, recordings[prediction.name]
 
 
 # as printed and on the page -------------------------------------------------------------------------------------------

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -93,13 +92,6 @@ def plain(value: Any) -> Any:
 def picked(instance: Any, *names: str, **renamed: str) -> dict[str, Any]:
     """Attributes of an object for JSON, some by other names than their own."""
     return {key: getattr(instance, name) for key, name in ({name: name for name in names} | renamed).items()}
-
-
-def write_csv(path: Path, rows: Iterable[Iterable[Any]], lineterminator: str = "\r\n") -> None:
-    """Write rows, the names of the columns first, whole."""
-
-    with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
-        csv.writer(stream, lineterminator=lineterminator).writerows(rows)
 
 
 def fingerprints(case: Case) -> dict[str, str]:

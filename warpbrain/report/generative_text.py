@@ -2,30 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
+from warpbrain.atomic import write_csv
 from warpbrain.gp.asymmetry import Asymmetry
 from warpbrain.gp.sampling import CURVES, DrawnLaws, Fit, Moduli, rejection_rate
-from warpbrain.report.files import write_csv
 from warpbrain.report.page import lines
 
 
 def asymmetry_lines(asymmetries: Sequence[Asymmetry], papers: Mapping[str, tuple[float, bool]]) -> list[str]:
     """Compression and tension, a line for each group, and one of the literature, as of `asymmetries_of_papers`."""
-    rows = []
-    for asymmetry in asymmetries:
-        mean, low, high, new_low, new_high = np.exp(
-            [asymmetry.mean, asymmetry.low, asymmetry.high, asymmetry.new_low, asymmetry.new_high]
-        ).tolist()
-        intervals = f"{mean:.2f} ({low:.2f} to {high:.2f})", f"{new_low:.2f} to {new_high:.2f}"
-        rows.append([asymmetry.group, asymmetry.strain, *intervals, 100.0 * asymmetry.tension])
-    width = 2 + max(len(asymmetry.group) for asymmetry in asymmetries)
-    return lines("gp.txt", "tension_over_compression", rows, width, list(papers.values()))
+    return lines("gp.txt", "tension_over_compression", asymmetries, list(papers.values()), math.exp)
 
 
 def moduli_lines(moduli: Sequence[Moduli]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import TetMesh
-from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import PointsRecording, Recording
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
@@ -49,15 +48,15 @@ class Moved:
     computed: Floats
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording], comparisons: Sequence[Comparison]) -> Moved:
-        """Of all recordings of displacements at points."""
+    def of(cls, recordings: Sequence[Recording], compared: Iterable[tuple[str, Ints, Floats, Floats]]) -> Moved:
+        """Of all recordings of displacements at points; of each `compared` one its name, its rows (n,), and what is
+        left there (n, 3) [m] with nothing moved and with the simulation."""
         by_name = {recording.name: recording for recording in recordings}
         moves = [np.zeros((0, 9))]
-        for comparison in comparisons:
-            recording = by_name[comparison.name]
+        for name, rows, before, after in compared:
+            recording = by_name[name]
             if isinstance(recording, PointsRecording):
-                moved = comparison.residuals_before - comparison.residuals_after
-                moves.append(np.column_stack([recording.points[comparison.rows], comparison.residuals_before, moved]))
+                moves.append(np.column_stack([recording.points[rows], before, before - after]))
         return cls(*np.split(np.concatenate(moves), 3, axis=1))
 
 

@@ -41,12 +41,13 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
 
     Returns the pictures, or why there are none.
     """
-    case, described, solution = summary["case"], summary["result"], summary["solution"]
+    case, solution = summary["case"], summary["solution"]
     judged, result, whole = explained_of(summary["recordings"]["compared"]), run.result, run.case.mesh
-    moved = Moved.of(run.case.recordings, run.observed.comparisons)
+    compared = ((c.name, c.rows, c.residuals_before, c.residuals_after) for c in run.observed.comparisons)
+    moved = Moved.of(run.case.recordings, compared)
     names = {label: tissue.name for label, tissue in run.case.tissues.items()}
     left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
-    subtitles = [_subtitle(case, solution), *summary["recordings"]["in_words"], *left_out]
+    subtitles = [*lines("run.txt", "subtitle", case, solution), *summary["recordings"]["in_words"], *left_out]
     begun = begin_pictures(whole, result.mesh, result.u, names, moved)
     fields = [
         Field(
@@ -57,66 +58,42 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     places = views.places(whole)
     view = body_view(result.mesh, result.u, fields, moved, places)
     pictures = draw(folder / "deformation.png", begun, run.case.title, subtitles)
-    solved = [f"{solution['kind']}, {len(solution['history'])} recorded steps"]
-    if "time_s" in solution:
-        solved.append(f"until {solution['time_s']:.4g} s")
-    if "relative_residual" in solution:
-        residual = f"{solution['relative_residual']:.1e} (goal {solution['tolerance']:.0e})"
-        solved.append(f"relative out-of-balance force {residual}")
-    largest = described["displacement_mm"]["all nodes"]["largest"]
-    facts = [("largest displacement", f"{largest:.3g} mm")]
-    if judged.before is not None:
-        facts.append(("RMSE, no motion → this", f"{judged.before:.3g} → {judged.after:.3g} mm"))
     sentences = judged.sentences or ["Nothing was recorded of this case that the simulation could be compared with."]
     _write(
-        folder / "report.html", summary, Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts),
+        folder / "report.html", summary, judged.verdict, BADGES[judged.verdict], sentences,
         pictures=before_and_after(pictures),
         view=view,
-        displacements=displacement_rows(described),
-        mesh_error=lines("run.txt", "mesh_error", summary["mesh_error"]) if "mesh_error" in summary else [],
-        solution=solved,
+        judged=judged,
+        displacements=displacement_rows(summary["result"]),
     )  # fmt: skip
     return pictures
 
 
-def _subtitle(case: Mapping[str, Any], outcome: Mapping[str, Any]) -> str:
-    laws = ", ".join(
-        f"{tissue['name']} {tissue['law']} {tissue['shear_modulus_Pa']:g} Pa" for tissue in case["tissues"].values()
-    )
-    state = outcome["kind"]
-    if state == "motion":
-        state = f"after {1000 * outcome['time_s']:.0f} ms"
-    elif state == "slow change":
-        state = f"after {outcome['time_s']:g} s"
-    stand_in = "stand-in, not the patient's images; " if case["origin"] == "stand-in" else ""
-    return f"{stand_in}{laws}; {state}"
-
-
 def write_specimen_page(path: Path, summary: Mapping[str, Any], tests: Sequence[Tested]) -> None:
     """Write the page of tests; `summary` is what `summary.json` holds."""
-    figure = inlined(
-        lambda narrow: tests_figure(tests, 1 if narrow else 2),
-        f"Recorded and simulated curves of {len(tests)} tests.",
-        "Each test as it was recorded and as it is simulated. What is marked check is not to be fitted.",
-    )
+    figure = inlined(lambda narrow: tests_figure(tests, 1 if narrow else 2))
     worse = explained_of(summary["recordings"]["compared"]).sentences
     sentences = worse or ["Every test is nearer to this simulation than to none."]
-    top = Top(
-        summary["case"]["title"], "tests of a specimen", (BLUE, "#ffffff"), sentences, [("tests", f"{len(tests)}")]
-    )
-    _write(path, summary, top, tests=figure)
+    _write(path, summary, "tests of a specimen", (BLUE, "#ffffff"), sentences, tests=figure)
 
 
-def _write(path: Path, summary: Mapping[str, Any], top: Top, **values: Any) -> None:
+def _write(
+    path: Path,
+    summary: Mapping[str, Any],
+    badge: str,
+    colours: tuple[str, str],
+    sentences: Sequence[str],
+    **values: Any,
+) -> None:
     case = summary["case"]
-    nothing = {"tests": "", "pictures": "", "view": "", "displacements": [], "mesh_error": [], "solution": []}
-    sections = sections_of(
-        "run.html", summary=summary, **{**nothing, **values},
-        recorded=[row[:9] for row in recorded_rows(summary["recordings"]["compared"])],
+    sections, facts = sections_of(
+        "run.html", summary=summary, **values,
+        recorded=recorded_rows(summary["recordings"]["compared"]),
         tissues=[
             [label, tissue["name"], f"{tissue['law']} ({tissue['formulation']})", f"{tissue['shear_modulus_Pa']:g}"]
             for label, tissue in case["tissues"].items()
         ],
         seconds=[[name, f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()],
     )  # fmt: skip
+    top = Top(case["title"], badge, colours, sentences, facts)
     write_text(path, document(f"{case['name']}: {case['title']}", top, sections))

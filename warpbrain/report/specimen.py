@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.atomic import write_csv
 from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.report import views
-from warpbrain.report.files import MILLIMETRES, picked, write_csv
+from warpbrain.report.files import MILLIMETRES, picked
 from warpbrain.report.summary import describe_case
 from warpbrain.report.views import BLACK, BLUE, VERMILLION
 from warpbrain.simulation.locking import largest_poisson, locking_sentences
@@ -103,22 +104,6 @@ def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
             }
         )
     return described
-
-
-def test_rows(tests: Sequence[Tested]) -> list[dict[str, Any]]:
-    """Cells of the table of tests: name, mode, rows, role, root mean square before and after with its unit, R2, states,
-    Newton iterations and least volume ratio; and in how many iterations the tangent was indefinite."""
-    rows = []
-    for test in tests:
-        recording, result, compared = test.recording, test.result, test.comparison
-        scale, unit = SHOWN[recording.answer[0]]
-        errors = (scale * error.root_mean_square for error in (compared.before, compared.after))
-        states = (len(result.imposed), int(result.newton.sum()), float(result.min_J.min()))
-        head = (recording.name, recording.mode, compared.count, recording.role)
-        rows.append(
-            {"cells": [*head, *errors, unit, result.r_squared, *states], "unstable": result.unstable_iterations}
-        )
-    return rows
 
 
 def write_tests(path: Path, tests: Sequence[Tested]) -> None:

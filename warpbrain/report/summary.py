@@ -13,7 +13,6 @@ from warpbrain.cases.checking import NOTHING_ACTS, Checked
 from warpbrain.mesh import measure
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import tabled
-from warpbrain.recordings.recording import Recording
 from warpbrain.report.files import MILLIMETRES, fingerprints, picked
 from warpbrain.report.page import lines
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
@@ -157,21 +156,11 @@ def describe_prior(prior: FromPrior) -> dict[str, Any]:
     return {"model": prior.model.name, "variant": prior.model.variant, "draw": draw, "tissues": tissues}
 
 
-def recording_line(recording: Recording) -> str:
-    """One line about a recording."""
-    role = "" if recording.role == "fit" else "; only checked, never fitted"
-    scale, unit = (MILLIMETRES, "mm") if recording.noise_unit == "m" else (1.0, "")
-    noise = f"; noise {scale * recording.sigma:g} {unit}".rstrip() if recording.sigma is not None else ""
-    return f"{recording.name}: {recording.content}{noise}{role}"
-
-
 def show_lines(case: Case) -> list[str]:
     """Everything a case says, as printed."""
-    recorded = list(map(recording_line, case.recordings))
-    return lines("case.txt", "show", case, measure(case.mesh), recorded, SET_TITLES, STAND_IN)
+    return lines("case.txt", "show", case, measure(case.mesh), SET_TITLES, STAND_IN)
 
 
 def check_lines(checked: Checked, cannot: str) -> list[str]:
     """What checking found, as printed: problems first; `cannot` says why a sound case cannot be run yet."""
-    recorded = [] if checked.case is None else list(map(recording_line, checked.case.recordings))
-    return lines("case.txt", "check", checked, cannot, recorded, SET_TITLES)
+    return lines("case.txt", "check", checked, cannot, SET_TITLES)

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.atomic import write_csv
 from warpbrain.errors import InputError
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.sweep import Steps, Sweep, SweepPoint
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
-from warpbrain.report.files import write_csv
 from warpbrain.report.page import lines
 from warpbrain.report.views import BLACK, BLUE, VERMILLION
 

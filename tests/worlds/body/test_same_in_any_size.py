@@ -13,7 +13,7 @@ from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import decide
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import NeoHookean
-from warpbrain.recordings.registration import Registration
+from warpbrain.recordings.base import Registration
 from warpbrain.worlds.body.hypotheses import screened
 from warpbrain.worlds.options import DiagnosisOptions
 

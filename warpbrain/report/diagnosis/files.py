@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.atomic import UNFINISHED, whole_file
+from warpbrain.atomic import UNFINISHED, whole_file, write_csv
 from warpbrain.cases.case import Case
 from warpbrain.cases.writing import write_case
 from warpbrain.diagnosis.locating import ScoreMap
@@ -20,7 +20,7 @@ from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Diagnosis
 from warpbrain.errors import SolveError
 from warpbrain.mesh import TetMesh
 from warpbrain.report.diagnosis.description import STATES
-from warpbrain.report.files import MILLIMETRES, body_file, write_body, write_csv
+from warpbrain.report.files import MILLIMETRES, body_file, write_body
 from warpbrain.worlds.body.uncertainty import displacement_deviation
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 

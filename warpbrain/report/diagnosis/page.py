@@ -8,7 +8,6 @@ from typing import Any
 
 from warpbrain.atomic import write_text
 from warpbrain.diagnosis.result import Diagnosis
-from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.report.body_sections import known_displacement
 from warpbrain.report.diagnosis import pictures, text
@@ -30,12 +29,6 @@ _BADGES = {
     CANNOT_SAY: (QUIET, "#ffffff"),
 }
 
-#: What the standard deviation of the displacement is of.
-_KNOWN = (
-    "It is what is not known of tissue, of the case's loads and of what is named, to first order about the state with "
-    "all that is named: what is left without a name is not in it, nor the error of the mesh."
-)
-
 
 def write_page(
     path: Path, diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None
@@ -48,17 +41,16 @@ def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], s
     """The page; `summary` is its `diagnosis.json`, `state` its `state.vtu`: how well the displacement is known."""
     recorded = Recorded.of(diagnosis) if isinstance(diagnosis, Diagnosis) else None
     shown = text.shown_of(summary)
-    sections = sections_of(
+    sections, facts = sections_of(
         "diagnosis.html",
         summary=summary,
         pictures=defaultdict(str, _pictures(diagnosis, summary, recorded, state)),
         shown=shown,
-        candidates=[row[:7] for row in shown["candidates"]],
         aside=[] if recorded is None else recorded.aside,
         chances={candidate["mechanism"]: candidate["probability"] for candidate in summary["ranking"]},
     )
     title, verdict = summary["case"]["title"], summary["verdict"]
-    top = Top(title, verdict, _BADGES[verdict], [summary["sentence"]], _facts(summary))
+    top = Top(title, verdict, _BADGES[verdict], [summary["sentence"]], facts)
     return document(f"{verdict}: {title}", top, sections)
 
 
@@ -67,37 +59,22 @@ def _pictures(
     summary: dict[str, Any],
     recorded: Recorded | None,
     state: SavedState | None,
-) -> dict[str, str]:
+) -> dict[str, Any]:
     """Figures and the 3-D view by name; of what was not recorded there are none."""
     if recorded is None or not isinstance(diagnosis, Diagnosis):
         return {"curves": pictures.curves_figure(diagnosis)} if isinstance(diagnosis, SpecimenDiagnosis) else {}
     anatomy = pictures.Anatomy(diagnosis, summary)
-    drawn, points = {"map": pictures.map_figure(anatomy)}, recorded.lengths.any() and not recorded.vectors.aside.all()
+    drawn: dict[str, Any] = {"map": pictures.map_figure(anatomy)}
+    points = recorded.lengths.any() and not recorded.vectors.aside.all()
     if points:
         drawn["residuals"] = pictures.residuals_figure(anatomy, recorded)
     if recorded.counted.any():
         drawn["agreement"] = pictures.agreement_figure(summary, recorded)
     if state is not None:
         places = [float(anatomy.centre[view.axis]) for view in VIEWS]
-        drawn["known"] = known_displacement(state, anatomy.mesh, places, _KNOWN)
+        drawn["known"] = known_displacement(state, anatomy.mesh, places)
     view = pictures.view_of(anatomy, recorded if points else None)
     drawn["view"] = viewer(view, "what is left", "Arrows go from the computed to the observed place.")
     if summary["confusion"]["rows"]:
         drawn["confusion"] = pictures.confusion_figure(summary["confusion"]["rows"])
     return drawn
-
-
-def _facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
-    facts = [("p-value if nothing were missing", f"{summary['p_value']:.2g}")]
-    if named := summary["mechanisms"]:
-        facts.insert(0, ("mechanism", " and ".join(mechanism["mechanism"] for mechanism in named)))
-        facts.append(("probability", " and ".join(percent(mechanism["probability"]) for mechanism in named)))
-    suffix, factor, unit = text.unit_of(summary)
-    held = summary["fit"][f"heldout_rmse_{suffix}"]
-    errors = [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None]
-    if errors:
-        facts.append(("held-out error", f"{' → '.join(errors)} {unit}"))
-    if improvement := summary["fit"]["improvement"]:
-        low, high = (100.0 * value for value in improvement["interval_95"])
-        facts.append(("of it gone (95 %)", f"{100.0 * improvement['part']:.0f} % ({low:.0f} to {high:.0f})"))
-    return facts

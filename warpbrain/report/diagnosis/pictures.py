@@ -82,11 +82,11 @@ class Anatomy:
         return section
 
 
-def map_figure(anatomy: Anatomy) -> str:
+def map_figure(anatomy: Anatomy) -> dict[str, Any]:
     """Scores as colours, with the threshold of significance as a line and the located ball as a dashed circle."""
     from matplotlib.patches import Circle
 
-    threshold, where = anatomy.threshold, anatomy.summary["map"]
+    threshold = anatomy.threshold
     extent = np.ptp(anatomy.mesh.points, axis=0)
     tallest = max(float(extent[view.plane[1]] / extent[view.plane[0]]) for view in VIEWS)
 
@@ -108,16 +108,10 @@ def map_figure(anatomy: Anatomy) -> str:
         bar.ax.axvline(threshold, color=BLACK, linewidth=1.6)
         return figure
 
-    caption = (
-        f"How strongly a force at each place would explain the mismatch. The largest score, {where['largest']:.1f}, "
-        f"{'is' if where['significant'] else 'is not'} above the threshold of {threshold:.1f} that pays for looking at "
-        f"{where['places']} places (bar; green line). Dashed: the ball that was located. Hatched: a force of "
-        f"{where['blind_above_n']:.2g} N would not be found. With --image both are trust.nii.gz."
-    )
-    return inlined(draw, "Three cuts with the score of a force at every place.", caption)
+    return inlined(draw)
 
 
-def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
+def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> dict[str, Any]:
     """What is left at every recorded point, one panel a state, on a common scale, over a cut of the anatomy."""
     vectors = recorded.vectors
     counted, shown, points = ~vectors.aside, list(vectors.left), anatomy.mesh.points
@@ -149,15 +143,10 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> str:
         return figure
 
     times = np.unique(recorded["time_s"][recorded.lengths])
-    when = f", at the last of {len(times)} times, {seconds(times[-1])} s" if len(times) > 1 else ""
-    hidden = f" {int(vectors.aside.sum())} set aside: cross." if vectors.aside.any() else ""
-    caption = (
-        f"What is left at each of {len(vectors.where)} recorded points: arrows from the computed to the observed "
-        f"place, {number(enlarged, 2)} times as long as they are, on a common scale, all points seen in the plane of a "
-        f"cut ({anatomy.plane(view)}){when}.{hidden} Green: where a force is significant. Hatched: the data cannot see "
-        "a force there."
-    )
-    return inlined(draw, f"Arrows of what is left at recorded points; RMSE {_listed(errors)}.", caption)
+    last = seconds(times[-1]) if len(times) > 1 else ""
+    arrows = {"points": len(vectors.where), "enlarged": number(enlarged, 2), "plane": anatomy.plane(view)}
+    aside = int(vectors.aside.sum())
+    return inlined(draw, **arrows, times=len(times), last=last, aside=aside, errors=_listed(errors))
 
 
 def _errors(summary: dict[str, Any], states: list[str]) -> dict[str, str]:
@@ -197,7 +186,7 @@ def view_of(anatomy: Anatomy, recorded: Recorded | None) -> View:
     return View(anatomy.mesh, fields, points, arrows, anatomy.ball)
 
 
-def agreement_figure(summary: dict[str, Any], recorded: Recorded) -> str:
+def agreement_figure(summary: dict[str, Any], recorded: Recorded) -> dict[str, Any]:
     """Observed beside computed, one panel a state, on common scales: every component of a displacement."""
     from matplotlib.ticker import MaxNLocator
 
@@ -225,14 +214,10 @@ def agreement_figure(summary: dict[str, Any], recorded: Recorded) -> str:
             panel.set_ylabel("observed [mm]", fontsize=TEXT)
         return figure
 
-    caption = (
-        "Every component of displacement that was recorded, beside what was computed of it; on the line they agree. "
-        "The refitted ones have registration and the error of the mesh taken off."
-    )
-    return inlined(draw, f"Observed beside computed displacements; RMSE {_listed(errors)}.", caption)
+    return inlined(draw, errors=_listed(errors))
 
 
-def confusion_figure(rows: dict[str, dict[str, float]]) -> str:
+def confusion_figure(rows: dict[str, dict[str, float]]) -> dict[str, Any]:
     """Rows: what acts; columns: what imitates it; in the cells percent of what is visible."""
     columns = list(dict.fromkeys(name for row in rows.values() for name in row))
     shares = np.array([[row.get(name, np.nan) for name in columns] for row in rows.values()], dtype=float)
@@ -253,18 +238,12 @@ def confusion_figure(rows: dict[str, dict[str, float]]) -> str:
         axes.set_ylabel("what acts", fontsize=TEXT)
         return figure
 
-    caption = (
-        "Percent of the visible effect of each mechanism, at its middling place, that the best place of another cause "
-        "imitates: near 100 these data cannot tell the two apart, however large the effect is."
-    )
     pairs = [(part, kind, imitator) for kind, row in rows.items() for imitator, part in row.items()]
-    most = ", ".join(
-        f"{kind} by {imitator} {percent(part)}" for part, kind, imitator in sorted(pairs, reverse=True)[:4]
-    )
-    return inlined(draw, f"How much of each mechanism others imitate; most: {most}.", caption)
+    most = sorted(pairs, reverse=True)[:4]
+    return inlined(draw, most=", ".join(f"{kind} by {imitator} {percent(part)}" for part, kind, imitator in most))
 
 
-def curves_figure(diagnosis: SpecimenDiagnosis) -> str:
+def curves_figure(diagnosis: SpecimenDiagnosis) -> dict[str, Any]:
     """Stress of tests, recorded and computed: one panel a test, over strain, or over time where the strain is held."""
     tests = diagnosis.protocol.tests
 
@@ -280,10 +259,7 @@ def curves_figure(diagnosis: SpecimenDiagnosis) -> str:
         grid[0].legend(fontsize=TEXT - 2, frameon=False)
         return figure
 
-    caption = (
-        "Nominal stress of each test: dots were recorded, lines were computed. Tests marked check were not fitted."
-    )
-    return inlined(draw, f"Recorded and computed stress of {len(tests)} tests.", caption)
+    return inlined(draw, tests=len(tests))
 
 
 def _curve(panel: Any, test: Test, computed: dict[str, Any]) -> None:

@@ -25,13 +25,15 @@ def diagnosis_lines(summary: Summary) -> list[str]:
 
 def shown_of(summary: Summary) -> dict[str, Any]:
     """What templates of printed lines and of the page show: rows of tables, sentences, and the unit of errors."""
+    suffix, factor, unit = unit_of(summary)
+    held = summary["fit"][f"heldout_rmse_{suffix}"]
     return {
-        "unit": unit_of(summary)[2],
+        "unit": unit,
         "sets": _set_rows(summary),
         "candidates": _candidate_rows(summary),
         "rejected": [[c["mechanism"], c["rejected_because"]] for c in summary["ranking"] if c["log_evidence"] is None],
         "fit": _fit_rows(summary),
-        "placebos": _placebo_sentences(summary),
+        "held_out": [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None],
         "smallest": _smallest_rows(summary),
         "measurements": [[m["what"], f"{m['expected_nats']:.1f}"] for m in summary["next_measurement"]],
         "where": summary["where"] and _where_in_words(summary["where"]),
@@ -112,16 +114,6 @@ def _smallest_rows(summary: Summary) -> list[list[str]]:
         of_size = named is not None and effect["unit"] != "of being there"
         rows.append([kind, effect["says"], f"{named:.2g} {effect['unit']}" if of_size else ""])
     return rows
-
-
-def _placebo_sentences(summary: Summary) -> list[str]:
-    """How often patterns that mean nothing do as well as what was added."""
-    fit, words = summary["fit"], "pattern that means nothing does as well with p ="
-    together = [] if fit.get("placebo_p") is None else [f"A {words} {fit['placebo_p']:.2g}."]
-    return together or [
-        f"{confirmation['mechanism']}: a {words} {confirmation['placebo_p']:.2g}."
-        for confirmation in fit["confirmations"]
-    ]
 
 
 def _where_in_words(where: Summary) -> str:

@@ -1,9 +1,10 @@
 """How a result becomes printed lines and one page that needs no network: templates of the same dictionary, its JSON.
 
 The macros of a text template (`run.txt`, `estimate.txt`, ...) make what is printed. A template of a page (`run.html` of
-runs and tests of specimens, `estimate.html`, `diagnosis.html`) makes sections of a result; `document` puts them below a
-verdict and a table of contents into the frame, with `page.css`. Macros of `parts.html`
-make what pages share; `figures` makes still figures, `scene` with `scene.js` the view in three dimensions.
+runs and tests of specimens, `estimate.html`, `diagnosis.html`) makes sections of a result, with what is said of their
+figures, and the facts on top; `document` puts them below a verdict and a table of contents into the frame, with
+`page.css`. Macros of `parts.html` make what pages share, those of `notebook.html` what a notebook shows; `figures`
+makes still figures, `scene` with `scene.js` the view in three dimensions.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def _environment() -> Environment:
         undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     environment.filters |= {"percent": percent, "tabled": tabled, "wrapped": _wrapped}
-    environment.globals |= {"table": table, "asset": asset}
+    environment.globals |= {"table": table, "asset": asset, "lines": lines}
     return environment
 
 
@@ -79,21 +80,26 @@ def _wrapped(sentence: str, following: str) -> str:
     return textwrap.fill(sentence, _WIDTH, initial_indent="  ", subsequent_indent=following)
 
 
-def part(name: str, *values: Any) -> Markup:
-    """A macro of `parts.html` with its values."""
-    return Markup(getattr(_environment().get_template("parts.html").module, name)(*values))
+def part(name: str, *values: Any, template: str = "parts.html") -> Markup:
+    """A macro of a template of HTML with its values."""
+    return Markup(getattr(_environment().get_template(template).module, name)(*values))
 
 
-def sections_of(template: str, **values: Any) -> list[Section]:
-    """The sections that a template makes of values: words of these are no markup."""
+def sections_of(template: str, **values: Any) -> tuple[list[Section], list[tuple[str, str]]]:
+    """The sections that a template makes of values, and the facts that it puts on top: words of these are no markup."""
     sections: list[Section] = []
+    facts: list[tuple[str, str]] = []
 
     def section(title: str, caller: Callable[[], str]) -> str:
         sections.append(Section(title, str(caller()).strip()))
         return ""
 
-    _environment().get_template(template).render(section=section, **values)
-    return sections
+    def fact(name: str, value: str) -> str:
+        facts.append((name, value))
+        return ""
+
+    _environment().get_template(template).render(section=section, fact=fact, **values)
+    return sections, facts
 
 
 def document(title: str, top: Top, sections: Sequence[Section]) -> str:

@@ -7,10 +7,7 @@ import io
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from markupsafe import Markup
-
 from warpbrain.report import views
-from warpbrain.report.page import part
 
 #: Of a page for one inch of a figure, so that texts of all are alike.
 _PIXELS = 112
@@ -41,14 +38,15 @@ def colour_bar(figure: Any, drawn: Any, axes: Sequence[Any], narrow: bool, label
     return bar
 
 
-def inlined(draw: Callable[[bool], Any], alternative: str, caption: str) -> Markup:
-    """A figure as HTML that needs no other file; pixels, since a drawing may have thousands of pieces.
+def inlined(draw: Callable[[bool], Any], **told: Any) -> dict[str, Any]:
+    """What the macro `figure` of a page takes: a figure that needs no other file, in pixels, since a drawing may have
+    thousands of pieces; and what else is `told` of it.
 
-    `draw` draws it, on a narrow window if it is told so; `alternative` is for those who do not see it.
+    `draw` draws it, on a narrow window if it is told so.
     """
     wide = draw(False)
-    width = f"{_PIXELS * wide.get_figwidth():.0f}"
-    return part("figure", _png(wide), _png(draw(True)), _NARROW_WINDOW, width, alternative, caption)
+    layouts = {"wide": _png(wide), "narrow": _png(draw(True)), "window": _NARROW_WINDOW}
+    return {**layouts, "width": f"{_PIXELS * wide.get_figwidth():.0f}", **told}
 
 
 def _png(figure: Any) -> str:

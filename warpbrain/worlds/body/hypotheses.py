@@ -17,7 +17,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
-from warpbrain.cases.enough import too_few_to_diagnose
+from warpbrain.cases.checking import too_few_to_diagnose
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import Listener

@@ -13,7 +13,7 @@ from warpbrain.estimation.likelihood import Likelihood, typical_size
 from warpbrain.estimation.observations import Sensors as Sensors
 from warpbrain.estimation.registration import rigid_columns
 from warpbrain.mesh import TetMesh
-from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.recordings.location import locate
 
 

@@ -18,7 +18,7 @@ from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.predict import Prediction, p_value, predict, predictive_p
 from warpbrain.inference.subsets import Blocks
 from warpbrain.physics.words import pascals
-from warpbrain.recordings.agreement import root_mean_square
+from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.worlds.specimen.fit import Fit
 from warpbrain.worlds.specimen.protocol import Protocol
 from warpbrain.worlds.specimen.result import Score
