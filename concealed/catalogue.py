@@ -9,12 +9,12 @@ import json
 from dataclasses import asdict
 
 from warpbrain.atomic import whole_file
+from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import CATALOGUE, SHIPPED, Entry, find_case
 
 
-def read_entry(name: str, tissue: str) -> Entry:
-    """An entry from the case itself."""
-    case = find_case(name, tissue)
+def entry_of(case: Case, name: str, tissue: str) -> Entry:
+    """What a case is that is found by a name."""
     return Entry(
         name,
         tissue,
@@ -28,7 +28,11 @@ def read_entry(name: str, tissue: str) -> Entry:
 
 
 if __name__ == "__main__":
-    entries = [asdict(read_entry(name, tissue)) for name, variants in SHIPPED.items() for tissue in variants]
+    entries = [
+        asdict(entry_of(find_case(name, tissue), name, tissue))
+        for name, variants in SHIPPED.items()
+        for tissue in variants
+    ]
     lines = ",\n".join(json.dumps(entry, ensure_ascii=False) for entry in entries)
     with whole_file(CATALOGUE) as scratch:
         scratch.write_text(f"[\n{lines}\n]\n", encoding="utf-8")

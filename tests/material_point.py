@@ -118,8 +118,9 @@ def _exact_energy(material: Material, row: list[float], logs: tuple[mp.mpf, ...]
 
     law = material.law
     if isinstance(law, NeoHookean):
-        (mu,) = parameters
-        w, rest = mu / 2 * powers(mp.mpf(2)), mu
+        half_mu, none = parameters
+        assert none == 0, "the second coefficient of a Mooney-Rivlin law"
+        w, rest = half_mu * powers(mp.mpf(2)), 2 * half_mu
     elif isinstance(law, MooneyRivlin):
         C1, C2 = parameters
         I2 = mp.fsum(mp.exp(2 * (bar[i] + bar[j])) for i, j in ((0, 1), (0, 2), (1, 2)))
@@ -142,11 +143,14 @@ def exact(material: Material, F: NDArray[np.floating], precision: Precision) -> 
         def at(*moves: tuple[int, int]) -> mp.mpf:
             return _exact_energy(material, row, _log_stretches(F, moves))
 
-        h = _STEP
-        gradient = [float((at((a, 1)) - at((a, -1))) / (2 * h)) for a in range(9)]
-        hessian = np.zeros((9, 9))
+        h, rest = _STEP, at()
+        beside = [(at((a, 1)), at((a, -1))) for a in range(9)]
+        gradient = [float((above - below) / (2 * h)) for above, below in beside]
+        # h^2 times second derivatives along each component, and along the sum of two, which has them twice beside both
+        bend = [above + below - 2 * rest for above, below in beside]
+        hessian = np.diag([float(b / h**2) for b in bend])
         for a in range(9):
-            for b in range(a, 9):
-                corners = at((a, 1), (b, 1)) - at((a, 1), (b, -1)) - at((a, -1), (b, 1)) + at((a, -1), (b, -1))
-                hessian[a, b] = hessian[b, a] = float(corners / (4 * h * h))
-        return float(at()), np.reshape(gradient, (3, 3)), hessian.reshape(3, 3, 3, 3)
+            for b in range(a):
+                together = at((a, 1), (b, 1)) + at((a, -1), (b, -1)) - 2 * rest
+                hessian[a, b] = hessian[b, a] = float((together - bend[a] - bend[b]) / (2 * h**2))
+        return float(rest), np.reshape(gradient, (3, 3)), hessian.reshape(3, 3, 3, 3)

@@ -5,13 +5,26 @@ import sys
 
 import pytest
 
-from concealed.catalogue import read_entry
-from warpbrain.cases.shipped import SHIPPED, catalogue
+from concealed.catalogue import entry_of
+from warpbrain.cases.shipped import BEAM, RESECT, SHIPPED, STAND_INS, catalogue, find_case
 
 
-@pytest.mark.parametrize("entry", catalogue(), ids=lambda entry: f"{entry.name}-{entry.tissue}")
+def same_mesh(entry):
+    """Whether all that it has beside an entry of the same mesh are landmarks, which are those of both tissues."""
+    return entry.name in RESECT[1:] and entry.tissue == "single"
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [pytest.param(entry, marks=[pytest.mark.slow(1)] if same_mesh(entry) else []) for entry in catalogue()],
+    ids=lambda entry: f"{entry.name}-{entry.tissue}",
+)
 def test_an_entry_is_what_the_case_is(entry):
-    assert entry == read_entry(entry.name, entry.tissue), "python -m concealed.catalogue writes it anew"
+    name, case = entry.name, find_case(entry.name, entry.tissue)
+    assert entry == entry_of(case, name, entry.tissue), "python -m concealed.catalogue writes it anew"
+    assert sorted(case.tissues) == ([1] if entry.tissue == "single" or name in BEAM else [1, 2])
+    assert case.origin == ("stand-in" if name in STAND_INS else "measured" if name in (*RESECT, *BEAM) else "synthetic")
+    assert (case.resection is not None) == (name in STAND_INS)
 
 
 def test_it_has_every_case():

@@ -14,7 +14,7 @@ from warpbrain.cases.reading import read_case
 from warpbrain.errors import InputError
 
 FILES = ("case.toml", "mesh.vtu", "recordings/beads.csv", "recordings/lid.csv", "recordings/cell.csv")
-SETTINGS = settings(max_examples=30, suppress_health_check=list(HealthCheck), derandomize=True)
+SETTINGS = settings(max_examples=15, suppress_health_check=list(HealthCheck), derandomize=True)
 
 
 @pytest.fixture(scope="module")

@@ -280,9 +280,18 @@ def test_crumbs_go_to_the_neighbour_they_touch_most():
 # the mesh
 
 
+#: Axes that are tilted and mirrored.
+TILTED = np.array([[0.0, 0.8, -0.6], [1, 0, 0], [0, 0.6, 0.8]])
+
+
+def of_tilted_voxels(path):
+    """Voxels of three lengths, along tilted axes."""
+    return meshed(write_ellipsoids(path, (2, 4, 3), (60, 36, 48), TILTED))
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    return meshed(write_ellipsoids(tmp_path_factory.mktemp("labels") / "a.nii.gz"))
+    return of_tilted_voxels(tmp_path_factory.mktemp("labels") / "a.nii.gz")
 
 
 def test_mesh_conforms_and_is_good(made):
@@ -315,24 +324,18 @@ def test_mesh_has_the_volumes_of_the_labels(made):
 
 @pytest.mark.slow(4)
 def test_mesh_is_the_same_again(made, tmp_path):
-    again = meshed(write_ellipsoids(tmp_path / "a.nii"))
+    again = of_tilted_voxels(tmp_path / "a.nii")
     np.testing.assert_array_equal(again.tetrahedra, made.tetrahedra)
     np.testing.assert_array_equal(again.points, made.points)
     np.testing.assert_array_equal(again.tissue, made.tissue)
 
 
-def test_mesh_lies_where_the_affine_says(tmp_path):
-    """Voxels of three lengths, axes tilted and mirrored."""
-    tilted = np.array([[0.0, 0.8, -0.6], [1, 0, 0], [0, 0.6, 0.8]])
-    assert np.linalg.det(tilted) == pytest.approx(-1.0)
-    made = meshed(write_ellipsoids(tmp_path / "a.nii", (2, 4, 3), (60, 36, 48), tilted))
+def test_mesh_lies_where_the_affine_says(made):
+    assert np.linalg.det(TILTED) == pytest.approx(-1.0)
     lower, upper = made.points.min(axis=0), made.points.max(axis=0)
     # [mm], of voxels of 2 to 4 mm and edges of 14 mm: 0.3 and 0.6 off, and flat faces leave out 2.4 % of the volume
     np.testing.assert_allclose((lower + upper) / 2, CENTRE, atol=0.6)
     np.testing.assert_allclose((upper - lower) / 2, (48, 58, 46), atol=1.0)
-    assert 1e-9 * signed_volumes(made.points, made.tetrahedra).sum() == pytest.approx(
-        volume_of(2) + volume_of(3), rel=0.03
-    )
 
 
 def test_a_cavity_may_open_to_the_outside(tmp_path):

@@ -10,7 +10,7 @@ from wrong_cases import FORCE, GRAVITY, SECOND_LAW, WRONG
 
 from warpbrain.cases.boundary import Fixed, Forced
 from warpbrain.cases.reading import read_case
-from warpbrain.cases.shipped import BEAM, RESECT, SHIPPED, STAND_INS, find_case
+from warpbrain.cases.shipped import find_case
 from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh, write_mesh
@@ -310,15 +310,6 @@ def test_a_file_that_is_no_mesh(tmp_path, capfd, name, content):
     assert refused(tmp_path).startswith(f"{name}: not a mesh that meshio can read")
     # nobody else has anything to say about it
     assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-@pytest.mark.parametrize("tissue", ["single", "multi"])
-def test_shipped_cases(name, tissue):
-    case = find_case(name, tissue)
-    assert sorted(case.tissues) == ([1] if tissue == "single" or name in BEAM else [1, 2])
-    assert case.origin == ("stand-in" if name in STAND_INS else "measured" if name in (*RESECT, *BEAM) else "synthetic")
-    assert (case.resection is not None) == (name in STAND_INS)
 
 
 def test_single_tissue_of_a_folder_is_a_file_of_its_own(tmp_path):

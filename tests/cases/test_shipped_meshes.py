@@ -2,8 +2,10 @@
 
 import csv
 import json
+from collections.abc import Iterable
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,12 +61,19 @@ MESHES = {
 CLINICAL = [name for name in MESHES if name.startswith("0")]
 
 
+def each(names: Iterable[str]) -> list[Any]:
+    """Meshes as parameters. Those of stand-ins change together, when they are built anew: one stands for all but in
+    slow tests."""
+    other = [name for name in CLINICAL if not name.startswith("0529")]
+    return [pytest.param(name, marks=[pytest.mark.slow(1)] if name in other else []) for name in names]
+
+
 @pytest.fixture(scope="module")
 def meshes() -> dict[str, TetMesh]:
     return {name: read_mesh(str(DATA / f"{name}.vtu"), unit="mm") for name in MESHES}
 
 
-@pytest.fixture(scope="module", params=MESHES)
+@pytest.fixture(scope="module", params=each(MESHES))
 def name(request) -> str:
     """All tests of a mesh run before those of the next: what is computed of it, is computed once."""
     return request.param
@@ -201,7 +210,7 @@ def test_skull_base_holds_the_brain(mesh, outer):
         assert (side & (np.abs(relative[:, 1] - 0.6) < 0.15)).sum() >= 3
 
 
-@pytest.mark.parametrize("clinical", CLINICAL)
+@pytest.mark.parametrize("clinical", each(CLINICAL))
 def test_resection(meshes, clinical):
     mesh = meshes[clinical]
     resected, margin = mesh.element_sets["resection"], mesh.node_sets["resection"]
@@ -234,7 +243,7 @@ def test_every_stand_in_is_an_individual(meshes):
     assert min(apart) > 0.01
 
 
-@pytest.mark.parametrize("clinical", CLINICAL)
+@pytest.mark.parametrize("clinical", each(CLINICAL))
 def test_what_a_resection_leaves(meshes, clinical):
     mesh = meshes[clinical]
     left, node_ids, _ = mesh.without(mesh.element_sets["resection"])

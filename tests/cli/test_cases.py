@@ -26,7 +26,7 @@ def test_the_list_names_every_case_and_says_what_a_stand_in_is():
 
 
 @pytest.mark.usefixtures("drawn")
-@pytest.mark.parametrize("name", ["0529", "phantom"])
+@pytest.mark.parametrize("name", ["0529", pytest.param("phantom", marks=pytest.mark.slow(2))])
 def test_show(tmp_path, name):
     done = warpbrain("cases", "show", name, "--tissue", "single", "--out", tmp_path / "a.png")
     assert done.status == 0, done.err

@@ -191,9 +191,9 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-def test_killed_it_goes_on_where_it_was(tmp_path):
+def test_killed_it_goes_on_where_it_was(folder, tmp_path):
     """`kill -9` in the middle: what was computed is there and is not computed again, and the result is the same."""
-    arguments = ["ensemble", "--case", "0529", "--tissue", "single", "--samples", "6", "--steps", "4"]
+    arguments = ["ensemble", "--case", str(folder), "--samples", "6", "--steps", "4"]
     arguments += ["--device", "cpu", "--processes", "1", "--batch", "1", "--out"]
     out = tmp_path / "killed"
     ran = subprocess.run([sys.executable, "-c", KILLED, *arguments, str(out)], stdout=subprocess.DEVNULL, check=False)
@@ -237,7 +237,7 @@ def test_interrupted_it_is_gone_within_two_seconds(tmp_path):
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as ran:
         assert ran.stdout is not None
         assert any("workers" in line for line in ran.stdout)
-        time.sleep(4.0)
+        time.sleep(3.0)
         patience = 2.0 * slowness()
         start = time.monotonic()
         ran.send_signal(signal.SIGINT)

@@ -102,7 +102,7 @@ def test_shipped_models_tell_the_command_that_made_them(kind, variant):
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory):
     out = tmp_path_factory.mktemp("shown")
-    return out, warpbrain("gp", "show", "--group", BRAIN, "--draws", "60", "--out", out)
+    return out, warpbrain("gp", "show", "--group", BRAIN, "--draws", "40", "--out", out)
 
 
 def test_show_prints_moduli_with_intervals(shown):
@@ -118,7 +118,7 @@ def test_show_prints_moduli_with_intervals(shown):
         assert f"{fitted.shear_modulus:.4g}" in done.out
         low, middle, high = (float(row[name]) for name in ("2.5 % [Pa]", "median of draws [Pa]", "97.5 % [Pa]"))
         assert low < middle < high
-    assert "60 draws each: their medians are known to" in done.out
+    assert "40 draws each: their medians are known to" in done.out
 
 
 def test_show_writes_pictures(shown):

@@ -358,7 +358,11 @@ def test_clinical_case(tmp_path):
 
 # of one tissue a stand-in runs in `test_clinical_case`; all of them are read in tests/cases
 @pytest.mark.parametrize("tissue", [pytest.param("single", marks=pytest.mark.slow), "multi"])
-@pytest.mark.parametrize("name", STAND_INS)
+@pytest.mark.parametrize(
+    # that of the README, and one of the other side
+    "name",
+    [pytest.param(name, marks=[] if name in ("0614", "0603") else [pytest.mark.slow(1)]) for name in STAND_INS],
+)
 def test_every_stand_in_runs_and_is_compared(tmp_path, name, tissue):
     ran = run(name, "--tissue", tissue, "--out", tmp_path)
     assert (ran.status, ran.err) == (0, "")

@@ -41,11 +41,19 @@ def moved(model: Model, device: str, precision: str) -> System:
     return system
 
 
-@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
-    ("formulation", "digits"),
+    ("kind", "formulation", "digits"),
     # kernels of each take a second to compile
-    [("coupled", "double"), pytest.param("uncoupled", "double", marks=pytest.mark.slow(2)), ("coupled", "single")],
+    [
+        *((kind, "coupled", "double") for kind in KINDS),
+        ("neo-hookean", "coupled", "single"),
+        *(pytest.param(kind, "uncoupled", "double", marks=pytest.mark.slow(2)) for kind in KINDS),
+        *(
+            pytest.param(kind, "coupled", "single", marks=pytest.mark.slow(2))
+            for kind in KINDS
+            if kind != "neo-hookean"
+        ),
+    ],
 )
 def test_a_motion_is_that_of_the_simulator(kind: str, formulation: str, digits: str, device: str) -> None:
     precision = PRECISIONS[digits]
@@ -86,8 +94,17 @@ def test_rest_is_that_of_the_relaxation(moves: bool, device: str, precision) -> 
 
 
 @pytest.mark.parametrize("course", ["motion", "rest"])
-def test_the_bits_of_a_sample_do_not_depend_on_the_others(course: str, device: str, precision) -> None:
-    model = shaken_block(LAWS["mooney-rivlin"])
+@pytest.mark.parametrize(
+    ("kind", "digits"),
+    [
+        ("mooney-rivlin", "double"),
+        ("neo-hookean", "single"),
+        pytest.param("mooney-rivlin", "single", marks=pytest.mark.slow(2)),
+    ],
+)
+def test_the_bits_of_a_sample_do_not_depend_on_the_others(kind: str, digits: str, course: str, device: str) -> None:
+    precision = PRECISIONS[digits]
+    model = shaken_block(KINDS[kind])
     samples = samples_of(model)
     system = System(model, device, precision.name)
 

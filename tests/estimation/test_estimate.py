@@ -60,7 +60,9 @@ def test_without_noise_tissue_is_found_to_a_thousandth(tissues: int, load: str) 
     assert not posterior.identifiability.nothing and not posterior.identifiability.hidden
 
 
-@pytest.mark.parametrize("law", [MooneyRivlin(400.0, 200.0), Ogden((2000.0 / -6.0,), (-6.0,))])
+@pytest.mark.parametrize(
+    "law", [MooneyRivlin(400.0, 200.0), pytest.param(Ogden((2000.0 / -6.0,), (-6.0,)), marks=pytest.mark.slow(5))]
+)
 def test_shapes_of_laws(law: Law) -> None:
     case = block({"brain": law}, "pushed")
     posterior = found(replace(case, recordings=(beads(truth(case), count=150, noise=2e-5, sigma=2e-5),)))
@@ -211,9 +213,8 @@ def test_a_law_need_not_be_known_and_what_it_is_does_not_matter() -> None:
     case = block({"brain": WHITE}, "pushed")
     seen = replace(case, recordings=(beads(truth(case), noise=1e-4),))
     unknown = replace(seen, tissues={1: replace(seen.tissues[1], law=None)})
-    first, second, third = (found(c, EstimationOptions(samples=25)) for c in (seen, unknown, with_laws(seen, GREY)))
+    first, second = (found(c, EstimationOptions(samples=25)) for c in (unknown, with_laws(seen, GREY)))
     np.testing.assert_array_equal(first.theta, second.theta)
-    np.testing.assert_array_equal(first.theta, third.theta)
 
 
 # -- what cannot be estimated -----------------------------------------------------------------------------------------

@@ -10,6 +10,9 @@ from febio.materials import constitution
 from febio.points import Points
 from febio.problem import read_problems
 
+# what they are for, test_febio.py, is slow, too
+pytestmark = pytest.mark.slow(1)
+
 PROBLEMS = read_problems(Path(__file__).parents[1] / "verification" / "data" / "febio")
 LAWS = {material["type"]: (problem, name) for problem in PROBLEMS for name, material in problem.materials.items()}
 

@@ -1,5 +1,7 @@
 """Batched kernels beside SciPy: products, sums and solves of each sample, and nothing that leaks between samples."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import scipy.sparse as sparse
@@ -12,7 +14,11 @@ from warpbrain.ensemble.batch import parts_of_clusters, pattern_of
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
 from warpbrain.kernels.batched.motion import batched_motion_kernels
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
+<<<<<<< HEAD
 from warpbrain.kernels.module import DOUBLE
+=======
+from warpbrain.kernels.precision import DOUBLE, Precision
+>>>>>>> tests23
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
@@ -77,6 +83,14 @@ class Systems:
         return float(np.linalg.norm(b - self.matrices[slot] @ x) / np.linalg.norm(b))
 
 
+@cache
+def solved(device: str, precision: Precision) -> Systems:
+    """All systems solved together, for all tests that compare with them."""
+    systems = Systems(device, precision)
+    systems.solve(*range(SLOTS))
+    return systems
+
+
 def test_every_system_is_solved(device: str, precision) -> None:
     systems = Systems(device, precision)
     systems.solve(*range(SLOTS))
@@ -94,8 +108,7 @@ def test_every_system_is_solved(device: str, precision) -> None:
 
 
 def test_a_system_has_the_same_bits_alone(device: str, precision) -> None:
-    together = Systems(device, precision)
-    together.solve(*range(SLOTS))
+    together = solved(device, precision)
     for slot in range(SLOTS):
         alone = Systems(device, precision)
         alone.solve(slot)
@@ -108,8 +121,7 @@ def test_a_system_has_the_same_bits_alone(device: str, precision) -> None:
 def test_a_system_that_is_not_a_number_ends_and_harms_no_other(
     diagonal: bool, entry: int, device: str, precision
 ) -> None:
-    clean, broken = Systems(device, precision), Systems(device, precision)
-    clean.solve(*range(SLOTS))
+    clean, broken = solved(device, precision), Systems(device, precision)
     values = broken.cg.values.numpy()
     # rows of nodes that are held in all directions are those of the identity, which a solver may leave out
     pairs = broken.system.pairs.numpy()

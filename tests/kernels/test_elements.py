@@ -6,12 +6,38 @@ from bodies import energy_at, forces_at, model_of, stiffness_at
 from material_point import LAWS, MATERIALS, random_rotations
 from shapes import box, distorted, tetrahedron
 
+<<<<<<< HEAD
 from warpbrain.kernels.module import DOUBLE, SINGLE, Precision
+=======
+from warpbrain.kernels.precision import DOUBLE, PRECISIONS, SINGLE, Precision
+>>>>>>> tests23
 from warpbrain.mesh import TetMesh
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
 
 every_material = pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS.keys())
+#: What tells most of what single precision does to an element; kernels of each of the others take a second to compile.
+TWO = (("neo-hookean", "coupled"), ("ogden", "uncoupled"))
+
+
+def marks_of(material: Material, precision: Precision) -> list[pytest.MarkDecorator]:
+    """Slow, where kernels are compiled for it alone."""
+    return [] if precision is DOUBLE or (material.law.name, material.formulation) in TWO else [pytest.mark.slow(1)]
+
+
+in_every_precision = pytest.mark.parametrize(
+    ("material", "precision"),
+    [
+        pytest.param(
+            material,
+            precision,
+            id=f"{name}, {precision.name}",
+            marks=marks_of(material, precision),
+        )
+        for precision in PRECISIONS.values()
+        for name, material in MATERIALS.items()
+    ],
+)
 
 
 def body(material: Material, precision: Precision, device: str) -> System:
@@ -55,7 +81,7 @@ def test_tangent_is_the_derivative_of_forces(material: Material, device: str) ->
     assert np.linalg.norm(slope - product) < 1e-8 * np.linalg.norm(product)
 
 
-@every_material
+@in_every_precision
 def test_tangent_is_symmetric_and_blind_to_translations(material: Material, precision: Precision, device: str) -> None:
     system = body(material, precision, device)
     K = stiffness_at(system, state(system))
@@ -66,7 +92,7 @@ def test_tangent_is_symmetric_and_blind_to_translations(material: Material, prec
     assert np.abs(K @ translations).max() <= rounding
 
 
-@every_material
+@in_every_precision
 def test_both_kernels_give_the_same_forces(material: Material, precision: Precision, device: str) -> None:
     """The kernel with tangents and the one without."""
     system = body(material, precision, device)
@@ -77,7 +103,7 @@ def test_both_kernels_give_the_same_forces(material: Material, precision: Precis
     assert np.abs(difference).max() <= 50.0 * precision.epsilon * np.abs(forces).max()
 
 
-@every_material
+@in_every_precision
 def test_forces_balance(material: Material, precision: Precision, device: str) -> None:
     """No force and no moment comes from inside a body."""
     system = body(material, precision, device)
@@ -88,7 +114,7 @@ def test_forces_balance(material: Material, precision: Precision, device: str) -
     assert np.abs(np.cross(system.model.mesh.points + u, forces).sum(axis=0)).max() <= 4.0 * rounding
 
 
-@every_material
+@in_every_precision
 def test_rigid_motion_costs_nothing(material: Material, precision: Precision, device: str) -> None:
     system = body(material, precision, device)
     R = random_rotations(1, seed=8)[0]
@@ -107,7 +133,11 @@ def test_rigid_motion_costs_nothing(material: Material, precision: Precision, de
     )
 
 
-@every_material
+@pytest.mark.parametrize(
+    "material",
+    [pytest.param(material, marks=marks_of(material, SINGLE)) for material in MATERIALS.values()],
+    ids=MATERIALS.keys(),
+)
 def test_single_agrees_with_double(material: Material, device: str) -> None:
     double, single = (body(material, p, device) for p in (DOUBLE, SINGLE))
     u = state(double)

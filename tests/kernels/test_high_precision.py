@@ -40,7 +40,9 @@ def test_against_60_digits(material, precision: Precision, device: str, verify: 
     # cost as many roundings again.
     tolerance = 60.0 * precision.epsilon
     errors = []
-    for i, name in enumerate(STATES):
+    # in single precision stretches that are almost the same are
+    different = {gradient.tobytes(): (i, name) for i, (gradient, name) in enumerate(zip(F, STATES, strict=True))}
+    for i, name in different.values():
         psi_exact, P_exact, A_exact = exact(material, F[i], precision)
         stiffness = np.abs(A_exact).max()
         errors.append(np.abs(A[i] - A_exact).max() / stiffness)

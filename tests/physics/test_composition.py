@@ -18,7 +18,7 @@ from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanism import Facts, Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.regions import elements_with
-from warpbrain.simulation.model import ELEMENTS, Material, Model, with_mechanisms
+from warpbrain.simulation.model import ELEMENTS, QUADRATIC, Material, Model, with_mechanisms
 from warpbrain.simulation.system import System
 
 Floats = NDArray[np.float64]
@@ -191,7 +191,8 @@ def test_energy_of_a_uniform_strain(kind: str, elements: str, device: str) -> No
 @pytest.mark.parametrize("elements", ELEMENTS)
 def test_what_swells_freely_is_without_stress(elements: str, device: str, verify: Row) -> None:
     """Whatever the tissue is made of: no tension, which is a stress by itself."""
-    kinds = ("asymmetry", "fibres", "inclusion", "swelling", *(("viscoelasticity",) if elements in LINEAR else ()))
+    # another law on quadratic elements: test_mechanisms.py
+    kinds = ("fibres", "inclusion", "swelling", *(("asymmetry", "viscoelasticity") if elements in LINEAR else ()))
     acting = [mechanisms()[kind](**EXAMPLES[kind][0]) for kind in kinds if kind != "swelling"]
     model = model_of([*acting, mechanisms()["swelling"](amount=0.3)], elements)
     system = System(model, device)
@@ -225,12 +226,18 @@ def test_what_says_a_law_does_so_in_any_order() -> None:
     assert model_of(both).materials == model_of(both[::-1]).materials
 
 
-@pytest.mark.parametrize("elements", ELEMENTS)
-@pytest.mark.parametrize("kind", ["asymmetry", "compressibility", "fibres", "swelling", "viscoelasticity"])
+@pytest.mark.parametrize(
+    ("kind", "elements"),
+    [
+        # kernels of another law on quadratic elements take as long to compile as all else here
+        pytest.param(kind, elements, marks=pytest.mark.slow(2) if kind == "asymmetry" and elements in QUADRATIC else [])
+        for kind in ("asymmetry", "compressibility", "fibres", "swelling", "viscoelasticity")
+        for elements in ELEMENTS
+        if elements in LINEAR or kind != "viscoelasticity"  # does not act on midside nodes
+    ],
+)
 def test_an_inclusion_multiplies_all_moduli(kind: str, elements: str, device: str, verify: Row) -> None:
     """Everywhere: all forces of the tissue are as many times as large."""
-    if elements not in LINEAR and kind == "viscoelasticity":
-        pytest.skip("does not act on midside nodes")
     other = mechanisms()[kind](**EXAMPLES[kind][0])
     forces, stresses = [], []
     for acting in ([other], [other, mechanisms()["inclusion"](ratio=10.0)]):

@@ -125,19 +125,19 @@ def test_a_published_set_that_is_unstable() -> None:
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("poisson", [0.3, 0.4, 0.45, 0.49, 0.4999])
 @pytest.mark.parametrize(
     "law",
     [*LAWS.values(), MooneyRivlin(500.0, 0.1), *(ogden(a) for a in (1.1, 2.0, 8.0, 50.0, -2.1, -3.0, -10.0, -50.0))],
     ids=str,
 )
-def test_usual_laws_are_stable_in_space(law: Law, poisson: float, formulation: str) -> None:
-    require_stable(law, poisson, formulation)
-    material = Material(law, poisson, formulation)
+def test_usual_laws_are_stable_in_space(law: Law, formulation: str) -> None:
     confined = np.stack([NEAR, np.ones_like(NEAR), np.ones_like(NEAR)], axis=1)
-    assert np.all(moduli_at(material, confined[:, :, None] * np.eye(3))[:, 0, 0, 0, 0] > 0.0)
     dilated = np.cbrt(NEAR)[:, None, None] * np.eye(3)
-    assert np.all(np.einsum("kiijj->k", moduli_at(material, dilated)) > 0.0)
+    for poisson in (0.3, 0.4, 0.45, 0.49, 0.4999):
+        require_stable(law, poisson, formulation)
+        material = Material(law, poisson, formulation)
+        assert np.all(moduli_at(material, confined[:, :, None] * np.eye(3))[:, 0, 0, 0, 0] > 0.0), poisson
+        assert np.all(np.einsum("kiijj->k", moduli_at(material, dilated)) > 0.0), poisson
 
 
 @pytest.mark.parametrize("alpha", [-2.1, -4.7, -8.0])

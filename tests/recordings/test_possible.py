@@ -22,6 +22,7 @@ def test_a_point_that_moves_farther_than_the_body_is_long(tmp_path, move, said, 
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_as_far_as_the_body_is_long_is_remarked_on_only(tmp_path):
     far = 1000.0 * SIDE * np.sqrt(3.0) - 1.0
     folder = write_recorded(tmp_path / "case", files={"recordings/beads.csv": BEADS.format(far)})

@@ -25,10 +25,17 @@ CLASSES = [
 ]
 
 
+#: What differs most: nothing, something that is a load, that remembers, two, what has no name, and a trap.
+MOST = ((), ("gravity",), ("viscoelasticity",), ("pressure", "inclusion"), ("uniform-force",), ("segmentation",))
+
+
 @pytest.mark.parametrize(
     "plan",
     # most draws with contact have no truth
-    [pytest.param(plan, marks=[pytest.mark.slow(6)] if plan.names == ("contact",) else []) for plan in CLASSES],
+    [
+        pytest.param(plan, marks=[] if plan.names in MOST else [pytest.mark.slow(6 if "contact" in plan.names else 1)])
+        for plan in CLASSES
+    ],
     ids=["-".join((plan.kind, *plan.names)) for plan in CLASSES],
 )
 def test_a_case_of_every_class(plan, small, tmp_path):

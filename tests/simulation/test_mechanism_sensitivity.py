@@ -184,7 +184,8 @@ MADE_OF = ("inclusion", "fibres", "residual-stress", "swelling")
     ("names", "elements"),
     [
         (HELD, "tet4"),
-        (HELD, "tet4-averaged"),
+        # each of them alone: test_alone_on_elements_that_do_not_lock
+        pytest.param(HELD, "tet4-averaged", marks=pytest.mark.slow(2)),
         (ON_A_TABLE, "tet4"),
         *((MADE_OF, elements) for elements in ("tet4", "tet4-averaged", "tet10")),
     ],

@@ -34,6 +34,7 @@ def test_it_is_the_equilibrium_of_the_model(case):
     assert after == done.observed.comparisons[0].after.root_mean_square
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_command_writes_the_same(case, tmp_path):
     done = run(str(case.folder), device="cpu")
     assert run_command(case.folder, "--out", tmp_path / "out").status == 0

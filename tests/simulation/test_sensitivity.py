@@ -93,10 +93,17 @@ CLAIM = "by parameters of every law, formulation and kind of load"
 BESIDE = "differences of equilibria"
 
 
-@pytest.mark.parametrize("load", ["gravity", "displaced", "pushed"])
+@pytest.mark.parametrize(
+    ("tissues", "load"),
+    [
+        *((2, load) for load in ("gravity", "displaced", "pushed")),
+        # of one tissue is apart what needs no force
+        (1, "displaced"),
+        *(pytest.param(1, load, marks=pytest.mark.slow(1)) for load in ("gravity", "pushed")),
+    ],
+)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("tissues", [1, 2])
 def test_against_equilibria_beside(
     tissues: int, law: str, formulation: str, load: str, device: str, verify: Row
 ) -> None:

@@ -8,6 +8,7 @@ from command import warpbrain
 from reliability.kinds import KINDS
 
 from subsets.tries import case_of, drawn_for_this_commit, every_subset, one_try, subsets
+from warpbrain.cases.shipped import RESECT
 from warpbrain.cases.writing import write_case
 
 
@@ -35,14 +36,17 @@ def test_where_nothing_can_be_rendered_it_is_a_verdict_too(tmp_path, monkeypatch
     assert ended.verdict and not ended.defect
 
 
-@pytest.mark.slow(30)
+@pytest.mark.slow(15)
 def test_every_case_without_recordings_is_a_sentence(tmp_path):
     every = every_subset()
     assert len(every) == KINDS["subsets"].promised
     bare = [(name, tissue) for name, tissue, recordings in every if not recordings]
     assert len(bare) == 56 == len(every) - _WITH_RECORDINGS
     assert all(recordings for *_, recordings in every[:_WITH_RECORDINGS])
+    # without their landmarks the patients of RESECT are one case
     for name, tissue in bare:
+        if name in RESECT[1:]:
+            continue
         case = write_case(tmp_path / f"{name}-{tissue}", replace(case_of(name, tissue), recordings=()))
         ran = warpbrain("diagnose", "--case", case, "--out", tmp_path / "out", "--quiet")
         assert ran.status == 2 and "recording" in ran.err and ran.err.count("\n") == 1
@@ -50,7 +54,7 @@ def test_every_case_without_recordings_is_a_sentence(tmp_path):
 
 
 #: Subsets that are not empty, and how many of them are diagnosed with each commit: a try takes up to two minutes.
-_WITH_RECORDINGS, _WITH_EACH_COMMIT = 86, 3
+_WITH_RECORDINGS, _WITH_EACH_COMMIT = 86, 2
 
 
 @pytest.mark.slow(120)

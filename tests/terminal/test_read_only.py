@@ -49,7 +49,7 @@ def test_a_cache_that_has_all_kernels_is_enough(tmp_path, cache):
     assert (tmp_path / "out" / "result.vtu").exists()
 
 
-@pytest.mark.parametrize("begun", [False, True])
+@pytest.mark.parametrize("begun", [False, pytest.param(True, marks=pytest.mark.slow(2))])
 def test_a_cache_without_kernels(tmp_path, cache, begun):
     empty = tmp_path / "cache"
     (empty / cache.name if begun else empty).mkdir(parents=True)

@@ -8,7 +8,7 @@ from material_point import MATERIALS, random_gradients, random_rotations, stress
 from shapes import cube, distorted
 from verification_rows import Row
 
-from warpbrain.kernels.module import SINGLE, Precision
+from warpbrain.kernels.module import DOUBLE, SINGLE, Precision
 from warpbrain.mesh import surface_forces
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
@@ -19,10 +19,9 @@ REGULAR = cube(2)
 MESH = distorted(REGULAR, 0.08, tissues=2)
 #: What tells most of an element; kernels of each of the others take a second to compile.
 TWO = ("neo-hookean, coupled", "ogden -20, uncoupled")
+SLOW = {name: [] if name in TWO else [pytest.mark.slow(2)] for name in MATERIALS}
 every_material = pytest.mark.parametrize(
-    "material",
-    [pytest.param(law, marks=[] if name in TWO else [pytest.mark.slow(2)]) for name, law in MATERIALS.items()],
-    ids=MATERIALS.keys(),
+    "material", [pytest.param(law, id=name, marks=SLOW[name]) for name, law in MATERIALS.items()]
 )
 
 
@@ -38,11 +37,19 @@ def quadratic(material: Material, elements: str, device: str, precision: str = "
 # -- what is exact ------------------------------------------------------------------------------------------------
 
 
-@every_material
+@pytest.mark.parametrize(
+    ("material", "precision"),
+    [
+        *(pytest.param(law, DOUBLE, id=name, marks=SLOW[name]) for name, law in MATERIALS.items()),
+        # two laws tell what single precision does to the element, and one most of it
+        *(
+            pytest.param(MATERIALS[name], SINGLE, id=f"{name}, single", marks=[pytest.mark.slow(2)] if k else [])
+            for k, name in enumerate(TWO)
+        ),
+    ],
+)
 def test_patch(material: Material, elements: str, precision: Precision, device: str, verify: Row) -> None:
     """A linear displacement: no force inside, and the law's stress everywhere."""
-    if precision is SINGLE and material not in [MATERIALS[name] for name in TWO]:
-        pytest.skip("two laws tell what single precision does to the element")
     system = quadratic(material, elements, device, precision.name)
     nodes = system.quadratic
     F = random_gradients(1, 0.2, seed=11)[0]
