@@ -14,11 +14,7 @@ from warpbrain.ensemble.batch import parts_of_clusters, pattern_of
 from warpbrain.kernels.batched.linear import BatchedConjugateGradient
 from warpbrain.kernels.batched.motion import batched_motion_kernels
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
-<<<<<<< HEAD
-from warpbrain.kernels.module import DOUBLE
-=======
-from warpbrain.kernels.precision import DOUBLE, Precision
->>>>>>> tests23
+from warpbrain.kernels.module import DOUBLE, Precision
 from warpbrain.physics.laws import NeoHookean
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System

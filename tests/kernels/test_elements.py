@@ -6,11 +6,7 @@ from bodies import energy_at, forces_at, model_of, stiffness_at
 from material_point import LAWS, MATERIALS, random_rotations
 from shapes import box, distorted, tetrahedron
 
-<<<<<<< HEAD
-from warpbrain.kernels.module import DOUBLE, SINGLE, Precision
-=======
-from warpbrain.kernels.precision import DOUBLE, PRECISIONS, SINGLE, Precision
->>>>>>> tests23
+from warpbrain.kernels.module import DOUBLE, PRECISIONS, SINGLE, Precision
 from warpbrain.mesh import TetMesh
 from warpbrain.simulation.model import Material
 from warpbrain.simulation.system import System
