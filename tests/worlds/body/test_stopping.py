@@ -64,7 +64,7 @@ def test_a_named_mechanism_is_fitted_then_expanded_then_left():
     assert following(nothing, weighted(30.0, "pressure", fitted=True), expanded=[("pressure",)]) is None
 
 
-def test_before_a_rest_has_no_name_the_likeliest_mechanism_is_fitted_and_expanded():
+def test_before_a_rest_has_no_name_the_likeliest_mechanisms_are_fitted_and_the_first_expanded():
     nothing, rest = weighted(0.0, fitted=True), weighted(60.0, "swelling", "unknown", fitted=True)
     known = {"expanded": [("swelling", "unknown"), ("swelling",)]}
     assert following(nothing, rest, weighted(30.0, "traction"), **known) == ["traction"]
@@ -72,6 +72,10 @@ def test_before_a_rest_has_no_name_the_likeliest_mechanism_is_fitted_and_expande
     assert following(nothing, rest, fitted, **known) == ["traction"]
     known["expanded"].append(("traction",))
     assert following(nothing, rest, fitted, **known) is None
+    # tissue that relaxes under a load is far from linear
+    both = "gravity", "viscoelasticity"
+    assert following(nothing, rest, fitted, weighted(40.0, *both), **known) == sorted(both)
+    assert following(nothing, rest, fitted, weighted(40.0, *both, fitted=True), **known) is None
 
 
 def test_after_many_fits_only_what_the_verdict_rests_on_is_fitted():

@@ -121,19 +121,20 @@ def _unknown_not_fitted(
     """What is to be fitted, or expanded, before something without a name is a part of the verdict; None if all was.
 
     Of a verdict of the unknown alone the likeliest set with that alone, and that without it: in the linear model, what
-    a finite rigid rotation does to second order looks like an unknown force. Of any the likeliest mechanism, with what
-    may act beside it: sets with the unknown are many, and what a mechanism does that is far from linear, with others
-    beside it, looks like one of them.
+    a finite rigid rotation does to second order looks like an unknown force. Of any the likeliest set of mechanisms
+    alone, and the likeliest single one with what may act beside it: sets with the unknown are many, and what a
+    mechanism does that is far from linear, such as tissue that relaxes under another one's load, looks like one.
     """
     if decision.verdict != UNKNOWN and not (decision.verdict == NAMED_AND_REST and UNKNOWN in sets[0].names):
         return None
     without_names = (candidate for candidate in sets if UNKNOWN in candidate.names and not candidate.mechanisms)
     likely = next((candidate.names for candidate in without_names), frozenset())
     alone = (likely, likely - {UNKNOWN}) if decision.verdict == UNKNOWN else ()
-    mechanism = next((s for s in sets if len(s.names) == len(s.mechanisms) == 1 and not s.failure), None)
-    parts = (candidate for candidate in sets if candidate.names in alone or candidate is mechanism)
+    of_mechanisms = [s for s in sets if 0 < len(s.names) == len(s.mechanisms) and not s.failure]
+    single = next((s for s in of_mechanisms if len(s.names) == 1), None)
+    parts = (s for s in sets if s.names in alone or s is single or s in of_mechanisms[:1])
     part = next((part for part in parts if part.refit is None and not part.failure), None)
-    return part or (None if mechanism is None or mechanism.names in expanded else mechanism)
+    return part or (None if single is None or single.names in expanded else single)
 
 
 def _not_fitted(sets: Sequence[WeightedSet], probabilities: Floats) -> Iterator[WeightedSet]:
