@@ -8,7 +8,7 @@ import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import as_case
-from warpbrain.diagnosis.checking import Confirming, check_errors, distance
+from warpbrain.diagnosis.checking import Confirming, HeldOut, check_errors, distance
 from warpbrain.diagnosis.locating import FittedSource, Traits, map_of_search, traits_of
 from warpbrain.diagnosis.measuring import imitations, next_measurements, smallest
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time
@@ -125,9 +125,10 @@ class Diagnosing:
                     break
             best, named = checked.best, checked.named
             weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
-            blocks = confirming.held_out_for(best)
+            source = search.fitted_source if checked.decision.verdict == UNKNOWN else None
+            blocks = confirming.held_out_for(source or best)
             predictions = {name: confirming.predict(candidate, blocks) for name, candidate in weighted_sets.items()}
-            fit = self._fit(confirming, weighted_sets, predictions, checked.confirmations)
+            fit = self._fit(confirming, weighted_sets, blocks, predictions, checked.confirmations)
             ranking = Ranking(search, confirming)
             ranked = ranking.all()
         confusing = beside(lambda: imitations(search.causes, nothing.marginal.model))
@@ -138,10 +139,9 @@ class Diagnosing:
                 resists = search.likely_unknown(best) == RESISTANCE
                 noise, centre = base.typical_noise, where.centre
                 unknown = traits_of(base.at, model, best.residual, noise, search.spacing, centre, resists)
-            if unknown is not None and checked.decision.verdict == UNKNOWN and (fitted := search.fitted_source):
-                apart = confirming.held_out_for(fitted)
-                without, error = (apart.error(confirming.predict(each, apart)) for each in (nothing, fitted))
-                unknown = replace(unknown, source=FittedSource.of(fitted, without, error))
+            if unknown is not None and source is not None:
+                error = blocks.error(confirming.predict(source, blocks))
+                unknown = replace(unknown, source=FittedSource.of(source, fit.refitted[1], error))
         with self.seconds.of("what would be seen"):
             confusion = confusing()
             seen = smallest(search.causes, nothing.marginal.model, confusion)
@@ -213,6 +213,7 @@ class Diagnosing:
         self,
         confirming: Confirming,
         weighted_sets: dict[str, WeightedSet],
+        blocks: HeldOut,
         held_out: dict[str, Prediction],
         confirmations: tuple[Confirmation, ...],
     ) -> Fit:
@@ -233,7 +234,7 @@ class Diagnosing:
             improvement,
             None if best is nothing else max(confirmation.placebo_p for confirmation in confirmations),
             patterns,
-            confirming.ceiling(nothing, confirming.held_out_for(best)),
+            confirming.ceiling(nothing, blocks),
             check_errors(self.case, base, refits),
         )
 
