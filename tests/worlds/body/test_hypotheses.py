@@ -150,3 +150,12 @@ def test_causes_are_checked_beside_those_that_explain_more(pair):
     # beside the weight, which acts, a swelling is worth nothing; the weight beside nothing is
     assert weight.why_not(0.05) == "" and swelling.log_evidence < 0.0
     assert swelling.gain[1] < 0.0 < weight.gain[1]
+
+
+def test_what_acts_linearly_alone_is_not_fitted_again_from_a_set_with_a_mechanism(search):
+    """A fit has no coefficients to begin at without the one mechanism, whichever of the two is fitted first."""
+    other = copy.copy(search)
+    other._sets = dict(search._sets)
+    for names in (("registration",), ("gravity", "registration")):
+        other._fit(frozenset(names))
+        assert other.get(names).refit is not None

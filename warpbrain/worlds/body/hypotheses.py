@@ -232,9 +232,9 @@ class HypothesisSearch:
         """
         superset = self._sets[names]
         assert superset.refit is not None
-        for cause in superset.acting:
+        for cause in superset.acting if len(superset.acting) > 1 else ():
             subset = self._sets.get(names - {cause})
-            if subset is None or not subset.names:
+            if subset is None:
                 continue
             reduced = superset.without(cause, self.base)
             if subset.refit is None and subset.acting == reduced.acting:
