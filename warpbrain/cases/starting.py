@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.atomic import check_new_folder, check_writable, whole_folder, write_text
-from warpbrain.cases.building.errors import BuildError, check_volume_in, cm3, require_extra
+from warpbrain.cases.building.errors import BuildError, require_extra
 from warpbrain.cases.building.label_fields import label_volumes, read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
 from warpbrain.cases.building.node_sets import first_sets
@@ -24,6 +24,7 @@ from warpbrain.cases.building.tissue_names import (
     preset,
     usual_name,
 )
+from warpbrain.cases.building.volumes import check_volume_in, cm3
 from warpbrain.cases.case_template import case_text
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame

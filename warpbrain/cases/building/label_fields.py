@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from warpbrain.arrays import Bools, Ints, Singles
-from warpbrain.cases.building.errors import check_volume
 from warpbrain.cases.building.tissue_names import Assignment
+from warpbrain.cases.building.volumes import check_volume
 from warpbrain.errors import InputError
 from warpbrain.images.grid import Grid
 from warpbrain.images.reading import Image, labels_of, read_image
