@@ -1,16 +1,11 @@
 """A traction that moves a face by a third of its radius: its fit tells where it is, the model about rest does not."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from shapes import box
+from gel import block_of_gel
 
-from warpbrain.cases.boundary import Fixed
-from warpbrain.cases.case import Case, Tissue
-from warpbrain.mesh import TetMesh
-from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.mechanisms.traction import Traction
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import PointsRecording
@@ -28,19 +23,8 @@ SIDE, NOISE, CENTRE, POINTS = 0.06, 1e-4, np.array([0.02, 0.034, 0.06]), 60
 
 @pytest.fixture(scope="module")
 def search() -> HypothesisSearch:
-    points = box((6, 6, 6), (SIDE, SIDE, SIDE))
-    mesh = TetMesh(points.points, points.tetrahedra, node_sets={"bottom": points.points[:, 2] < 1e-9})
-    case = Case(
-        name="pulled",
-        title="A block that is pulled",
-        origin="synthetic",
-        path=Path("case.toml"),
-        mesh=mesh,
-        tissues={label: Tissue("gel", NeoHookean(1000.0)) for label in mesh.labels},
-        density=1000.0,
-        poisson=0.45,
-        boundaries=(Fixed(name="table", nodes="bottom"),),
-    )
+    case = block_of_gel((6, 6, 6), (SIDE, SIDE, SIDE), axis=2, mu=1000.0)
+    mesh = case.mesh
     x, y, z = CENTRE.tolist()
     pull = Traction(centre=(x, y, z), value=(150.0, 0.0, 1200.0), radius=0.02)
     model = model_of(replace(case, mechanisms=(pull,)))

@@ -1,20 +1,17 @@
 """What has no name and acts in one place."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import pytest
+from gel import block_of_gel
 from shapes import box
 
-from warpbrain.cases.boundary import Fixed
-from warpbrain.cases.case import Case, Tissue
 from warpbrain.diagnosis.diagnose import diagnose
 from warpbrain.diagnosis.result import sentence_of
 from warpbrain.inference.decide import UNKNOWN
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.laws import NeoHookean
 from warpbrain.physics.load import Load
 from warpbrain.recordings.location import locate
 from warpbrain.recordings.recording import PointsRecording
@@ -130,19 +127,9 @@ class Whirl(Load):
 @pytest.mark.parametrize("size", [12e3, pytest.param(40e3, marks=pytest.mark.slow(10))])
 def test_a_whirl_that_turns_tissue_far_is_not_called_by_a_name(size):
     """Linear about rest it is lost to a traction that a fit follows; a larger one looks like a field there."""
-    solid, side, noise = box((7, 7, 7), (0.1, 0.1, 0.1)), 0.1, 3e-4
-    mesh = TetMesh(solid.points, solid.tetrahedra, node_sets={"foot": solid.points[:, 2] < 1e-9})
-    case = Case(
-        name="block",
-        title="A block of gel",
-        origin="synthetic",
-        path=Path("case.toml"),
-        mesh=mesh,
-        tissues={label: Tissue("gel", NeoHookean(1000.0)) for label in mesh.labels},
-        density=1000.0,
-        poisson=0.45,
-        boundaries=(Fixed(name="foot", nodes="foot"),),
-    )
+    side, noise = 0.1, 3e-4
+    case = block_of_gel((7, 7, 7), (side, side, side), axis=2, mu=1000.0)
+    mesh = case.mesh
     whirl = Whirl(centre=(0.03, 0.055, 0.07), axis=(0.0, 0.6, 0.8), length=0.022, size=size)
     system = System(model_of(case), "cpu")
     u = EquilibriumSolver(system).solve(whirl.nodal_forces(mesh)).u

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -28,8 +28,8 @@ from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.unknown import gaussians, root_mean_square, stress_patches, unit_stresses
 
-#: From coefficients of a stress to its components as of `unit_stresses`: two and three without a trace, and a pressure,
-#: which moves hardly compressible tissue so little that it has a size of its own.
+#: Columns are components, as of `unit_stresses`, of five deviatoric stresses and of an isotropic one, all of unit
+#: Frobenius norm. The last moves nearly incompressible tissue so little that it has a standard deviation of its own.
 _STRESSES = np.zeros((6, 6))
 _STRESSES[:3, [0, 1, 5]] = np.linalg.svd(np.ones((1, 3)))[2][[1, 2, 0]].T
 _STRESSES[3:, 2:5] = np.eye(3)
@@ -46,8 +46,8 @@ class Source(Load, Mechanism):
     centre: Place  # [m]
     length: float  # [m]
     force: Place = (0.0, 0.0, 0.0)  # [N]
-    turn: Place = (0.0, 0.0, 0.0)  # a force that is this times the arm over the length [N]
-    stress: tuple[float, ...] = ()  # six components as of `unit_stresses` [Pa]
+    turn: Place = (0.0, 0.0, 0.0)  # adds the force turn x arm / length at a node, arm from the centre [N]
+    stress: tuple[float, ...] = ()  # six components as of `unit_stresses` at the centre [Pa]; none if empty
     kind: ClassVar[str] = "unknown"
     sentence: ClassVar[str] = "Something without a name acts in one place."
     example: ClassVar[str] = ""
@@ -56,25 +56,31 @@ class Source(Load, Mechanism):
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         assert isinstance(mesh, TetMesh), "a diagnosis has linear elements"
-        at_nodes, at_centres = _weights(mesh, self.centre, self.length)
-        arms = (mesh.points - np.array(self.centre)) / self.length
-        forces = at_nodes[:, None] * (np.array(self.force) + np.cross(np.array(self.turn), arms))
         if self.stress:
             of_elements = np.tensordot(np.array(self.stress), unit_stresses(mesh.points[mesh.tetrahedra]), axes=1)
-            forces -= summed_at_nodes(mesh, at_centres[:, None, None] * of_elements)
-        return np.asarray(forces)
+            heights = _heights_at(mesh, self.centre, self.length)
+            return np.asarray(-summed_at_nodes(mesh, heights[:, None, None] * of_elements))
+        arms = (mesh.points - np.array(self.centre)) / self.length
+        forces = np.array(self.force) + np.cross(np.array(self.turn), arms)
+        return np.asarray(_shares_at(mesh, self.centre, self.length)[:, None] * forces)
 
 
 @lru_cache(maxsize=_KEPT)
-def _weights(mesh: TetMesh, centre: Place, length: float) -> tuple[Floats, Floats]:
-    """Gaussians at the nodes (N,), which add up to 1, and at the middles of elements (m,), of height 1."""
-    at_nodes, at_centres = _of_places(mesh, np.array([centre]), length)
-    return at_nodes[:, 0], at_centres[:, 0]
+def _heights_at(mesh: TetMesh, centre: Place, length: float) -> Floats:
+    """Gaussian of height 1 about a centre [m] at the middles of elements (m,)."""
+    return gaussians(mesh.centres, np.array([centre]), length)[:, 0]
 
 
-def _of_places(mesh: TetMesh, centres: Floats, length: float) -> tuple[Floats, Floats]:
-    at_nodes = mesh.node_volumes[:, None] * gaussians(mesh.points, centres, length)
-    return at_nodes / np.maximum(at_nodes.sum(axis=0), 1e-300), gaussians(mesh.centres, centres, length)
+@lru_cache(maxsize=_KEPT)
+def _shares_at(mesh: TetMesh, centre: Place, length: float) -> Floats:
+    """The part (N,) of a force about a centre [m] that each node bears."""
+    return np.asarray(_shares(mesh, np.array([centre]), length)[:, 0])
+
+
+def _shares(mesh: TetMesh, centres: Floats, length: float) -> Floats:
+    """Parts (N, s) of a force about each centre (s, 3) [m] that nodes bear: of each centre they add up to 1."""
+    shares = mesh.node_volumes[:, None] * gaussians(mesh.points, centres, length)
+    return np.asarray(shares / np.maximum(shares.sum(axis=0), 1e-300))
 
 
 def sources(at: Linearisation, spacing: float, size: float) -> tuple[Effect, ...]:
@@ -84,15 +90,21 @@ def sources(at: Linearisation, spacing: float, size: float) -> tuple[Effect, ...
     a root mean square of `size` [m]. `spacing`: between places of a scan [m].
     """
     mesh = at.system.model.mesh
+
+    @cache
+    def places(apart: float) -> Floats:
+        return np.asarray(mesh.centres[spread_points(mesh.centres, apart, 700)])
+
     effects: list[Effect] = []
     for is_force, lengths in ((True, beliefs("unknown.force_lengths")), (False, beliefs("unknown.stress_lengths"))):
         for length in (spacing * lengths).tolist():
-            centres = mesh.centres[spread_points(mesh.centres, max(spacing, _APART * length), 700)]
-            effects += _sources(at, centres, length, is_force, size)
+            effects += _sources(at, places(max(spacing, _APART * length)), length, is_force, size)
     return tuple(effects)
 
 
 def _sources(at: Linearisation, centres: Floats, length: float, is_force: bool, size: float) -> list[Effect]:
+    """Effects of one length [m], of forces or of stresses, at each centre (s, 3) [m]; `size` as of `sources`."""
+
     def about(moment: Moment) -> Floats:
         return (_force_columns if is_force else _stress_columns)(moment.at, centres, length)
 
@@ -111,6 +123,7 @@ def _sources(at: Linearisation, centres: Floats, length: float, is_force: bool, 
 
 
 def _proposal(sd: Floats, is_force: bool, centre: Floats, length: float) -> Proposal:
+    """Six coefficients at a centre (3,) [m], with deviations `sd` (6,): force and turn [N], or stresses [Pa]."""
     x, y, z = centre.tolist()
 
     def make(c: Floats) -> Source:
@@ -127,7 +140,7 @@ def _proposal(sd: Floats, is_force: bool, centre: Floats, length: float) -> Prop
 def _force_columns(at: Linearisation, centres: Floats, length: float) -> Floats:
     """Columns (n, 6, s) of a force of 1 N along each axis, and of one that runs around each."""
     mesh = at.system.model.mesh
-    weights, _ = _of_places(mesh, centres, length)
+    weights = _shares(mesh, centres, length)
     arms = (mesh.points[:, None] - centres) / length
     pushes = at.answers_of_patches(weights).transpose(0, 2, 1)
     moments = [at.answers_of_patches(weights * arms[:, :, axis]) for axis in range(3)]
