@@ -40,7 +40,7 @@ class Nothing(_WithoutVolume, NeoHookean):
     """No energy: what is there is all added by terms."""
 
     def parameters(self) -> tuple[float, ...]:
-        return (0.0,)
+        return (0.0,) * len(super().parameters())
 
 
 # -- Holmes-Mow: exponential in the invariants -----------------------------------------------------------------
