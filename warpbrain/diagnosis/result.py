@@ -226,8 +226,10 @@ def traits_in_words(unknown: Traits, extent: float) -> str:
     size, sd = unknown.size
     where = f"about {place(unknown.centre, extent)}"
     fitted = "" if unknown.source is None else f" {_source_in_words(unknown.source, extent)}"
+    told = abs(unknown.surface_nats) > belief("checks.surface_told")
+    depth = ("on the surface" if unknown.surface_nats > 0.0 else "below the surface") if told else ""
     if fitted and not unknown.outside:
-        return fitted
+        return f"{fitted} It acts {depth}." if depth else fitted
     if unknown.outside:
         sentence = f"It is a force from outside, {where}, of {measured(size, sd, 'N')} in all"
     elif unknown.hidden:
@@ -239,10 +241,7 @@ def traits_in_words(unknown: Traits, extent: float) -> str:
         sentence = (
             f"It is strongest {where}, and no net force of it is seen ({measured(size, sd, 'N')}): it may act within"
         )
-    depth = abs(unknown.surface_nats)
-    if depth > belief("checks.surface_told"):
-        sentence += ", and on the surface" if unknown.surface_nats > 0.0 else ", and below the surface"
-    return f" {sentence}.{fitted}"
+    return f" {sentence}{', and ' if depth else ''}{depth}.{fitted}"
 
 
 def _source_in_words(source: FittedSource, extent: float) -> str:

@@ -1,5 +1,8 @@
 """Which set is fitted next."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 
 from warpbrain.inference.calibration import calibration
@@ -15,6 +18,10 @@ def weighted(log_evidence, *names, fitted=False, failure=""):
     hypothesis = Hypothesis(names, kinds, log_evidence, -3.0 * len(names), None)
     nothing, acting = np.zeros(0), hypothesis.of_kind(Kind.PHYSICS)
     return WeightedSet(hypothesis, acting, (), nothing, np.zeros((0, 0)), None, object() if fitted else None, failure)
+
+
+def in_a_place(candidate):
+    return replace(candidate, effects=(SimpleNamespace(is_placed=True),))
 
 
 def following(*sets, expanded=(), rivals=True):
@@ -89,3 +96,25 @@ def test_after_many_fits_only_what_the_verdict_rests_on_is_fitted():
 
 def test_nothing_is_fitted_where_no_fit_can_change_the_verdict():
     assert following(weighted(0.0, fitted=True), weighted(-8.0, "pressure")) is None
+
+
+def test_what_a_verdict_rests_on_is_looked_at_in_other_places():
+    nothing, fitted = weighted(0.0, fitted=True), in_a_place(weighted(30.0, "traction", fitted=True))
+    assert following(nothing, fitted, expanded=[("traction",)]) == ["traction"]
+    assert following(nothing, replace(fitted, moved=True), expanded=[("traction",)]) is None
+
+
+def test_a_rival_that_may_be_better_elsewhere_is_looked_at_in_other_places():
+    # by how much a fit gains where it is moved is not known before: its probability is next to nothing
+    nothing, named = weighted(0.0, fitted=True), weighted(60.0, "pressure", fitted=True)
+    rival = in_a_place(weighted(40.0, "traction", fitted=True))
+    assert following(nothing, named, rival, expanded=[("pressure",)]) == ["traction"]
+    assert following(nothing, named, replace(rival, moved=True), expanded=[("pressure",)]) is None
+    assert following(nothing, named, rival.with_evidence(20.0), expanded=[("pressure",)]) is None
+
+
+def test_before_something_has_no_name_the_likeliest_mechanism_is_looked_at_in_other_places():
+    nothing, unknown = weighted(0.0, fitted=True), weighted(90.0, "unknown", fitted=True)
+    likely = in_a_place(weighted(20.0, "traction", fitted=True))
+    assert following(nothing, unknown, likely, expanded=[("traction",)]) == ["traction"]
+    assert following(nothing, unknown, replace(likely, moved=True), expanded=[("traction",)]) is None

@@ -87,6 +87,11 @@ class Effect:
         assert self.proposal is not None
         return self.proposal
 
+    @property
+    def is_placed(self) -> bool:
+        """Whether it acts in a place, with a size of its own there, and may act at another."""
+        return self.proposal is not None and self.proposal.elsewhere is not None and not self.proposal.is_there_or_not
+
     def coefficients(self, z: Floats) -> Floats:
         """The proposal's own coefficients."""
         return self.proposed.mean + self.proposed.sd * z

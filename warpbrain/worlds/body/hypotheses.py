@@ -23,7 +23,6 @@ from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import Listener
 from warpbrain.estimation.parameters import Gaussian
 from warpbrain.inference import GaussianModel, Search, posterior
-from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.noise import scales
@@ -133,11 +132,16 @@ class HypothesisSearch:
         self._fit(frozenset())
         while not alone and (single := far_from_linear(list(self._sets.values()), self._bend)) is not None:
             self._fit(single.names)
-        for number in range(0 if alone else 2 * _MOST):
+        number = 0
+        while number < (0 if alone else 2 * _MOST):
             expanded = {*self._expanded, *self._unstable}
             chosen = next_to_fit(self.weighted_sets, self.probabilities, expanded, rivals=number < _MOST)
             if chosen is None:
                 return
+            if chosen.may_move:
+                self._move(chosen)
+                continue
+            number += 1
             if chosen.refit is None:
                 self._fit(chosen.names)
                 continue
@@ -211,17 +215,18 @@ class HypothesisSearch:
             gain = max(gain, 0.0)
         inherited = candidate.inherited_gain or 0.0
         gain = inherited + _of_all_places(gain - inherited, candidate.log_share)
-        fitted = candidate.fitted(refit).with_evidence(candidate.hypothesis.log_evidence - inherited + gain)
-        # places are moved where the verdict may depend on it
-        near = self._missing(fitted) <= belief("fits.change")
-        self._sets[names] = moved_about_fit(self.base, self._fitter, fitted, self.spacing) if near else fitted
+        fitted = candidate.fitted(refit)
+        self._sets[names] = fitted.with_evidence(candidate.hypothesis.log_evidence - inherited + gain)
         self._pass_on(gain, names)
         self._refit_subsets(names)
 
-    def _missing(self, candidate: WeightedSet) -> float:
-        """Log evidence that a set would have to gain to be as probable as the best one."""
-        best = max(other.hypothesis.log_evidence + other.hypothesis.log_prior for other in self._sets.values())
-        return float(best - (candidate.hypothesis.log_evidence + candidate.hypothesis.log_prior))
+    def _move(self, fitted: WeightedSet) -> None:
+        """Fit a fitted set where its mechanisms are better placed."""
+        self._listener.stage(f"places of {' and '.join(sorted(fitted.names))}")
+        self._sets[fitted.names] = moved = moved_about_fit(self.base, self._fitter, fitted, self.spacing)
+        if moved.refit is not fitted.refit:
+            self._forget_supersets(fitted.names)
+            self._refit_subsets(fitted.names)
 
     def _refit_subsets(self, names: frozenset[str]) -> None:
         """Fit subsets with one mechanism less again, from the optimum of a set, if that is better than their own.

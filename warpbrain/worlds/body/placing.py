@@ -248,6 +248,7 @@ def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: fl
 
     `spacing`: between the places of a scan [m].
     """
+    fitted = replace(fitted, moved=True)
     for _ in range(_MOVES):
         assert fitted.refit is not None
         moved = _moved_once(base, fitter, fitted.refit, _MOVE * spacing)
@@ -288,10 +289,10 @@ def _moved_once(base: Base, fitter: Fitter, refit: Refit, step: float) -> Refit 
 
 def _moved_effects(base: Base, effect: Effect, step: float) -> Iterator[Effect]:
     """An effect at places a step from where it is, in its own columns; none of what is everywhere, or there or not."""
-    proposal = effect.proposal
-    if proposal is None or proposal.elsewhere is None or proposal.is_there_or_not:
+    if not effect.is_placed:
         return
-    assert proposal.centre is not None and proposal.radius is not None
+    proposal = effect.proposed
+    assert proposal.elsewhere is not None and proposal.centre is not None and proposal.radius is not None
     size = float(np.max(proposal.sd / proposal.elsewhere(proposal.centre, proposal.radius).sd))
     for other in places_about(base.at.system.model, proposal, step):
         yield replace(scaled(replace(effect, proposal=other), size), columns=effect.columns)

@@ -1,8 +1,9 @@
 """Which set of causes is worth fitting next: the value of information of a fit for the verdict.
 
-A fit costs many equilibria, and tells by how much the evidence of a set differs from that in the linear model. It is
-worth that where the verdict of least expected loss could be regretted once this is known. Of the set that a name or an
-unknown rests on a fit is always made. Where a body moves far the linear model says little of any cause: `bend_of`.
+A fit costs many equilibria, and tells by how much the evidence of a set differs from that in the linear model; fits at
+other places tell how much better a mechanism would be there. Either is worth its cost where the verdict of least
+expected loss could be regretted once this is known. Of the set that a name or an unknown rests on both are always done.
+Where a body moves far the linear model says little of any cause: `bend_of`.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def next_to_fit(
     expanded: Collection[frozenset[str]],
     rivals: bool = True,
 ) -> WeightedSet | None:
-    """The set that is fitted next, or whose supersets are weighed next if it is fitted; None to stop.
+    """The set that is fitted next, if it is fitted is moved, or else its supersets are weighed; None to stop.
 
     `sets`: the most probable first.
     `probabilities` (s,).
@@ -45,7 +46,7 @@ def next_to_fit(
     elif not rivals:
         return None
     else:
-        open_sets = _not_fitted(sets, probabilities)
+        open_sets = _open_sets(sets, probabilities)
         matters = (candidate for candidate in open_sets if _may_be_regretted(candidate, sets, decision))
         first = next(matters, None)
         if first is None:
@@ -98,8 +99,8 @@ def _is_settled(named: Sequence[WeightedSet], expanded: Collection[frozenset[str
 
     That one is fitted, since it is what the verdict rests on, and one that is fitted is expanded.
     """
-    if named[0].refit is None:
-        return bool(named[0].failure)
+    if named[0].refit is None or named[0].may_move:
+        return not named[0].is_open
     fitted = (candidate for candidate in named if candidate.refit is not None)
     return any(candidate.names in expanded or len(candidate.names) > 2 for candidate in fitted)
 
@@ -111,8 +112,7 @@ def _part_not_fitted(decision: Decision, sets: Sequence[WeightedSet]) -> Weighte
     """
     named = frozenset(decision.causes)
     parts = (candidate for candidate in sets if candidate.names < named and len(candidate.names) == len(named) - 1)
-    open_parts = (part for part in parts if part.names and part.refit is None and not part.failure)
-    return next(open_parts, None)
+    return next((part for part in parts if part.names and part.is_open), None)
 
 
 def _unknown_not_fitted(
@@ -133,20 +133,22 @@ def _unknown_not_fitted(
     of_mechanisms = [s for s in sets if 0 < len(s.names) == len(s.mechanisms) and not s.failure]
     single = next((s for s in of_mechanisms if len(s.names) == 1), None)
     parts = (s for s in sets if s.names in alone or s is single or s in of_mechanisms[:1])
-    part = next((part for part in parts if part.refit is None and not part.failure), None)
+    part = next((part for part in parts if part.is_open), None)
     return part or (None if single is None or single.names in expanded else single)
 
 
-def _not_fitted(sets: Sequence[WeightedSet], probabilities: Floats) -> Iterator[WeightedSet]:
+def _open_sets(sets: Sequence[WeightedSet], probabilities: Floats) -> Iterator[WeightedSet]:
     for candidate, probability in zip(sets, probabilities.tolist(), strict=True):
-        if probability > _NEGLIGIBLE and candidate.refit is None and not candidate.failure:
+        # how much a fit at another place gains is not in the probability
+        if candidate.may_move or (probability > _NEGLIGIBLE and candidate.is_open):
             yield candidate
 
 
 def _may_be_regretted(candidate: WeightedSet, sets: Sequence[WeightedSet], decision: Decision) -> bool:
     """Whether another verdict would be better by more than a fit is worth, if the fit changed the set's evidence."""
-    for sign in (-1.0, 1.0):
-        best, losses = _decide(sets, candidate, sign * belief("fits.change"))
+    change = belief("fits.change")
+    for gain in (belief("fits.moved"),) if candidate.may_move else (-change, change):
+        best, losses = _decide(sets, candidate, gain)
         if losses.get(decision, np.inf) - losses[best] > belief("fits.regret"):
             return True
     return False

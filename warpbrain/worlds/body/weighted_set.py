@@ -260,6 +260,7 @@ class WeightedSet:
     #: it is fitted itself. None if its linear model is about a fit, whose gain it has already.
     inherited_gain: float | None = 0.0
     refined: bool = False  # whether its mechanisms are at the best places within their cells
+    moved: bool = False  # whether these were looked at about its fit
     #: Log of the part of these places in the evidence of a set that is not fitted, which is a sum over all places.
     log_share: float = 0.0
 
@@ -272,6 +273,16 @@ class WeightedSet:
     def mechanisms(self) -> tuple[str, ...]:
         """Names of its mechanisms."""
         return self.hypothesis.of_kind(Kind.PHYSICS)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it may be fitted yet, or be fitted with its mechanisms better placed."""
+        return self.may_move if self.refit is not None else not self.failure
+
+    @property
+    def may_move(self) -> bool:
+        """Whether it is fitted with mechanisms in places beside which none was looked at."""
+        return self.refit is not None and not self.moved and any(effect.is_placed for effect in self.effects)
 
     @property
     def slices(self) -> tuple[slice, ...]:
