@@ -20,7 +20,6 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import (
     CANNOT_SAY,
-    NAMED,
     NAMED_AND_REST,
     NOT_PHYSICS,
     NOTHING,
@@ -61,11 +60,6 @@ class _Checked:
     best: WeightedSet
     confirmations: tuple[Confirmation, ...]
     p_left: float | None
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """Mechanisms that are named."""
-        return self.decision.causes if self.decision.verdict in (NAMED, NAMED_AND_REST) else ()
 
 
 class Diagnosing:
@@ -123,7 +117,7 @@ class Diagnosing:
                 # least expected loss may be another one
                 if _decided(search) == by_posterior:
                     break
-            best, named = checked.best, checked.named
+            best, named = checked.best, checked.decision.named
             weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
             source = search.fitted_source if checked.decision.verdict == UNKNOWN else None
             blocks = confirming.held_out_for(source or best)
@@ -180,7 +174,7 @@ class Diagnosing:
     def _checked(self, search: HypothesisSearch, confirming: Confirming, claimed: Decision) -> _Checked:
         """A significant verdict after its other checks, and the set that it is about."""
         nothing, alpha = search.nothing, self.options.alpha
-        if claimed.verdict not in (NAMED, NAMED_AND_REST):
+        if not claimed.named:
             return _Checked(claimed, (), nothing, (), None)
         best = search.fitted_with(frozenset(claimed.causes))
         if best is None:
@@ -190,7 +184,7 @@ class Diagnosing:
             return _Checked(Decision(CANNOT_SAY, claimed.causes), (doubt,), nothing, (), None)
         confirmations, p_left = confirming.confirmations(best), confirming.p_left(best)
         decision, doubts = after_checks(claimed, confirmations, p_left, alpha)
-        if decision.verdict not in (NAMED, NAMED_AND_REST):
+        if not decision.named:
             return _Checked(decision, doubts, nothing, confirmations, p_left)
         if set(decision.causes) != set(claimed.causes):
             best = search.fitted_with(frozenset(decision.causes), best)

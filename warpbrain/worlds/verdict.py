@@ -9,16 +9,7 @@ from typing import Generic, TypeVar
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import percent
-from warpbrain.inference.decide import (
-    CANNOT_SAY,
-    NAMED,
-    NAMED_AND_REST,
-    NOT_PHYSICS,
-    NOTHING,
-    UNKNOWN,
-    Confirmation,
-    Decision,
-)
+from warpbrain.inference.decide import CANNOT_SAY, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN, Confirmation, Decision
 from warpbrain.physics.sizes import smallest_in_words
 from warpbrain.physics.words import Measurement, Smallest
 from warpbrain.shown import Shown
@@ -115,7 +106,7 @@ def verdict_in_words(
     if verdict == NOTHING:
         seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in smallest.items())
         return f"No missing physics is detected ({p}). What {data} would have shown: {seen or words.nothing}."
-    if verdict in (NAMED, NAMED_AND_REST):
+    if decision.named:
         first, *others = words.named
         sentences = [first, *(f"Beside it: {_lower(sentence)}" for sentence in others), words.grounds]
         rest = f" Something else is left, which this does not explain.{words.rest}"

@@ -11,37 +11,19 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.decide import (
-    NAMED,
-    NAMED_AND_REST,
-    NOTHING,
-    UNKNOWN,
-    Decision,
-    after_checks,
-    decide,
-    if_significant,
-)
+from warpbrain.inference.decide import NOTHING, UNKNOWN, Decision, after_checks, decide, if_significant
 from warpbrain.physics.words import Measurement
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.seconds import Seconds
 from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen import result
 from warpbrain.worlds.specimen.checks import Checker, grown_errors, score
 from warpbrain.worlds.specimen.effects import effects_of
 from warpbrain.worlds.specimen.fit import Fit, Forward, fit
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.protocol import protocol_of
-from warpbrain.worlds.specimen.result import (
-    Combination,
-    Ranked,
-    SpecimenDiagnosis,
-    assumptions_of,
-    next_measurements,
-    smallest_of,
-    values_of,
-    where_it_shows,
-)
 from warpbrain.worlds.specimen.search import CauseSet, Sets
 
 #: Rows below which nothing is concluded; combinations that are told.
@@ -72,12 +54,12 @@ class DiagnosingSpecimen:
         #: All recorded rows.
         self.protocol = protocol_of(specimen_of(case), recordings)
 
-    def run(self) -> SpecimenDiagnosis:
+    def run(self) -> result.SpecimenDiagnosis:
         """Every stage; `InputError` if the declared law finds no state in the tests."""
         with one_thread_of_blas():
             return self._run()
 
-    def _run(self) -> SpecimenDiagnosis:
+    def _run(self) -> result.SpecimenDiagnosis:
         options, protocol = self.options, self.protocol
         self._listener.stage("base: the case as declared, its tissue refitted")
         with self.seconds.of("base"):
@@ -101,7 +83,7 @@ class DiagnosingSpecimen:
             decision, doubts = after_checks(
                 claimed, checked.confirmations, checked.p_left, options.alpha, *grown_errors(checked)
             )
-        names = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
+        names = decision.named
         with self.seconds.of("next measurement"):
             measurements = _next(ordered, base)
         with self.seconds.of("explained"):
@@ -112,8 +94,8 @@ class DiagnosingSpecimen:
         nothing = sets.nothing.hypothesis.log_evidence
         shows = None
         if best is not base:
-            shows = where_it_shows(protocol, checked.stresses["refitted"], checked.stresses["explained"])
-        return SpecimenDiagnosis(
+            shows = result.where_it_shows(protocol, checked.stresses["refitted"], checked.stresses["explained"])
+        return result.SpecimenDiagnosis(
             case=self.case,
             protocol=protocol,
             decision=decision,
@@ -122,11 +104,11 @@ class DiagnosingSpecimen:
             p_value=p_value,
             alpha=options.alpha,
             p_left=checked.p_left,
-            named=tuple(replace(ranked[name], values=values_of(best, name)) for name in names),
+            named=tuple(replace(ranked[name], values=result.values_of(best, name)) for name in names),
             ranking=ranking,
             rejected=rejected,
             combinations=tuple(
-                Combination(
+                result.Combination(
                     # what has no name comes last
                     tuple(sorted(candidate.hypothesis.causes, key=lambda name: name == UNKNOWN)),
                     candidate.hypothesis.log_evidence - nothing,
@@ -137,13 +119,13 @@ class DiagnosingSpecimen:
             ),
             where=shows,
             next_measurement=measurements,
-            smallest=smallest_of(sets.about(base)),
+            smallest=result.smallest_of(sets.about(base)),
             scores={"declared": score(protocol, declared)} | checked.scores,
             stresses={"declared": declared} | checked.stresses,
             improvement=checked.improvement,
             confirmations=checked.confirmations,
             explained=explained,
-            assumptions=assumptions_of(best, protocol, checker.folds.by_test),
+            assumptions=result.assumptions_of(best, protocol, checker.folds.by_test),
             remarks=tuple(
                 f"{component.effect.name} is not simulated by a run: the explained case is fitted without it"
                 for component in best.assumed
@@ -172,8 +154,7 @@ def _check(case: Case, recordings: Sequence[TestRecording]) -> None:
 
 def _explaining(ordered: Ordered, decision: Decision) -> Fit:
     """The most probable fit that has all causes of a verdict; of one that speaks of none, of all with any."""
-    spoken = decision.verdict in (NAMED, NAMED_AND_REST)
-    wanted = {name for name in decision.causes if name != UNKNOWN} if spoken else set()
+    wanted = {name for name in decision.named if name != UNKNOWN}
     fits = [candidate.fit for candidate, _ in ordered if candidate.fit is not None]
     explaining = (each for each in fits if each.names and wanted <= each.names)
     return next(explaining, next(each for each in fits if not each.names))
@@ -209,10 +190,10 @@ def _next(ordered: Ordered, base: Fit) -> tuple[Measurement, ...]:
             runs = frozenset(each.effect.name for each in candidate.fit.assumed if each.effect.runs)
             fits.setdefault(runs, candidate.fit)
     first = [*(fitted for runs, fitted in fits.items() if runs), base]
-    return next_measurements(*first[:2]) if len(first) > 1 else ()
+    return result.next_measurements(*first[:2]) if len(first) > 1 else ()
 
 
-def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ...]:
+def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[result.Ranked, ...]:
     """Every cause alone, that which most probably acts first."""
     base, nothing = sets.base, sets.nothing.hypothesis.log_evidence
     ranked = []
@@ -224,10 +205,10 @@ def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ..
             moved = (alone.fit.stress - base.stress)[base.rows]
             d = float(np.linalg.norm(base.model.standardised(moved)))
         best = next((each.fit for each, _ in ordered if effect.name in each.names and each.fit is not None), None)
-        values = () if best is None else values_of(best, effect.name)
+        values = () if best is None else result.values_of(best, effect.name)
         regions = () if best is None else (each.variant.region for each in best.assumed if each.effect is effect)
         ranked.append(
-            Ranked(
+            result.Ranked(
                 name=effect.name,
                 sentence=effect.sentence_of(values),
                 kind=effect.kind,
