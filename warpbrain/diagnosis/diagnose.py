@@ -13,7 +13,7 @@ from warpbrain.diagnosis.locating import FittedSource, Traits, map_of_search, tr
 from warpbrain.diagnosis.measuring import imitations, next_measurements, smallest
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time
 from warpbrain.diagnosis.ranking import Ranking, about_base
-from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked, assumptions_of
+from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Diagnosis, Fit, assumptions_of
 from warpbrain.errors import require_kind
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief
@@ -42,6 +42,7 @@ from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
+from warpbrain.worlds.verdict import Combination, Ranked
 
 #: Sets of causes that a diagnosis lists.
 _LISTED = 20

@@ -11,6 +11,7 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.calibration import calibration
+from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import NOTHING, UNKNOWN, Decision, after_checks, decide, if_significant
 from warpbrain.physics.words import Measurement
 from warpbrain.recordings.recording import TestRecording
@@ -25,6 +26,7 @@ from warpbrain.worlds.specimen.fit import Fit, Forward, fit
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.protocol import protocol_of
 from warpbrain.worlds.specimen.search import CauseSet, Sets
+from warpbrain.worlds.verdict import Combination, Ranked
 
 #: Rows below which nothing is concluded; combinations that are told.
 _FEWEST, _TOLD = 15, 12
@@ -90,7 +92,7 @@ class DiagnosingSpecimen:
             explained = _explained_case(best) if names else None
         declared = forward.of(protocol=protocol).stress((), np.zeros(len(forward)))
         ranking = _ranking(sets, ordered, checker)
-        ranked = {cause.name: cause for cause in ranking}
+        ranked = {cause.kind: cause for cause in ranking}
         nothing = sets.nothing.hypothesis.log_evidence
         shows = None
         if best is not base:
@@ -107,16 +109,7 @@ class DiagnosingSpecimen:
             named=tuple(replace(ranked[name], values=result.values_of(best, name)) for name in names),
             ranking=ranking,
             rejected=rejected,
-            combinations=tuple(
-                result.Combination(
-                    # what has no name comes last
-                    tuple(sorted(candidate.hypothesis.causes, key=lambda name: name == UNKNOWN)),
-                    candidate.hypothesis.log_evidence - nothing,
-                    p,
-                    candidate.fit is not None,
-                )
-                for candidate, p in ordered[:_TOLD]
-            ),
+            combinations=tuple(_combination(candidate, p, nothing) for candidate, p in ordered[:_TOLD]),
             where=shows,
             next_measurement=measurements,
             smallest=result.smallest_of(sets.about(base)),
@@ -193,7 +186,16 @@ def _next(ordered: Ordered, base: Fit) -> tuple[Measurement, ...]:
     return result.next_measurements(*first[:2]) if len(first) > 1 else ()
 
 
-def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[result.Ranked, ...]:
+def _combination(candidate: CauseSet, probability: float, nothing: float) -> Combination:
+    """A set as it is told, with its evidence against that of nothing; what has no name comes last."""
+    hypothesis = candidate.hypothesis
+    each = sorted(zip(hypothesis.causes, hypothesis.kinds, strict=True), key=lambda cause: cause[0] == UNKNOWN)
+    causes, kinds = tuple(name for name, _ in each), tuple(kind for _, kind in each)
+    gain, fitted = hypothesis.log_evidence - nothing, candidate.fit is not None
+    return Combination(causes, kinds, gain, hypothesis.log_prior, probability, fitted)
+
+
+def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ...]:
     """Every cause alone, that which most probably acts first."""
     base, nothing = sets.base, sets.nothing.hypothesis.log_evidence
     ranked = []
@@ -207,17 +209,19 @@ def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[result.Ran
         best = next((each.fit for each, _ in ordered if effect.name in each.names and each.fit is not None), None)
         values = () if best is None else result.values_of(best, effect.name)
         regions = () if best is None else (each.variant.region for each in best.assumed if each.effect is effect)
+        gain = float("-inf") if alone is None else alone.hypothesis.log_evidence - nothing
         ranked.append(
-            result.Ranked(
-                name=effect.name,
-                sentence=effect.sentence_of(values),
-                kind=effect.kind,
-                log_evidence=float("-inf") if alone is None else alone.hypothesis.log_evidence - nothing,
-                probability=sum(p for candidate, p in ordered if effect.name in candidate.names),
-                detectability=d,
-                change=change,
-                values=values,
+            Ranked(
+                effect.name,
+                effect.kind is Kind.PHYSICS,
+                gain,
+                sum(p for candidate, p in ordered if effect.name in candidate.names),
+                d,
+                change,
+                values,
                 region=next(iter(regions), ""),
+                rejected_because="" if np.isfinite(gain) else "no fit with it stands",
+                sentence=effect.sentence_of(values),
             )
         )
     return tuple(sorted(ranked, key=lambda cause: (-cause.probability, -cause.log_evidence)))
