@@ -83,27 +83,22 @@ class SpecimenDiagnosis(Verdict):
     @cached_property
     def sentence(self) -> str:
         """The verdict for people."""
-        return sentence_of(self)
-
-
-def sentence_of(diagnosis: SpecimenDiagnosis) -> str:
-    """The verdict for people."""
-    named, causes, scores = diagnosis.named, diagnosis.decision.causes, diagnosis.scores
-    members = [cause for cause in diagnosis.ranking if cause.kind in causes and cause.kind != UNKNOWN]
-    heldout = [pascals(scores[name].heldout or 0.0) for name in ("explained", "refitted") if name in scores]
-    words = Words(
-        data="these tests",
-        nothing="none of those that were looked for",
-        unnamed="a smooth change of single tests",
-        named=[specimen_effect_sentence(cause) for cause in named],
-        grounds=grounds([cause.probability for cause in named], "tests", (heldout[0], heldout[-1])),
-        members=[(cause.sentence, cause.probability) for cause in members],
-        perhaps=[f"{clause(cause.sentence)} ({percent(cause.probability)})" for cause in members],
-        nothing_acts=sum(each.probability for each in diagnosis.combinations if not each.causes),
-        physics_acts=sum(each.probability for each in diagnosis.combinations if set(each.kinds) - {Kind.NOT_PHYSICS}),
-    )
-    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.alpha, diagnosis.smallest, words)
-    return " ".join([sentence, *diagnosis.doubts])
+        named, causes, scores = self.named, self.decision.causes, self.scores
+        members = [cause for cause in self.ranking if cause.kind in causes and cause.kind != UNKNOWN]
+        heldout = [pascals(scores[name].heldout or 0.0) for name in ("explained", "refitted") if name in scores]
+        words = Words(
+            data="these tests",
+            nothing="none of those that were looked for",
+            unnamed="a smooth change of single tests",
+            named=[specimen_effect_sentence(cause) for cause in named],
+            grounds=grounds([cause.probability for cause in named], "tests", (heldout[0], heldout[-1])),
+            members=[(cause.sentence, cause.probability) for cause in members],
+            perhaps=[f"{clause(cause.sentence)} ({percent(cause.probability)})" for cause in members],
+            nothing_acts=sum(each.probability for each in self.combinations if not each.causes),
+            physics_acts=sum(each.probability for each in self.combinations if set(each.kinds) - {Kind.NOT_PHYSICS}),
+        )
+        sentence = verdict_in_words(self.decision, self.p_value, self.alpha, self.smallest, words)
+        return " ".join([sentence, *self.doubts])
 
 
 def specimen_effect_sentence(cause: Ranked) -> str:
