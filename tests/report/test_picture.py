@@ -117,7 +117,7 @@ def test_pictures_of_any_body_become_a_file(tmp_path, monkeypatch):
     def white(_scene, _cameras, size):
         return {name: np.full((size[1], size[0], 3), 255, np.uint8) for name in NAMES}
 
-    monkeypatch.setattr(picture.rendering, "render", white)
+    monkeypatch.setattr(picture, "render", white)
     mesh = block()
     plain = TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, {}, {})
     for u in (np.zeros(mesh.points.shape), np.tile([0.0, 0.0, 0.2], (len(mesh.points), 1))):
@@ -138,7 +138,7 @@ def test_where_nothing_can_be_rendered_no_old_picture_stays(tmp_path, monkeypatc
     def fails(*_):
         raise RenderingError("no graphics")
 
-    monkeypatch.setattr(picture.rendering, "render", fails)
+    monkeypatch.setattr(picture, "render", fails)
     path, mesh = tmp_path / "a.png", block()
     path.write_bytes(b"of another run")
     said = draw(path, begin_pictures(mesh, mesh, np.zeros(mesh.points.shape), {}, NO_POINTS), "A title", [])

@@ -16,6 +16,7 @@ from warpbrain.mesh import TetMesh
 from warpbrain.recordings.recording import PointsRecording, Recording
 from warpbrain.report import rendering, views
 from warpbrain.report.files import MILLIMETRES
+from warpbrain.report.rendering import RenderingError, render
 from warpbrain.threads import beside
 
 #: Pixels of one picture.
@@ -73,7 +74,7 @@ def begin_pictures(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, st
     """
     scene, resected = scene_of(whole, mesh, u, names, moved), taken_out(whole, mesh)
     cameras = cameras_of(scene)
-    rendered = beside(lambda: rendering.render(scene, cameras, _SIZE))
+    rendered = beside(lambda: render(scene, cameras, _SIZE))
     return Pictures(scene, cameras, whole, resected, names, rendered)
 
 
@@ -203,7 +204,7 @@ def draw(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -
     views.lay_out(figure)
     try:
         images = pictures.images
-    except rendering.RenderingError as error:
+    except RenderingError as error:
         path.unlink(missing_ok=True)
         return str(error)
     for name, image in images.items():
