@@ -9,14 +9,14 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from warpbrain.diagnosis.result import Fit, Ranked, effect_sentence, sentence_of
+from warpbrain.diagnosis.result import Fit, effect_sentence, sentence_of
 from warpbrain.inference import Kind
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import VERDICTS, Decision
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import Smallest, Value
 from warpbrain.worlds.body.causes import SENTENCES
-from warpbrain.worlds.verdict import Words, verdict_in_words
+from warpbrain.worlds.verdict import Ranked, Words, verdict_in_words
 
 #: What each verdict says, whatever its numbers.
 SAID = {

@@ -1,13 +1,14 @@
 """The paper's Table 3: elapsed times of the deformation of its synthetic phantom, and which of our cases stands beside.
 
-Supplement of "A Generative Model of Hyperelastic Strain Energy Density Functions for Multiple Tissue Brain
-Deformation", Table 3: mean (sd) in ms, Intel Core i7 at 2.8 GHz with an NVIDIA GeForce GTX 1060. The paper does not
-publish the sizes of these meshes; ours are at least as large as the median clinical mesh of its Table 5.
+The numbers and where they are from are in `table3.toml`. The paper does not publish the sizes of these meshes; ours are
+at least as large as the median clinical mesh of its Table 5.
 """
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass
+from importlib.resources import files
 
 from warpbrain.simulation.dynamics import PHASES
 
@@ -28,28 +29,8 @@ class Row:
     phases: dict[str, tuple[float, float]]
 
 
-def _row(name: str, case: str, tissue: str, preprocessing: float, *times: tuple[float, float]) -> Row:
-    return Row(name, case, tissue, preprocessing, dict(zip((*PHASES, MAIN_LOOP), times, strict=True)))
-
-
+_TABLE = tomllib.loads((files("warpbrain.bench") / "table3.toml").read_text(encoding="utf-8"))
 TABLE3 = {
-    row.name: row
-    for row in (
-        _row(
-            "st/coarse", "phantom", "single", 569,
-            (27.44, 3.9), (18.32, 2.0), (63.36, 4.9), (4.95, 5.4), (118.78, 10.2),
-        ),
-        _row(
-            "st/fine", "phantom-fine", "single", 1026,
-            (36.4, 3.6), (28.31, 2.5), (90.4, 5.3), (4.16, 1.2), (164.2, 8.9),
-        ),
-        _row(
-            "mt/coarse", "phantom", "multi", 2577,
-            (70.93, 5.2), (55.43, 3.6), (174.03, 6.1), (5.91, 7.6), (310.9, 11.8),
-        ),
-        _row(
-            "mt/fine", "phantom-fine", "multi", 9953,
-            (126.99, 14.9), (136.8, 5.6), (437.54, 9.5), (5.27, 1.4), (710.87, 17.0),
-        ),
-    )
-}  # fmt: skip
+    name: Row(name, **row | {"phases": dict(zip((*PHASES, MAIN_LOOP), map(tuple, row["phases"]), strict=True))})
+    for name, row in _TABLE.items()
+}

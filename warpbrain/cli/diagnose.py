@@ -14,15 +14,8 @@ from warpbrain.cli.log import note_case
 from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.estimation.options import Listener
 from warpbrain.kernels.module import find_device
+from warpbrain.report.diagnosis import files
 from warpbrain.report.diagnosis.description import describe
-from warpbrain.report.diagnosis.files import (
-    write_covariance,
-    write_curves,
-    write_diagnosed_state,
-    write_explained,
-    write_map,
-    write_points,
-)
 from warpbrain.report.diagnosis.page import write_page
 from warpbrain.report.diagnosis.text import diagnosis_lines
 from warpbrain.report.files import read_state, write_summary
@@ -37,13 +30,13 @@ _Way = tuple[Callable[..., Any], dict[str, Callable[[Path, Any], None]]]
 _OF_A_BODY: _Way = (
     Diagnosing,
     {
-        "map.vtu": write_map,
-        "state.vtu": write_diagnosed_state,
-        "points.csv": write_points,
-        "covariance.npz": write_covariance,
+        "map.vtu": files.write_map,
+        "state.vtu": files.write_diagnosed_state,
+        "points.csv": files.write_points,
+        "covariance.npz": files.write_covariance,
     },
 )
-_OF_A_SPECIMEN: _Way = (DiagnosingSpecimen, {"curves.csv": write_curves})
+_OF_A_SPECIMEN: _Way = (DiagnosingSpecimen, {"curves.csv": files.write_curves})
 
 
 def diagnose(options: argparse.Namespace) -> None:
@@ -78,7 +71,7 @@ def diagnose(options: argparse.Namespace) -> None:
             write(out / name, diagnosis)
         record.files += ["report.html", "diagnosis.json", *tables]
         if diagnosis.explained is not None:
-            write_explained(out / "explained", diagnosis.explained)
+            files.write_explained(out / "explained", diagnosis.explained)
             record.files.append("explained")
         # after all that it speaks of: whoever finds it finds the others
         write_summary(out / "diagnosis.json", summary)

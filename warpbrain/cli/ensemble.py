@@ -20,15 +20,8 @@ from warpbrain.ensemble.store import Store, discard
 from warpbrain.ensemble.workers import Job, Workers
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
+from warpbrain.report import ensemble as report
 from warpbrain.report import summary as tables
-from warpbrain.report.ensemble import (
-    describe_ensemble,
-    ensemble_lines,
-    file_of_fields,
-    table_of,
-    write_spread_picture,
-    write_table,
-)
 from warpbrain.report.files import fingerprints, write_body, write_summary
 from warpbrain.report.page import lines
 from warpbrain.simulation.model import Model
@@ -78,8 +71,8 @@ def ensemble(options: argparse.Namespace) -> None:
     with Progress("summing up", options.quiet) as progress:
         to_rest, outcomes = options.steps is None, store.outcomes()
         result = results_of(case, model.mesh, samples, outcomes, to_rest, lambda n: progress.show(n / len(samples)))
-    result_summary = describe_ensemble(result)
-    say("", *ensemble_lines(result_summary), sep="\n")
+    result_summary = report.describe_ensemble(result)
+    say("", *report.ensemble_lines(result_summary), sep="\n")
     summary = {
         "case": described,
         "inputs_sha256": fingerprints(case),
@@ -102,10 +95,10 @@ def _write(
     out: Path, result: EnsembleResult, summary: dict[str, Any], chosen: str, title: str, count: int
 ) -> list[str]:
     """Write what an ensemble gave; returns the names of the files."""
-    files = [*write_table(out, table_of(result)), "summary.json"]
+    files = [*report.write_table(out, report.table_of(result)), "summary.json"]
     if result.fields is not None:
-        write_body(out / "fields.vtu", file_of_fields(result.fields))
-        write_spread_picture(
+        write_body(out / "fields.vtu", report.file_of_fields(result.fields))
+        report.write_spread_picture(
             out / "spread.png", result.fields, title, f"{result.fields.count} of {count} samples, {chosen}"
         )
         files += ["fields.vtu", "spread.png"]

@@ -16,16 +16,8 @@ from warpbrain.gp.literature.studies import read_studies
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import draw_laws, law_of_curve, moduli, unstable
 from warpbrain.gp.trained import KINDS, find_model, fit_model, trained, write_model
+from warpbrain.report import generative_text as text
 from warpbrain.report.generative_pictures import draw_draws, draw_extrapolation, draw_studies, save
-from warpbrain.report.generative_text import (
-    LawRow,
-    asymmetry_lines,
-    law_lines,
-    moduli_lines,
-    redrawn_lines,
-    write_laws,
-    write_moduli,
-)
 from warpbrain.report.page import lines
 from warpbrain.terminal.progress import Progress
 
@@ -58,13 +50,13 @@ def show(options: argparse.Namespace) -> None:
         for index, (group, law) in enumerate(wanted):
             bar.show(index / len(wanted), f"{group}, {law}")
             rows.append(moduli(model, group, law, options.draws, options.seed, options.poisson))
-    print("", *moduli_lines(rows), *lines("gp.txt", "known", rows, options.draws), sep="\n")
+    print("", *text.moduli_lines(rows), *lines("gp.txt", "known", rows, options.draws), sep="\n")
     curved = [group for group in groups if group.startswith("hyperelastic/")]
     if curved and isinstance(model, Hierarchical):
         papers = asymmetries_of_papers(model.studies)
-        print("", *asymmetry_lines([asymmetry(model, group) for group in curved], papers), sep="\n")
+        print("", *text.asymmetry_lines([asymmetry(model, group) for group in curved], papers), sep="\n")
     other = trained("coregionalised" if model.name == KINDS[0] else "hierarchical", options.variant or "corrected")
-    write_moduli(out / "moduli.csv", rows)
+    text.write_moduli(out / "moduli.csv", rows)
     save(draw_studies(model, options.group), out / "studies.png")
     save(draw_draws(model, options.group, options.seed), out / "draws.png")
     save(draw_extrapolation(model, other, options.group), out / "extrapolation.png")
@@ -99,7 +91,7 @@ def _print_change(options: argparse.Namespace, model: Process) -> None:
             for when, process in (("before", trained(options.gp, options.variant)), ("after", model))
             if group in process.groups
         }
-        head, *lines = moduli_lines(list(tables.values()))
+        head, *lines = text.moduli_lines(list(tables.values()))
         print(
             "", f"with {', '.join(study.name for study in added if study.group == group)}:", f"{'':10}{head}", sep="\n"
         )
@@ -129,24 +121,24 @@ def sample(options: argparse.Namespace) -> None:
         last = "unstable"
     if options.csv is None:
         shown = first if options.sweep is None else tuple(f"k {i}" for i in range(1, len(first) + 1))
-        print(*law_lines(shown, options.group, rows), sep="\n")
+        print(*text.law_lines(shown, options.group, rows), sep="\n")
     else:
-        write_laws(options.csv, first, options.group, rows, last)
+        text.write_laws(options.csv, first, options.group, rows, last)
         sentences.append(f"written to {options.csv}")
     print("", *sentences, sep="\n")
 
 
-def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
+def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[text.LawRow], list[str]]:
     draws, seed = [], options.seed or 0
     with Progress("draws") as bar:
         for number in range(options.number):
             draws.append(draw_laws(model, options.group, options.model, number, seed, options.poisson))
             bar.show(len(draws) / options.number)
-    rows = [LawRow((str(draw.number), str(1 + len(draw.rejected))), draw.fits, draw.rejected) for draw in draws]
-    return rows, redrawn_lines(draws)
+    rows = [text.LawRow((str(draw.number), str(1 + len(draw.rejected))), draw.fits, draw.rejected) for draw in draws]
+    return rows, text.redrawn_lines(draws)
 
 
-def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], list[str]]:
+def _swept(options: argparse.Namespace, model: Process) -> tuple[list[text.LawRow], list[str]]:
     places = [-2.0 + 4.0 * i / (options.sweep - 1) for i in range(options.sweep)]
     fits = {(group, k): law_of_curve(model, group, k, options.model) for group in options.group for k in places}
     reasons = {key: unstable(fitted, options.poisson) for key, fitted in fits.items()}
@@ -154,7 +146,7 @@ def _swept(options: argparse.Namespace, model: Process) -> tuple[list[LawRow], l
     for combination in product(places, repeat=len(options.group)):
         keys = list(zip(options.group, combination, strict=True))
         wrong = tuple(f"{key[0]}: {reasons[key]}" for key in keys if reasons[key])
-        rows.append(LawRow(tuple(f"{k:g}" for k in combination), tuple(fits[key] for key in keys), wrong))
+        rows.append(text.LawRow(tuple(f"{k:g}" for k in combination), tuple(fits[key] for key in keys), wrong))
     count = sum(bool(row.reasons) for row in rows)
     sentences = [f"unstable: {count} of {len(rows)}"]
     return rows, sentences + sorted({f"  {reason}" for row in rows for reason in row.reasons})

@@ -13,14 +13,13 @@ from warpbrain.diagnosis.locating import FittedSource, Traits, map_of_search, tr
 from warpbrain.diagnosis.measuring import imitations, next_measurements, smallest
 from warpbrain.diagnosis.onset import AS_IT_CHANGES, Onset, always_there, onset_of, size_over_time
 from warpbrain.diagnosis.ranking import Ranking, about_base
-from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Combination, Diagnosis, Fit, Ranked, assumptions_of
+from warpbrain.diagnosis.result import EXPLAINED, REFITTED, Diagnosis, Fit, assumptions_of
 from warpbrain.errors import require_kind
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import (
     CANNOT_SAY,
-    NAMED,
     NAMED_AND_REST,
     NOT_PHYSICS,
     NOTHING,
@@ -43,6 +42,7 @@ from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
+from warpbrain.worlds.verdict import Combination, Ranked
 
 #: Sets of causes that a diagnosis lists.
 _LISTED = 20
@@ -61,11 +61,6 @@ class _Checked:
     best: WeightedSet
     confirmations: tuple[Confirmation, ...]
     p_left: float | None
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """Mechanisms that are named."""
-        return self.decision.causes if self.decision.verdict in (NAMED, NAMED_AND_REST) else ()
 
 
 class Diagnosing:
@@ -123,7 +118,7 @@ class Diagnosing:
                 # least expected loss may be another one
                 if _decided(search) == by_posterior:
                     break
-            best, named = checked.best, checked.named
+            best, named = checked.best, checked.decision.named
             weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
             source = search.fitted_source if checked.decision.verdict == UNKNOWN else None
             blocks = confirming.held_out_for(source or best)
@@ -180,7 +175,7 @@ class Diagnosing:
     def _checked(self, search: HypothesisSearch, confirming: Confirming, claimed: Decision) -> _Checked:
         """A significant verdict after its other checks, and the set that it is about."""
         nothing, alpha = search.nothing, self.options.alpha
-        if claimed.verdict not in (NAMED, NAMED_AND_REST):
+        if not claimed.named:
             return _Checked(claimed, (), nothing, (), None)
         best = search.fitted_with(frozenset(claimed.causes))
         if best is None:
@@ -190,7 +185,7 @@ class Diagnosing:
             return _Checked(Decision(CANNOT_SAY, claimed.causes), (doubt,), nothing, (), None)
         confirmations, p_left = confirming.confirmations(best), confirming.p_left(best)
         decision, doubts = after_checks(claimed, confirmations, p_left, alpha)
-        if decision.verdict not in (NAMED, NAMED_AND_REST):
+        if not decision.named:
             return _Checked(decision, doubts, nothing, confirmations, p_left)
         if set(decision.causes) != set(claimed.causes):
             best = search.fitted_with(frozenset(decision.causes), best)

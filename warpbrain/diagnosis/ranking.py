@@ -7,7 +7,6 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.diagnosis.checking import Confirming
 from warpbrain.diagnosis.locating import ball_of
-from warpbrain.diagnosis.result import Ranked
 from warpbrain.inference import Cause, GaussianModel, Kind
 from warpbrain.inference.subsets import Blocks
 from warpbrain.physics.sizes import beyond_in_words
@@ -15,6 +14,7 @@ from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.parameters import scanned_values, values_of
 from warpbrain.worlds.body.weighted_set import WeightedSet
+from warpbrain.worlds.verdict import Ranked
 
 
 class Ranking:
@@ -44,7 +44,7 @@ class Ranking:
         gain = 0.0 if alone is None else alone.hypothesis.log_evidence - nothing.hypothesis.log_evidence
         if cause.kind is not Kind.PHYSICS:
             why = "no physics" if cause.kind is Kind.NOT_PHYSICS else ""
-            return Ranked(cause.name, False, gain, probability, 0.0, None, (), None, None, "", why)
+            return Ranked(cause.name, False, gain, probability, 0.0, None, (), rejected_because=why)
         number = weighted_set.acting.index(cause.name)
         effect = weighted_set.effects[number]
         weights = self._weights(cause, weighted_set)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.locating import FittedSource, ScoreMap, Traits
 from warpbrain.diagnosis.onset import Onset
@@ -19,34 +19,15 @@ from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.predict import Prediction
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import size_in_words
-from warpbrain.physics.words import Value, length, measured, number, place
+from warpbrain.physics.words import length, measured, number, place
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import SENTENCES
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.weighted_set import WeightedSet
-from warpbrain.worlds.verdict import Verdict, Words, clause, grounds, verdict_in_words
+from warpbrain.worlds.verdict import Ranked, Verdict, Words, clause, grounds, verdict_in_words
 
 #: Sets of causes: without any, and with all that is named.
 REFITTED, EXPLAINED = "refitted", "explained"
-
-
-@dataclass(frozen=True, eq=False)
-class Ranked:
-    """A cause with its probability, size and place."""
-
-    kind: str
-    physics: bool  # whether it is a mechanism, not something that is no physics
-    log_evidence: float  # logarithm, against nothing missing
-    probability: float  # among all that may be missing
-    detectability: float  # length of its fitted effect in standard deviations of noise and nuisances
-    #: Of held-out points [m] against the refitted case without it; negative is better. None where it was not fitted.
-    heldout_rmse_change: float | None
-    values: tuple[Value, ...]  # its parameters
-    #: Where it acts, if somewhere: (3,) and a radius [m].
-    centre: Floats | None
-    radius: float | None
-    region: str
-    rejected_because: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +36,6 @@ class Confusion:
 
     #: By mechanism, the part of its detectable effect that the best place of each other cause explains.
     rows: dict[str, dict[str, float]]
-
-
-@dataclass(frozen=True)
-class Combination:
-    """A set of causes."""
-
-    causes: tuple[str, ...]
-    kinds: tuple[Kind, ...]  # of each
-    log_evidence: float
-    log_prior: float
-    probability: float
-    fitted: bool  # whether it was fitted without linearising
-    gross_errors: int  # points that are more probably gross errors than not under it
 
 
 @dataclass(frozen=True)
@@ -88,7 +56,7 @@ class Fit:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Diagnosis(Verdict[Ranked, Combination]):
+class Diagnosis(Verdict):
     """A diagnosis of a body; what it has in common with others: `warpbrain.worlds.verdict.Verdict`.
 
     Attributes

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtr
 
 from warpbrain.arrays import Floats
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import write_csv
 from warpbrain.errors import InputError
 from warpbrain.gp.coregionalised import JITTER, TASKS, Coregionalised, Likelihood, climb, start, train, training_points
 from warpbrain.gp.hierarchy import (
@@ -334,13 +334,12 @@ COLUMNS = ("model", "log density [nats a point]", "standard error", "median", "r
 
 def write_scores(path: Path, scores: Sequence[Score], held: Sequence[str]) -> None:
     """Write scores, a line a model, with log density and level of each study or paper that was left out."""
-    with whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([*COLUMNS, *held, *_level_columns(held)])
-        for score in scores:
-            density = score.log_density, score.log_density_error, score.median
-            points = score.rms_error, score.coverage_50, score.coverage_95
-            writer.writerow([score.name, *map(repr, (*density, *points, *score.values, *score.levels))])
+    rows: list[list[str]] = [[*COLUMNS, *held, *_level_columns(held)]]
+    for score in scores:
+        density = score.log_density, score.log_density_error, score.median
+        points = score.rms_error, score.coverage_50, score.coverage_95
+        rows.append([score.name, *map(repr, (*density, *points, *score.values, *score.levels))])
+    write_csv(path, rows)
 
 
 def read_scores(path: Path, held: Sequence[str]) -> list[Score]:

@@ -33,6 +33,11 @@ class Decision:
     verdict: str
     causes: tuple[str, ...] = ()
 
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Mechanisms that it names; none of the verdicts that name none."""
+        return self.causes if self.verdict in (NAMED, NAMED_AND_REST) else ()
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -192,7 +197,7 @@ def after_checks(
     doubts.
     """
     remarks = list(doubts)
-    if decision.verdict not in (NAMED, NAMED_AND_REST):
+    if not decision.named:
         return decision, (*grown, *remarks)
     if p_left is not None and p_left <= alpha:
         remarks.append(f"Other causes would explain what is left (p = {p_left:.2g} if nothing were).")

@@ -18,13 +18,12 @@ from warpbrain.physics.words import tabled
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report.files import MILLIMETRES, picked
+from warpbrain.report.page import lines
 from warpbrain.simulation.mesh_error import MeshError
 from warpbrain.simulation.observation import Observed
 
 #: Units as people read them, by that of a comparison, the factor and the name.
 SHOWN = {"m": (MILLIMETRES, "mm")} | {unit: (1.0, unit) for unit in ("N", "Pa", "N m", "rad", "")}
-#: What "before" is, by the unit of an error: nothing moves, or nothing pushes.
-_NOTHING = {"mm": "no motion", "N": "no force", "Pa": "no stress"}
 WORSE, IN_PART, NO_NEARER, NEARER, UNKNOWN = (
     "worse than no motion at all", "in part worse than no motion", "no nearer than no motion", "nearer than no motion",
     "not compared",
@@ -162,33 +161,14 @@ def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation
         math.sqrt(sum(entry["count"] * entry[key] ** 2 for entry in lengths) / count) if count else None
         for key in ("before", "after")
     )
-    worse = [(entry, entry["unit"]) for entry in entries if entry["after"] > entry["before"]]
-    sentences = [
-        f"It explains '{entry['name']}' worse than {_NOTHING.get(unit, 'nothing')} at all: RMSE "
-        f"{error_text(entry['after'], unit)} {unit} with it, {error_text(entry['before'], unit)} {unit} without."
-        for entry, unit in worse
-    ]
+    worse = [entry for entry in entries if entry["after"] > entry["before"]]
+    sentences = lines("run.txt", "worse", worse, error_text)
     if before is None or after is None:
         return Explained(UNKNOWN, before, after, tuple(sentences))
     # whole per cent of the error of no motion that are gone
     gone = round(100.0 * (1.0 - after / before)) if before > 0.0 else 0
-    name = what[0].upper() + what[1:]
-    if after > before:
-        verdict, first = WORSE, (
-            f"{name} explains the recordings worse than no motion at all: RMSE {tabled(after)} mm with it, "
-            f"{tabled(before)} mm if nothing had moved."
-        )  # fmt: skip
-    elif not gone:
-        verdict, first = IN_PART if worse else NO_NEARER, (
-            f"{name} explains the recordings no better than no motion at all: RMSE {tabled(after)} mm with it and "
-            "without."
-        )  # fmt: skip
-    else:
-        verdict, first = IN_PART if worse else NEARER, (
-            f"{name} takes {gone} % off the error of no motion at all: RMSE {tabled(before)} mm if nothing had moved, "
-            f"{tabled(after)} mm with it."
-        )  # fmt: skip
-    return Explained(verdict, before, after, (first, *sentences))
+    verdict = WORSE if after > before else IN_PART if worse else NEARER if gone else NO_NEARER
+    return Explained(verdict, before, after, (*lines("run.txt", "explained", what, before, after, gone), *sentences))
 
 
 # the error of the mesh ------------------------------------------------------------------------------------------------

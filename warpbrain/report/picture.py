@@ -14,23 +14,9 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.recording import PointsRecording, Recording
-from warpbrain.report import views
+from warpbrain.report import rendering, views
 from warpbrain.report.files import MILLIMETRES
-from warpbrain.report.rendering import (
-    AFTER,
-    AXIAL,
-    BEFORE,
-    COMPUTED,
-    CORONAL,
-    CUTS,
-    MOTION,
-    RECORDED,
-    SAGITTAL,
-    Camera,
-    RenderingError,
-    Scene,
-    render,
-)
+from warpbrain.report.rendering import RenderingError, render
 from warpbrain.threads import beside
 
 #: Pixels of one picture.
@@ -64,8 +50,8 @@ class Moved:
 class Pictures:
     """Renderings of a scene, and what makes a figure of them."""
 
-    scene: Scene
-    cameras: dict[str, Camera]
+    scene: rendering.Scene
+    cameras: dict[str, rendering.Camera]
     #: The anatomy, elements (m,) of it that were taken out, and the names of its tissues.
     whole: TetMesh
     resected: Bools
@@ -102,7 +88,7 @@ def taken_out(whole: TetMesh, mesh: TetMesh) -> Bools:
     return np.asarray(cKDTree(mesh.centres).query(whole.centres)[0] > near)
 
 
-def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Scene:
+def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> rendering.Scene:
     """What is drawn of a deformed body; see `begin_pictures`."""
     from matplotlib import colormaps
     from matplotlib.colors import to_rgb
@@ -126,7 +112,7 @@ def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], mo
     corner = whole.points[ventricle].mean(axis=0) if ventricle.any() else middle
     # two cuts through what was resected and an axial one through the ventricles say more than three through one place
     places[2] = corner[2]
-    return Scene(
+    return rendering.Scene(
         points=MILLIMETRES * points,
         tetrahedra=tetrahedra.astype(np.int64),
         removed=gone,
@@ -151,16 +137,16 @@ def round_factor(wanted: float, length: float) -> float:
     return views.round_below(max(1.0, wanted / length) * (1.0 + 1e-9))
 
 
-def cameras_of(scene: Scene) -> dict[str, Camera]:
+def cameras_of(scene: rendering.Scene) -> dict[str, rendering.Camera]:
     """Where each picture is seen from: the body, before and after, fills it."""
     moved = scene.points + scene.exaggeration * scene.u
     everything = np.concatenate([scene.points, moved[np.unique(scene.tetrahedra[~scene.removed])]])
     tips = np.concatenate([everything, scene.where + scene.arrows * scene.recorded])
     cameras = {}
     for name, towards, points in (
-        (BEFORE, [0.80, 0.85, 0.62], everything),
-        (AFTER, [0.80, 0.85, 0.62], everything),
-        (MOTION, [1.0, 0.25, 0.12], tips),
+        (rendering.BEFORE, [0.80, 0.85, 0.62], everything),
+        (rendering.AFTER, [0.80, 0.85, 0.62], everything),
+        (rendering.MOTION, [1.0, 0.25, 0.12], tips),
     ):
         # what is above is above
         to_viewer = scene.side * towards
@@ -168,12 +154,16 @@ def cameras_of(scene: Scene) -> dict[str, Camera]:
         right /= np.linalg.norm(right)
         cameras[name] = _fitted(points, right, np.cross(to_viewer / np.linalg.norm(to_viewer), right))
     x, y, z = np.eye(3)
-    for name, (right, up) in {AXIAL: (-x, y), CORONAL: (-x, z), SAGITTAL: (-y, z)}.items():
+    for name, (right, up) in {
+        rendering.AXIAL: (-x, y),
+        rendering.CORONAL: (-x, z),
+        rendering.SAGITTAL: (-y, z),
+    }.items():
         cameras[name] = _fitted(everything, right, up)
     return cameras
 
 
-def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
+def _fitted(points: Floats, right: Floats, up: Floats) -> rendering.Camera:
     flat = points @ np.column_stack([right, up])
     low, high = flat.min(axis=0), flat.max(axis=0)
     towards = np.cross(right, up)
@@ -181,7 +171,7 @@ def _fitted(points: Floats, right: Floats, up: Floats) -> Camera:
     centre = np.column_stack([right, up, towards]) @ [*(0.5 * (low + high)), 0.5 * (depth.min() + depth.max())]
     across, high_ = 0.5 * (high - low)
     # room for letters and a scale bar
-    return Camera(right, up, centre, 1.14 * float(max(high_, across * _SIZE[1] / _SIZE[0], 1e-3)))
+    return rendering.Camera(right, up, centre, 1.14 * float(max(high_, across * _SIZE[1] / _SIZE[0], 1e-3)))
 
 
 def draw(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -> Pictures | str:
@@ -223,25 +213,25 @@ def draw(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -
     return pictures
 
 
-def arrow_colours(scene: Scene) -> dict[str, str]:
+def arrow_colours(scene: rendering.Scene) -> dict[str, str]:
     """What arrows of displacements mean, and their colours."""
-    computed = {"computed displacement": COMPUTED}
-    return {"recorded displacement": RECORDED, **computed} if len(scene.where) else computed
+    computed = {"computed displacement": rendering.COMPUTED}
+    return {"recorded displacement": rendering.RECORDED, **computed} if len(scene.where) else computed
 
 
 def heading(pictures: Pictures, name: str) -> str:
     """What stands above a picture, in two lines."""
     scene, factor = pictures.scene, pictures.scene.exaggeration
-    if name == BEFORE:
+    if name == rendering.BEFORE:
         return "before\n"
-    if name == AFTER:
+    if name == rendering.AFTER:
         above = "after"
-    elif name == MOTION and len(scene.where):
+    elif name == rendering.MOTION and len(scene.where):
         above, factor = "recorded and computed", scene.arrows
-    elif name == MOTION:
+    elif name == rendering.MOTION:
         above = "how the surface moves"
     else:
-        view = next(view for view in views.VIEWS if view.axis == CUTS[name])
+        view = next(view for view in views.VIEWS if view.axis == rendering.CUTS[name])
         above = views.heading(pictures.whole, view, float(scene.places[view.axis]) / MILLIMETRES)
     return f"{above}\n" + ("motion as large as it is" if factor == 1.0 else f"motion {factor:g} times as large")
 
@@ -267,7 +257,10 @@ def annotations_of(pictures: Pictures, name: str) -> Annotations:
 
 
 def notes_on(
-    camera: Camera, shape: tuple[int, ...], whole: TetMesh, ends: Sequence[str] = ("R", "A", "S", "L", "P", "I")
+    camera: rendering.Camera,
+    shape: tuple[int, ...],
+    whole: TetMesh,
+    ends: Sequence[str] = ("R", "A", "S", "L", "P", "I"),
 ) -> Annotations:
     """What is written on a picture (height, width, ...) of a body; `ends` are those of x, y and z, then the others."""
     high = camera.half_height

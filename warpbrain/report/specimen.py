@@ -18,6 +18,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.specimen import Specimen
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES, picked
+from warpbrain.report.page import lines
 from warpbrain.report.summary import describe_case
 from warpbrain.report.views import BLACK, BLUE, VERMILLION
 from warpbrain.simulation.locking import largest_poisson, locking_sentences
@@ -27,35 +28,6 @@ from warpbrain.simulation.specimen import SHOWN, Tested, interpolated
 #: Colour and shape of recorded points by role; told apart by the colour-blind and without any colour.
 _STYLES = {"fit": (BLUE, "o"), "check": (VERMILLION, "x")}
 COLUMNS = 3
-#: How the grips hold a specimen, in words.
-_GRIPS = {
-    "glued": (
-        "both ends are glued to rigid platens and cannot widen; the upper one moves as imposed: along the axis, or "
-        "sideways or about the axis at constant height"
-    ),
-    "lubricated": (
-        "both ends slide without friction on rigid platens: the state is homogeneous, nothing barrels or buckles"
-    ),
-}
-_ELASTIC = (
-    "the tissue is elastic and the test quasi-static: loading, unloading and every cycle run on one curve, and the "
-    "specimen is free of stress at rest, where nothing is imposed"
-)
-_IN_TIME = (
-    "the test is quasi-static and follows its recorded times, straight between the corners of its record; each begins "
-    "with a rested specimen"
-)
-_RATE = "rate and history: relaxation, hysteresis, conditioning by earlier cycles"
-_EARLIER = "conditioning by earlier cycles and tests"
-_LEFT_OUT = (
-    "flow of fluid through the tissue; weight and inertia of the specimen; prestrain from mounting it; slip and "
-    "peeling at the grips"
-)
-#: Against meshes twice as fine and their extrapolation: neo-Hookean, 8 mm by 4.5 mm, and a cube.
-_LOCKING = (
-    "the linear tetrahedra make a glued specimen stiffer than it is: a cylinder of 8 mm by 4.5 mm at nu = 0.45 by 10 % "
-    "axially, 9 % in torsion and 4 % in shear, at nu = 0.49 by 30 %, 28 % and 6 %; a cube by 6 % and by 8 % to 17 %"
-)
 
 
 def describe_specimen(
@@ -65,13 +37,9 @@ def describe_specimen(
 
     `in_time`: tests are followed through their times, since what acts has a memory or a ramp.
     """
-    if specimen.grips != "glued":
-        locking = []
-    elif model.elements == "tet4":
-        locking = [_LOCKING]
-    else:
-        locking = locking_sentences(model.elements, largest_poisson(model), "a specimen has none that lock less")
-    left_out = f"{_EARLIER if in_time else _RATE}; {_LEFT_OUT}"
+    glued, plain = specimen.grips == "glued", model.elements == "tet4"
+    instead = "a specimen has none that lock less"
+    locking = locking_sentences(model.elements, largest_poisson(model), instead) if glued and not plain else []
     return {
         **describe_case(case, model, chosen),
         "specimen": {
@@ -79,8 +47,8 @@ def describe_specimen(
             "size_mm": [MILLIMETRES * length for length in specimen.size],
             "grips": specimen.grips,
         },
-        "assumptions": [_GRIPS[specimen.grips], _IN_TIME if in_time else _ELASTIC, *case.assumptions],
-        "left_out": [left_out, *locking],
+        "assumptions": [*lines("run.txt", "specimen_assumed", glued, in_time), *case.assumptions],
+        "left_out": [*lines("run.txt", "specimen_left_out", in_time, glued and plain), *locking],
     }
 
 

@@ -4,32 +4,55 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
 
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import percent
-from warpbrain.inference.decide import (
-    CANNOT_SAY,
-    NAMED,
-    NAMED_AND_REST,
-    NOT_PHYSICS,
-    NOTHING,
-    UNKNOWN,
-    Confirmation,
-    Decision,
-)
+from warpbrain.inference.causes import Kind
+from warpbrain.inference.decide import CANNOT_SAY, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN, Confirmation, Decision
 from warpbrain.physics.sizes import smallest_in_words
-from warpbrain.physics.words import Measurement, Smallest
+from warpbrain.physics.words import Measurement, Smallest, Value
 from warpbrain.shown import Shown
 
-#: Causes with their probabilities, and sets of causes.
-Ranked = TypeVar("Ranked")
-Combination = TypeVar("Combination")
+
+@dataclass(frozen=True, eq=False)
+class Ranked:
+    """A cause with its probability, size and place."""
+
+    kind: str
+    physics: bool  # whether it is a mechanism, not something that is no physics
+    log_evidence: float  # of the cause alone against nothing
+    probability: float  # that it acts, whatever else does
+    #: `d` of its fitted effect: its length in standard deviations of noise and nuisances.
+    detectability: float | None
+    #: Of held-out points [m] or rows of tests [Pa] against the refitted case without it; negative is better. None where
+    #: it was not fitted.
+    heldout_rmse_change: float | None
+    values: tuple[Value, ...]  # its parameters
+    #: Where it acts, if somewhere: (3,) and a radius [m].
+    centre: Floats | None = None
+    radius: float | None = None
+    region: str = ""  # or in which way
+    rejected_because: str = ""
+    sentence: str = ""  # what it is, of what is no mechanism of a run
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A set of causes."""
+
+    causes: tuple[str, ...]
+    kinds: tuple[Kind, ...]  # of each
+    log_evidence: float
+    log_prior: float
+    probability: float
+    fitted: bool  # whether it was fitted without linearising
+    gross_errors: int = 0  # points that are more probably gross errors than not under it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Verdict(Shown, Generic[Ranked, Combination]):
+class Verdict(Shown):
     """What was left out of a case.
 
     Attributes
@@ -115,7 +138,7 @@ def verdict_in_words(
     if verdict == NOTHING:
         seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in smallest.items())
         return f"No missing physics is detected ({p}). What {data} would have shown: {seen or words.nothing}."
-    if verdict in (NAMED, NAMED_AND_REST):
+    if decision.named:
         first, *others = words.named
         sentences = [first, *(f"Beside it: {_lower(sentence)}" for sentence in others), words.grounds]
         rest = f" Something else is left, which this does not explain.{words.rest}"

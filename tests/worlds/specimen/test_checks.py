@@ -74,7 +74,7 @@ def test_a_viscosity_stays_where_more_tests_are_fitted():
     for durations in ((400.0, 40.0), (400.0, 40.0, 100.0, 200.0)):
         options = DiagnosisOptions(candidates=("viscoelasticity", "softening", "drift of the zero"), draws=100)
         found = DiagnosingSpecimen(cycles(*durations), options, "cpu").run()
-        assert "viscoelasticity" in [one.name for one in found.named], durations
+        assert "viscoelasticity" in [one.kind for one in found.named], durations
 
 
 def test_what_stiffens_is_what_tissue_remembers_too():

@@ -42,7 +42,7 @@ def test_false_alarms_on_neo_hookean_rods_are_as_rare_as_was_asked():
 
 def test_an_ogden_rod_resists_compression_more():
     found = diagnosed(static(lambda l: ogden(l, -15.0), np.random.default_rng(1)))
-    assert found.verdict == "named" and [one.name for one in found.named] == ["asymmetry"]
+    assert found.verdict == "named" and [one.kind for one in found.named] == ["asymmetry"]
     [exponent] = found.named[0].values
     assert abs(exponent.value + 15.0) < 3.0 * exponent.sd + 3.0
     assert found.rejected["viscoelasticity"].startswith("not testable with these data")
@@ -57,7 +57,7 @@ def test_a_viscous_rod_is_told_by_its_cycles():
         time, stretch = cycle(duration)
         tests.append(rod_test(name, stretch, noisy(viscous(time, stretch, 1.5, 12.0), rng), time))
     found = diagnosed(tests)
-    assert found.verdict == "named" and [one.name for one in found.named] == ["viscoelasticity"]
+    assert found.verdict == "named" and [one.kind for one in found.named] == ["viscoelasticity"]
     values = {one.name: one for one in found.named[0].values}
     # what noise of 1 % of the peak, and of 2 % that neighbours share, leaves open: 10 % and 14 % off
     assert values["moduli"].value == pytest.approx(1.5, rel=0.15)
@@ -79,7 +79,7 @@ def test_a_rod_under_forces_is_read_with_the_noise_of_its_stretch():
         for test in protocol.tests:
             assert test.sigma == pytest.approx(0.001 * test.peak / test.reach)
         found = diagnosed(tests)
-        assert [one.name for one in found.named] == named
+        assert [one.kind for one in found.named] == named
         assert named or found.verdict == "nothing missing"
 
 
@@ -102,7 +102,7 @@ def test_confined_compression_tells_how_compressible_a_rod_is(poisson):
     if poisson == 0.45:
         assert found.verdict == "nothing missing"
         return
-    assert found.verdict == "named" and [one.name for one in found.named] == ["compressibility"]
+    assert found.verdict == "named" and [one.kind for one in found.named] == ["compressibility"]
     [value] = found.named[0].values
     assert abs(value.value - poisson) < 3.0 * value.sd < 0.03
     alone = diagnosed(tests[:2], (*KINDS, "compressibility"))
@@ -119,7 +119,7 @@ def test_a_drifting_zero_is_no_physics():
         tests.append(rod_test(name, stretch, drifted, first + time))
         first += 101.0
     found = diagnosed(tests)
-    assert found.verdict == "not physics" and found.ranking[0].name == "drift of the zero"
+    assert found.verdict == "not physics" and found.ranking[0].kind == "drift of the zero"
     assert not found.named and found.explained is None
 
 

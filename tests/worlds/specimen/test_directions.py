@@ -64,7 +64,7 @@ def test_fibres_are_told_by_one_mode_along_and_across_them(tmp_path):
         candidates=("fibres", "asymmetry", "stiffening", "second invariant", "drift of the zero")
     )
     found = DiagnosingSpecimen(read, options, "cpu").run()
-    assert found.verdict == "named" and [one.name for one in found.named] == ["fibres"]
+    assert found.verdict == "named" and [one.kind for one in found.named] == ["fibres"]
     assert found.named[0].region == "fibres along x"
     [stiffness] = found.named[0].values
     assert abs(stiffness.value - 900.0) < 3.0 * stiffness.sd + 90.0

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 from warpbrain.diagnosis.checking import distance
-from warpbrain.diagnosis.result import Diagnosis, Ranked, confusion_sentences, effect_sentence, sentence_of_kind
-from warpbrain.inference.causes import Kind
+from warpbrain.diagnosis.result import Diagnosis, confusion_sentences, effect_sentence, sentence_of_kind
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.sizes import smallest_in_words
 from warpbrain.physics.words import Smallest, Value
 from warpbrain.report.files import fingerprints, picked, plain
 from warpbrain.report.summary import machine
 from warpbrain.worlds.options import DiagnosisOptions
-from warpbrain.worlds.specimen import result as of_specimen
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis, specimen_effect_sentence
+from warpbrain.worlds.verdict import Ranked
 
 #: States of a case in the order in which they are shown, and their names for people.
 STATES = {"declared": "as declared", "refitted": "tissue refitted", "explained": "with what is named"}
@@ -147,9 +145,7 @@ def _words(diagnosis: Diagnosis, ranked: Ranked) -> str:
     return effect_sentence(ranked, diagnosis.case.gravity_axis)
 
 
-def _cause(
-    name: str, words: str, known: Mapping[str, Any], ranked: Ranked | of_specimen.Ranked | None = None
-) -> dict[str, Any]:
+def _cause(name: str, words: str, known: Mapping[str, Any], ranked: Ranked | None = None) -> dict[str, Any]:
     """A row of a ranking; of a cause that was not tried there are no numbers."""
     numbers = _picked(ranked, "log_evidence", "probability", "detectability", "region")
     nothing = {"log_evidence": None, "probability": 0.0, "detectability": None, "region": ""}
@@ -202,7 +198,10 @@ def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
         "where": _picked(where, "test", "mode", "segment", "strain"),
         "when": {"seconds": where.time} if where is not None and where.time is not None else None,
         "ranking": [_ranked_of_specimen(ranked) for ranked in diagnosis.ranking] + rejected,
-        "combinations": [asdict(combination) for combination in diagnosis.combinations],
+        "combinations": [
+            _picked(combination, "causes", "log_evidence", "probability", "fitted")
+            for combination in diagnosis.combinations
+        ],
         "before_checks": _picked(diagnosis.by_posterior, "verdict", "causes"),
         "smallest_detectable": {name: _smallest(name, smallest) for name, smallest in diagnosis.smallest.items()},
         "fit": {
@@ -222,7 +221,6 @@ def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
     }
 
 
-def _ranked_of_specimen(ranked: of_specimen.Ranked) -> dict[str, Any]:
-    why = "" if math.isfinite(ranked.log_evidence) else "no fit with it stands"
-    known = {"physics": ranked.kind is Kind.PHYSICS, "rejected_because": why, "heldout_rmse_change_pa": ranked.change}
-    return _cause(ranked.name, specimen_effect_sentence(ranked), known, ranked)
+def _ranked_of_specimen(ranked: Ranked) -> dict[str, Any]:
+    known = _picked(ranked, "physics", "rejected_because", heldout_rmse_change_pa="heldout_rmse_change")
+    return _cause(ranked.kind, specimen_effect_sentence(ranked), known, ranked)

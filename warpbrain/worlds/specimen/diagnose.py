@@ -11,38 +11,22 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
 from warpbrain.estimation.options import Listener
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.decide import (
-    NAMED,
-    NAMED_AND_REST,
-    NOTHING,
-    UNKNOWN,
-    Decision,
-    after_checks,
-    decide,
-    if_significant,
-)
+from warpbrain.inference.causes import Kind
+from warpbrain.inference.decide import NOTHING, UNKNOWN, Decision, after_checks, decide, if_significant
 from warpbrain.physics.words import Measurement
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.seconds import Seconds
 from warpbrain.simulation.specimen import not_transmitted, specimen_of
 from warpbrain.threads import one_thread_of_blas
 from warpbrain.worlds.options import DiagnosisOptions
+from warpbrain.worlds.specimen import result
 from warpbrain.worlds.specimen.checks import Checker, grown_errors, score
 from warpbrain.worlds.specimen.effects import effects_of
 from warpbrain.worlds.specimen.fit import Fit, Forward, fit
 from warpbrain.worlds.specimen.glued_ends import GluedEnds
 from warpbrain.worlds.specimen.protocol import protocol_of
-from warpbrain.worlds.specimen.result import (
-    Combination,
-    Ranked,
-    SpecimenDiagnosis,
-    assumptions_of,
-    next_measurements,
-    smallest_of,
-    values_of,
-    where_it_shows,
-)
 from warpbrain.worlds.specimen.search import CauseSet, Sets
+from warpbrain.worlds.verdict import Combination, Ranked
 
 #: Rows below which nothing is concluded; combinations that are told.
 _FEWEST, _TOLD = 15, 12
@@ -72,12 +56,12 @@ class DiagnosingSpecimen:
         #: All recorded rows.
         self.protocol = protocol_of(specimen_of(case), recordings)
 
-    def run(self) -> SpecimenDiagnosis:
+    def run(self) -> result.SpecimenDiagnosis:
         """Every stage; `InputError` if the declared law finds no state in the tests."""
         with one_thread_of_blas():
             return self._run()
 
-    def _run(self) -> SpecimenDiagnosis:
+    def _run(self) -> result.SpecimenDiagnosis:
         options, protocol = self.options, self.protocol
         self._listener.stage("base: the case as declared, its tissue refitted")
         with self.seconds.of("base"):
@@ -101,19 +85,19 @@ class DiagnosingSpecimen:
             decision, doubts = after_checks(
                 claimed, checked.confirmations, checked.p_left, options.alpha, *grown_errors(checked)
             )
-        names = decision.causes if decision.verdict in (NAMED, NAMED_AND_REST) else ()
+        names = decision.named
         with self.seconds.of("next measurement"):
             measurements = _next(ordered, base)
         with self.seconds.of("explained"):
             explained = _explained_case(best) if names else None
         declared = forward.of(protocol=protocol).stress((), np.zeros(len(forward)))
         ranking = _ranking(sets, ordered, checker)
-        ranked = {cause.name: cause for cause in ranking}
+        ranked = {cause.kind: cause for cause in ranking}
         nothing = sets.nothing.hypothesis.log_evidence
         shows = None
         if best is not base:
-            shows = where_it_shows(protocol, checked.stresses["refitted"], checked.stresses["explained"])
-        return SpecimenDiagnosis(
+            shows = result.where_it_shows(protocol, checked.stresses["refitted"], checked.stresses["explained"])
+        return result.SpecimenDiagnosis(
             case=self.case,
             protocol=protocol,
             decision=decision,
@@ -122,28 +106,19 @@ class DiagnosingSpecimen:
             p_value=p_value,
             alpha=options.alpha,
             p_left=checked.p_left,
-            named=tuple(replace(ranked[name], values=values_of(best, name)) for name in names),
+            named=tuple(replace(ranked[name], values=result.values_of(best, name)) for name in names),
             ranking=ranking,
             rejected=rejected,
-            combinations=tuple(
-                Combination(
-                    # what has no name comes last
-                    tuple(sorted(candidate.hypothesis.causes, key=lambda name: name == UNKNOWN)),
-                    candidate.hypothesis.log_evidence - nothing,
-                    p,
-                    candidate.fit is not None,
-                )
-                for candidate, p in ordered[:_TOLD]
-            ),
+            combinations=tuple(_combination(candidate, p, nothing) for candidate, p in ordered[:_TOLD]),
             where=shows,
             next_measurement=measurements,
-            smallest=smallest_of(sets.about(base)),
+            smallest=result.smallest_of(sets.about(base)),
             scores={"declared": score(protocol, declared)} | checked.scores,
             stresses={"declared": declared} | checked.stresses,
             improvement=checked.improvement,
             confirmations=checked.confirmations,
             explained=explained,
-            assumptions=assumptions_of(best, protocol, checker.folds.by_test),
+            assumptions=result.assumptions_of(best, protocol, checker.folds.by_test),
             remarks=tuple(
                 f"{component.effect.name} is not simulated by a run: the explained case is fitted without it"
                 for component in best.assumed
@@ -172,8 +147,7 @@ def _check(case: Case, recordings: Sequence[TestRecording]) -> None:
 
 def _explaining(ordered: Ordered, decision: Decision) -> Fit:
     """The most probable fit that has all causes of a verdict; of one that speaks of none, of all with any."""
-    spoken = decision.verdict in (NAMED, NAMED_AND_REST)
-    wanted = {name for name in decision.causes if name != UNKNOWN} if spoken else set()
+    wanted = {name for name in decision.named if name != UNKNOWN}
     fits = [candidate.fit for candidate, _ in ordered if candidate.fit is not None]
     explaining = (each for each in fits if each.names and wanted <= each.names)
     return next(explaining, next(each for each in fits if not each.names))
@@ -209,7 +183,16 @@ def _next(ordered: Ordered, base: Fit) -> tuple[Measurement, ...]:
             runs = frozenset(each.effect.name for each in candidate.fit.assumed if each.effect.runs)
             fits.setdefault(runs, candidate.fit)
     first = [*(fitted for runs, fitted in fits.items() if runs), base]
-    return next_measurements(*first[:2]) if len(first) > 1 else ()
+    return result.next_measurements(*first[:2]) if len(first) > 1 else ()
+
+
+def _combination(candidate: CauseSet, probability: float, nothing: float) -> Combination:
+    """A set as it is told, with its evidence against that of nothing; what has no name comes last."""
+    hypothesis = candidate.hypothesis
+    each = sorted(zip(hypothesis.causes, hypothesis.kinds, strict=True), key=lambda cause: cause[0] == UNKNOWN)
+    causes, kinds = tuple(name for name, _ in each), tuple(kind for _, kind in each)
+    gain, fitted = hypothesis.log_evidence - nothing, candidate.fit is not None
+    return Combination(causes, kinds, gain, hypothesis.log_prior, probability, fitted)
 
 
 def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ...]:
@@ -224,19 +207,21 @@ def _ranking(sets: Sets, ordered: Ordered, checker: Checker) -> tuple[Ranked, ..
             moved = (alone.fit.stress - base.stress)[base.rows]
             d = float(np.linalg.norm(base.model.standardised(moved)))
         best = next((each.fit for each, _ in ordered if effect.name in each.names and each.fit is not None), None)
-        values = () if best is None else values_of(best, effect.name)
+        values = () if best is None else result.values_of(best, effect.name)
         regions = () if best is None else (each.variant.region for each in best.assumed if each.effect is effect)
+        gain = float("-inf") if alone is None else alone.hypothesis.log_evidence - nothing
         ranked.append(
             Ranked(
-                name=effect.name,
-                sentence=effect.sentence_of(values),
-                kind=effect.kind,
-                log_evidence=float("-inf") if alone is None else alone.hypothesis.log_evidence - nothing,
-                probability=sum(p for candidate, p in ordered if effect.name in candidate.names),
-                detectability=d,
-                change=change,
-                values=values,
+                effect.name,
+                effect.kind is Kind.PHYSICS,
+                gain,
+                sum(p for candidate, p in ordered if effect.name in candidate.names),
+                d,
+                change,
+                values,
                 region=next(iter(regions), ""),
+                rejected_because="" if np.isfinite(gain) else "no fit with it stands",
+                sentence=effect.sentence_of(values),
             )
         )
     return tuple(sorted(ranked, key=lambda cause: (-cause.probability, -cause.log_evidence)))

@@ -22,7 +22,7 @@ from warpbrain.worlds.specimen.fit import CANNOT_BE, Fit
 from warpbrain.worlds.specimen.glued_ends import ELEMENTS
 from warpbrain.worlds.specimen.protocol import Protocol, Test, noise_factor
 from warpbrain.worlds.specimen.search import Linear
-from warpbrain.worlds.verdict import Verdict, Words, clause, grounds, verdict_in_words
+from warpbrain.worlds.verdict import Ranked, Verdict, Words, clause, grounds, verdict_in_words
 
 #: Of a cause no more numbers are said in a sentence.
 _VALUES = 6
@@ -31,33 +31,6 @@ _STILL, _STEP = 0.002, 1e-3
 #: Rows of a side of a further test, largest strain of one, duration [s] where no test has times, and part of a modulus
 #: that differs from specimen to specimen and tells nothing.
 _ROWS, _REACH, _DURATION, _SPREAD = 40, 0.5, 100.0, 0.1
-
-
-@dataclass(frozen=True)
-class Ranked:
-    """One cause."""
-
-    name: str
-    sentence: str
-    kind: Kind
-    log_evidence: float  # of the cause alone against nothing
-    probability: float  # that it acts, whatever else does
-    #: `d` of the effect, fitted alone: its length in standard deviations of noise and nuisances.
-    detectability: float | None
-    #: Of the held-out error of all rows [Pa] with it alone; negative is better. None where it was not fitted.
-    change: float | None
-    values: tuple[Value, ...]
-    region: str
-
-
-@dataclass(frozen=True)
-class Combination:
-    """A set of causes, its log evidence against nothing and its probability; whether it was fitted."""
-
-    causes: tuple[str, ...]
-    log_evidence: float
-    probability: float
-    fitted: bool
 
 
 @dataclass(frozen=True)
@@ -82,7 +55,7 @@ class Score:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SpecimenDiagnosis(Verdict[Ranked, Combination]):
+class SpecimenDiagnosis(Verdict):
     """A diagnosis of a specimen; what it has in common with others: `warpbrain.worlds.verdict.Verdict`.
 
     Attributes
@@ -110,33 +83,27 @@ class SpecimenDiagnosis(Verdict[Ranked, Combination]):
     @cached_property
     def sentence(self) -> str:
         """The verdict for people."""
-        return sentence_of(self)
-
-
-def sentence_of(diagnosis: SpecimenDiagnosis) -> str:
-    """The verdict for people."""
-    named, causes, scores = diagnosis.named, diagnosis.decision.causes, diagnosis.scores
-    members = [cause for cause in diagnosis.ranking if cause.name in causes and cause.name != UNKNOWN]
-    errors = {cause.name for cause in diagnosis.ranking if cause.kind is Kind.NOT_PHYSICS}
-    heldout = [pascals(scores[name].heldout or 0.0) for name in ("explained", "refitted") if name in scores]
-    words = Words(
-        data="these tests",
-        nothing="none of those that were looked for",
-        unnamed="a smooth change of single tests",
-        named=[specimen_effect_sentence(cause) for cause in named],
-        grounds=grounds([cause.probability for cause in named], "tests", (heldout[0], heldout[-1])),
-        members=[(cause.sentence, cause.probability) for cause in members],
-        perhaps=[f"{clause(cause.sentence)} ({percent(cause.probability)})" for cause in members],
-        nothing_acts=sum(each.probability for each in diagnosis.combinations if not each.causes),
-        physics_acts=sum(each.probability for each in diagnosis.combinations if set(each.causes) - errors),
-    )
-    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.alpha, diagnosis.smallest, words)
-    return " ".join([sentence, *diagnosis.doubts])
+        named, causes, scores = self.named, self.decision.causes, self.scores
+        members = [cause for cause in self.ranking if cause.kind in causes and cause.kind != UNKNOWN]
+        heldout = [pascals(scores[name].heldout or 0.0) for name in ("explained", "refitted") if name in scores]
+        words = Words(
+            data="these tests",
+            nothing="none of those that were looked for",
+            unnamed="a smooth change of single tests",
+            named=[specimen_effect_sentence(cause) for cause in named],
+            grounds=grounds([cause.probability for cause in named], "tests", (heldout[0], heldout[-1])),
+            members=[(cause.sentence, cause.probability) for cause in members],
+            perhaps=[f"{clause(cause.sentence)} ({percent(cause.probability)})" for cause in members],
+            nothing_acts=sum(each.probability for each in self.combinations if not each.causes),
+            physics_acts=sum(each.probability for each in self.combinations if set(each.kinds) - {Kind.NOT_PHYSICS}),
+        )
+        sentence = verdict_in_words(self.decision, self.p_value, self.alpha, self.smallest, words)
+        return " ".join([sentence, *self.doubts])
 
 
 def specimen_effect_sentence(cause: Ranked) -> str:
     """What a cause is, how large it was found to be, and in which way it acts."""
-    size = "; ".join([*size_in_words(cause.name, cause.values)[:_VALUES], *([cause.region] if cause.region else [])])
+    size = "; ".join([*size_in_words(cause.kind, cause.values)[:_VALUES], *([cause.region] if cause.region else [])])
     return f"{cause.sentence.rstrip('.')}: {size}." if size else cause.sentence
 
 

@@ -47,12 +47,6 @@ class Linear:
     causes: tuple[Cause, ...]
     components: tuple[tuple[Component, ...], ...]
 
-    def posterior(self, beam: int) -> tuple[Hypothesis, ...]:
-        """Over sets of these causes beside those of the fit."""
-        values, logs = scales()
-        residual = self.fit.residual[self.fit.rows]
-        return posterior(self.fit.model.with_scale(1.0), residual, self.causes, Search(values, logs, beam=beam))
-
     def start(self, best: Configuration) -> tuple[tuple[Component, ...], Floats]:
         """Causes of the fit and of a configuration, and coefficients to begin at."""
         sizes = beliefs("specimen.sizes").tolist()
@@ -199,7 +193,8 @@ class Sets:
         """Sets with the causes of a fit and others: those that were not fitted take their evidence from here."""
         linear = self.about(fit)
         kinds = {component.effect.name: component.effect.kind for component in fit.assumed}
-        hypotheses = linear.posterior(0 if kinds else _BEAM)
+        search = Search(*scales(), beam=0 if kinds else _BEAM)
+        hypotheses = posterior(fit.model.with_scale(1.0), fit.residual[fit.rows], linear.causes, search)
         nothing = next(hypothesis for hypothesis in hypotheses if not hypothesis.causes)
         of_scale = nothing.log_evidence - nothing.best.log_density
         for hypothesis in hypotheses:
