@@ -101,6 +101,8 @@ class Term(abc.ABC):
     of_moduli: bool = True
     #: Whether it is there in full, however little of the load is.
     in_full: ClassVar[bool] = False
+    #: Whether its forces have a derivative everywhere; those of what opens and closes have none where it does.
+    is_smooth: bool = True
     #: Names of the arrays that hold what it remembers of earlier steps and augmentations.
     memory: ClassVar[tuple[str, ...]] = ()
     #: Names of what no number of a mechanism changes: rigid shapes around the body, solvers and what they work on.

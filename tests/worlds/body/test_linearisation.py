@@ -60,3 +60,24 @@ def test_what_lets_go_is_what_a_dense_solution_says(at):
     du = frame @ np.linalg.solve(frame.T @ K @ frame, frame.T @ load)
     expected = at.sensors.by_displacement @ du
     np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
+
+
+def test_reactions_to_further_forces_balance_them(at):
+    forces = np.random.default_rng(3).normal(size=at.u.shape)
+    reactions = at.reactions_to(forces)
+    assert not reactions.ravel()[at.free].any()
+    np.testing.assert_allclose(reactions.sum(axis=0), -forces.sum(axis=0), atol=1e-6 * np.abs(forces).sum())
+
+
+@pytest.mark.parametrize("lifts", [False, True])
+def test_what_lets_go_beside_further_forces_is_what_does_where_they_act_already(at, lifts):
+    held = at.system.model.constrained.all(axis=1)
+    patch = held & (at.system.model.mesh.points[:, 0] < 0.025)
+    more = at.reactions_to(1e-4 * np.random.default_rng(1).normal(size=at.u.shape))
+    loaded = copy.copy(at)
+    loaded._surfaces, loaded._surface_responses = {}, {}
+    loaded.reactions = at.reactions + more
+    expected = loaded.released(patch, held, lifts)
+    found = at.released(patch, held, lifts, more)
+    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+    assert np.abs(expected).max() > 0.0

@@ -182,6 +182,7 @@ class ContactTerm(KernelTerm):
         made, *kernels = _kernels(body.precision)
         super().__init__(body, members[:, None], kernels, contact.factor)
         self.mechanism = contact
+        self.is_smooth = contact.state != "lifting"
         precision = body.precision
         points, faces = contact.skull(body.mesh)
         boundary = body.mesh.boundary

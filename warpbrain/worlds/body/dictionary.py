@@ -243,8 +243,9 @@ def candidates_about_fit(
 ) -> Candidates:
     """The effects of a dictionary at the state of a fit, in which some mechanisms act.
 
-    Switches, courses in time and what is no physics keep their columns at the base, as do all at improbable places. A
-    kind of which a case has only one is left out if it acts already.
+    What lets go depends on all that pulls: its columns are made anew at all places, unless something let go already.
+    Other switches, courses in time and what is no physics keep their columns at the base, as do all at improbable
+    places. A kind of which a case has only one is left out if it acts already.
 
     `candidates`: at the base. `places`: of each kind, numbers of the places whose columns are made anew.
     """
@@ -262,5 +263,17 @@ def candidates_about_fit(
         for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
             if is_linear(effect, effects.at):
                 of_this_kind[k] = effect
+        if not any(effect.proposed.patch is not None and effect.proposed.is_there_or_not for effect in acting):
+            of_this_kind = released_anew(of_this_kind, effects)
         by_kind[kind] = tuple(of_this_kind)
     return replace(candidates, effects=by_kind, source=effects)
+
+
+def released_anew(of_a_kind: Sequence[Effect], effects: Effects) -> list[Effect]:
+    """Effects of a kind, those of what lets go at another state, or beside what pushes; as they were where none is."""
+    released = [k for k, e in enumerate(of_a_kind) if e.proposal is not None and e.proposal.follows == "release"]
+    anew = list(of_a_kind)
+    for k, effect in zip(released, switch_effects(effects, [anew[k].proposed for k in released]), strict=True):
+        if isinstance(effect, Effect):
+            anew[k] = effect
+    return anew

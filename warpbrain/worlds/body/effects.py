@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -118,6 +118,7 @@ class Effects:
     `switches`: needed for proposals that are switches.
     `mesh_errors`: of the state: less compressible tissue locks more, which is part of the effect of a law.
     `instant`: number of the time of the state.
+    `pushing`: what acts beside all proposals, to first order, which what lets go depends on most of all.
     """
 
     def __init__(
@@ -126,8 +127,10 @@ class Effects:
         switches: SolvedSwitches | None = None,
         mesh_errors: MeshErrors | None = None,
         instant: int = -1,
+        pushing: Sequence[Mechanism] = (),
     ) -> None:
         self.at, self.mesh_errors, self._switches, self._instant = at, mesh_errors, switches, instant
+        self.pushing = tuple(pushing)
         self._internal: Floats | None = None
         # systems of the same state with laws of other kinds, as long as columns are made
         self._of_other_laws: list[System] = []
@@ -139,6 +142,18 @@ class Effects:
     def over(self, at: Linearisation) -> Effects:
         """The same over other sensors at the same state."""
         return Effects(at, self._switches, self.mesh_errors)
+
+    def beside(self, pushing: Sequence[Mechanism]) -> Effects:
+        """The same beside mechanisms that act by nodal forces; others are left out."""
+        acting = [mechanism for mechanism in pushing if not _faces(mechanism.__class__).isdisjoint(_PUSHING)]
+        return Effects(self.at, self._switches, self.mesh_errors, self._instant, acting)
+
+    @cached_property
+    def _reactions(self) -> Floats | None:
+        """What reactions (N, 3) are larger by [N] under what acts beside; None if nothing does."""
+        if not self.pushing:
+            return None
+        return self.at.reactions_to(np.sum([self._forces(m, _faces(m.__class__)) for m in self.pushing], axis=0))
 
     def of(
         self, proposals: Sequence[Proposal], present: Mechanism | None = None, columns_alone: bool = False
@@ -152,7 +167,9 @@ class Effects:
         each_once, by_moment = list({id(base): base for base in bases}.values()), []
         for moment in self.at.moments:
             at = moment.at
-            here = self if at is self.at else Effects(at, self._switches, self.mesh_errors, moment.number)
+            here = self
+            if at is not self.at:
+                here = Effects(at, self._switches, self.mesh_errors, moment.number, self.pushing)
             by_moment.append(here._at_one_time(each_once, present, columns_alone))
         return [
             self._over_time(proposal, [effects[id(base)] for effects in by_moment])
@@ -238,7 +255,8 @@ class Effects:
         if proposal.is_there_or_not:
             if proposal.follows == "release":
                 patch = proposal.released
-                answer = self.at.released(patch.members, patch.held, proposal.make(proposal.mean).lifts)
+                lifts = proposal.make(proposal.mean).lifts
+                answer = self.at.released(patch.members, patch.held, lifts, self._reactions)
             else:
                 assert self._switches is not None, "about a fit switches keep their columns"
                 answer = self._switches.effect_of(proposal.make(proposal.mean), self.at.sensors, self._instant)

@@ -30,7 +30,13 @@ from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads, one_thread_of_blas
 from warpbrain.worlds.body.base import Base, BaseFinder
 from warpbrain.worlds.body.causes import UNKNOWN, BodyCauses, causes_of, not_physics_at, unknown_effects, visible
-from warpbrain.worlds.body.dictionary import Candidates, candidates_about_fit, candidates_at, dictionary_of
+from warpbrain.worlds.body.dictionary import (
+    Candidates,
+    candidates_about_fit,
+    candidates_at,
+    dictionary_of,
+    released_anew,
+)
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
@@ -123,6 +129,36 @@ class HypothesisSearch:
         refine = partial(with_refined_places, base, spacing=self.spacing, source=base.effects)
         for candidate in in_threads(refine, singles):
             self._sets[candidate.names] = candidate
+        for single in singles:
+            self._weigh_what_lets_go(self._sets[single.names])
+
+    def _weigh_what_lets_go(self, single: WeightedSet) -> None:
+        """Weigh what may let go beside a mechanism that explains something, under the reactions to that.
+
+        About the base the reactions are those to the declared loads: what slides or lifts off under a load that is
+        missing, too, does nothing there.
+        """
+        [effect], (mean, _) = single.effects, single.coefficients[0]
+        if effect.proposal is None or effect.proposed.over_time is not None:
+            return
+        mechanisms = effect.proposed.acting(effect.coefficients(mean))
+        if single.hypothesis.log_evidence <= self.nothing.hypothesis.log_evidence or not mechanisms:
+            return
+        beside = self.base.effects.beside(mechanisms)
+        released = {
+            kind: of_kind
+            for kind, of_kind in self.candidates.effects.items()
+            if any(each.proposal is not None and each.proposal.follows == "release" for each in of_kind)
+        }
+        if not beside.pushing or not released.keys() - single.names:
+            return
+        effects = {kind: tuple(released_anew(of_kind, beside)) for kind, of_kind in released.items()}
+        marginal = single.marginal
+        causes = visible(causes_of(self.base, replace(self.candidates, effects=effects)), marginal.model)
+        weighing = Weighing(self.base, causes, marginal.sizes, single)
+        unscaled = GaussianModel(marginal.noise.noise_factor / marginal.scale, single.columns)
+        for superset in self._supersets(single, causes, weighing, unscaled):
+            _keep_better(self._sets, replace(superset, inherited_gain=0.0))
 
     def fit(self, alone: bool = False) -> None:
         """Fit sets, and weigh supersets of those that are fitted, until no fit can be expected to change the verdict.

@@ -83,6 +83,13 @@ class HeldSurface:
         self._R = np.einsum("aki,ai->ak", self._frames, at.reactions[self.members])
         self._released: dict[tuple[bytes, bool], Floats] = {}
 
+    def under(self, more: Floats) -> HeldSurface:
+        """The same where reactions are larger by some (N, 3) [N]."""
+        other = copy.copy(self)
+        other._R = self._R + np.einsum("aki,ai->ak", self._frames, more[self.members])
+        other._released = {}
+        return other
+
     def answers(self, at: Linearisation) -> Floats:
         """What the sensors of the same state record where each component of `moved` is 1 m: (n, 3 m)."""
         sensors, free = at.sensors, at.free
@@ -293,18 +300,19 @@ class Linearisation:
         A[:, ~free] = held[different]
         return A, which.ravel()
 
-    def released(self, patch: Bools, held: Bools, lifts: bool) -> Floats:
+    def released(self, patch: Bools, held: Bools, lifts: bool, more: Floats | None = None) -> Floats:
         """Change (n,) of what is recorded if held nodes are released, to first order.
 
         They slide along the surface; where they are under tension they also leave it, if they can.
 
-        `patch` (N,). `held` (N,): the surface that the patch is a part of, all of whose components are held.
-        `SolveError` if too little holds the body without the patch.
+        `patch` (N,). `held` (N,): the surface that the patch is a part of, all of whose components are held. `more`
+        (N, 3): what reactions are larger by [N], see `reactions_to`. `SolveError` if too little holds the body without
+        the patch.
         """
         key = held.tobytes()
         with self._surface_lock:
             surface = self._surface(key, held)
-        moved = surface.moved(patch, lifts)
+        moved = (surface if more is None else surface.under(more)).moved(patch, lifts)
         loose = np.flatnonzero(moved)
         return np.asarray(self._surface_responses[key][:, loose] @ moved[loose])
 
@@ -359,6 +367,12 @@ class Linearisation:
             dR = np.where(self.free[:, None], 0.0, self.stiffness @ du - forces)
             answers += self.sensors.by_reactions @ dR
         return answers
+
+    def reactions_to(self, forces: Floats) -> Floats:
+        """By how much reactions (N, 3) [N] are larger under further nodal forces (N, 3) [N], to first order."""
+        flat = forces.reshape(-1, 1)
+        du = self.displacements(flat)
+        return np.where(self.free[:, None], 0.0, self.stiffness @ du - flat).reshape(forces.shape)
 
     def displacements(self, forces: Floats) -> Floats:
         """Of all components (3 N, k) [m] under nodal forces (3 N, k) [N]."""

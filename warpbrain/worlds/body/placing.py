@@ -25,6 +25,7 @@ from warpbrain.inference.causes import Hypothesis, Member
 from warpbrain.inference.gross_errors import log_densities_of
 from warpbrain.inference.noise import scales
 from warpbrain.mesh.quality import principal_axes
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses, scaled
@@ -223,9 +224,10 @@ def with_refined_places(
         usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
         size = float(np.max(effect.proposed.sd / usual.sd))
         residual = candidate.residual + effect.mean
-        # what lets go has its columns at the base; centres are as far apart as those of a scan's patches
-        at_base = effect.proposed.is_there_or_not
-        apart, about = (BETWEEN * base.at.sensors.radius, base.effects) if at_base else (spacing, source)
+        apart, about = spacing, source
+        if effect.proposed.is_there_or_not:
+            # what lets go: centres are as far apart as those of a scan's patches
+            apart, about = BETWEEN * base.at.sensors.radius, source.beside(_pushing_beside(candidate, number, placed))
         best, gain, log_share = best_in_cell(base, about, effect, size, apart, without, residual)
         columns = candidate.columns.copy()
         columns[:, part] = best.columns
@@ -241,6 +243,17 @@ def with_refined_places(
             log_share=candidate.log_share + log_share,
         ).with_evidence(candidate.hypothesis.log_evidence + gain)
     return replace(candidate, refined=True)
+
+
+def _pushing_beside(candidate: WeightedSet, number: int, placed: int) -> list[Mechanism]:
+    """Mechanisms beside one of a set that its linear model is not about: all but the first ones, which were placed."""
+    acting = list(zip(candidate.effects, candidate.coefficients, strict=True))
+    return [
+        mechanism
+        for other, (effect, (mean, _)) in enumerate(acting)
+        if other >= placed and other != number and effect.proposal is not None and effect.proposed.over_time is None
+        for mechanism in effect.proposed.acting(effect.coefficients(mean))
+    ]
 
 
 def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:

@@ -248,13 +248,15 @@ class States:
         Where several are stable, or none is, iterations that go downhill end in one of them, or nowhere, as they are
         rounded. So they are given up where a tangent is not positive definite, or steps do not contract, for the path
         from the known state; where that turns or branches there is no such state. What is found does not depend on how
-        many iterations are allowed: where rounding decides that one more is taken it would be all or nothing.
+        many iterations are allowed: where rounding decides that one more is taken it would be all or nothing. Where
+        something opens and closes steps need not contract: they do not where it does, though nothing branches.
         """
         factors = self._factors_of(system)
         if known is None:
             return EquilibriumSolver(system, options, factors=factors).solve(external, start)
         most = round(options.max_newton / _SHORTEST)
-        stable = replace(options, pass_unstable=False, contracts=True, max_total_newton=most)
+        smooth = all(term.is_smooth for term in system.terms)
+        stable = replace(options, pass_unstable=False, contracts=smooth, max_total_newton=most)
         try:
             at_once = replace(stable, min_load_step=1.0)
             return EquilibriumSolver(system, at_once, factors=factors).solve(external, start)

@@ -42,7 +42,7 @@ def next_to_fit(
     if named and named[0].mechanisms and not _is_settled(named, expanded):
         chosen = named[0]
     elif part := _part_not_fitted(decision, sets) or _unknown_not_fitted(decision, sets, expanded):
-        return part
+        chosen = part
     elif not rivals:
         return None
     else:
