@@ -263,7 +263,7 @@ def candidates_about_fit(
         for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
             if is_linear(effect, effects.at):
                 of_this_kind[k] = effect
-        if not any(effect.proposed.patch is not None and effect.proposed.is_there_or_not for effect in acting):
+        if not any(effect.lets_go for effect in acting):
             of_this_kind = released_anew(of_this_kind, effects)
         by_kind[kind] = tuple(of_this_kind)
     return replace(candidates, effects=by_kind, source=effects)
@@ -271,7 +271,7 @@ def candidates_about_fit(
 
 def released_anew(of_a_kind: Sequence[Effect], effects: Effects) -> list[Effect]:
     """Effects of a kind, those of what lets go at another state, or beside what pushes; as they were where none is."""
-    released = [k for k, e in enumerate(of_a_kind) if e.proposal is not None and e.proposal.follows == "release"]
+    released = [number for number, effect in enumerate(of_a_kind) if effect.lets_go]
     anew = list(of_a_kind)
     for k, effect in zip(released, switch_effects(effects, [anew[k].proposed for k in released]), strict=True):
         if isinstance(effect, Effect):

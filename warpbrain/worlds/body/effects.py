@@ -92,9 +92,20 @@ class Effect:
         """Whether it acts in a place, with a size of its own there, and may act at another."""
         return self.proposal is not None and self.proposal.elsewhere is not None and not self.proposal.is_there_or_not
 
+    @property
+    def lets_go(self) -> bool:
+        """Whether it is something held that lets go."""
+        return self.proposal is not None and self.proposal.follows == "release"
+
     def coefficients(self, z: Floats) -> Floats:
         """The proposal's own coefficients."""
         return self.proposed.mean + self.proposed.sd * z
+
+    def steady(self, z: Floats) -> list[Mechanism]:
+        """Mechanisms that act at coordinates; none of what is no physics, or changes in time."""
+        if self.proposal is None or self.proposal.over_time is not None or self.proposal.changes_in_time:
+            return []
+        return list(self.proposal.acting(self.coefficients(z)))
 
     def offset(self, z: Floats) -> Floats:
         """Coefficients less those that have no effect (k,) [standard deviations]."""

@@ -138,18 +138,12 @@ class HypothesisSearch:
         About the base the reactions are those to the declared loads: what slides or lifts off under a load that is
         missing, too, does nothing there.
         """
+        if single.hypothesis.log_evidence <= self.nothing.hypothesis.log_evidence:
+            return
         [effect], (mean, _) = single.effects, single.coefficients[0]
-        if effect.proposal is None or effect.proposed.over_time is not None:
-            return
-        mechanisms = effect.proposed.acting(effect.coefficients(mean))
-        if single.hypothesis.log_evidence <= self.nothing.hypothesis.log_evidence or not mechanisms:
-            return
-        beside = self.base.effects.beside(mechanisms)
-        released = {
-            kind: of_kind
-            for kind, of_kind in self.candidates.effects.items()
-            if any(each.proposal is not None and each.proposal.follows == "release" for each in of_kind)
-        }
+        beside = self.base.effects.beside(effect.steady(mean))
+        of_all = self.candidates.effects.items()
+        released = {kind: of_kind for kind, of_kind in of_all if any(each.lets_go for each in of_kind)}
         if not beside.pushing or not released.keys() - single.names:
             return
         effects = {kind: tuple(released_anew(of_kind, beside)) for kind, of_kind in released.items()}

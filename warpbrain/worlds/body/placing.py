@@ -251,8 +251,8 @@ def _pushing_beside(candidate: WeightedSet, number: int, placed: int) -> list[Me
     return [
         mechanism
         for other, (effect, (mean, _)) in enumerate(acting)
-        if other >= placed and other != number and effect.proposal is not None and effect.proposed.over_time is None
-        for mechanism in effect.proposed.acting(effect.coefficients(mean))
+        if other >= placed and other != number
+        for mechanism in effect.steady(mean)
     ]
 
 
