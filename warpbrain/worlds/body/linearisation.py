@@ -48,9 +48,9 @@ _CHANGES = 20
 _FARTHEST = 0.2
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
-#: Columns that one thread computes at a time: of dense forces, and of sparse ones at most; few of these are in so many
-#: parts.
-_TOGETHER, _TOGETHER_SPARSE, _PARTS = 64, 128, 16
+#: Columns that one thread computes at a time at most: of dense forces, of which products with fewer spend most of their
+#: time on copies of the compliance, and of sparse ones; few of these are in so many parts.
+_TOGETHER, _TOGETHER_SPARSE, _PARTS = 256, 128, 16
 #: Part of sparse forces that is not zero above which a dense product is faster.
 _DENSE = 0.1
 
@@ -334,13 +334,14 @@ class Linearisation:
         """Response (n, s, 3) to forces of 1 N in each direction, spread over nodes with weights (N, s)."""
         rows, which = self._rows
         answers = np.empty((3, weights.shape[1], len(rows)))
+        together = _dense_together(weights.shape[1])
 
         def fill(task: tuple[int, int]) -> None:
             axis, first = task
-            columns = slice(first, first + _TOGETHER)
+            columns = slice(first, first + together)
             answers[axis, columns] = (rows[:, axis::3] @ weights[:, columns]).T
 
-        in_threads(fill, list(itertools.product(range(3), range(0, weights.shape[1], _TOGETHER))))
+        in_threads(fill, list(itertools.product(range(3), range(0, weights.shape[1], together))))
         return np.asarray(answers.transpose(2, 1, 0)[which])
 
     def answers_of_columns(self, forces: Any) -> Floats:
@@ -351,22 +352,29 @@ class Linearisation:
         from scipy.sparse import issparse
 
         count = forces.shape[1]
-        self._equilibria += count
-        if "_rows" in self.__dict__ or self._equilibria >= len(self.sensors):
+        if self._are_by_compliance(count):
             rows, which = self._rows
             answers = np.empty((len(rows), count))
             if issparse(forces) and forces.nnz > _DENSE * np.prod(forces.shape):
                 forces = forces.toarray()
-            together = min(_TOGETHER_SPARSE, 1 + count // _PARTS) if issparse(forces) else _TOGETHER
+            together = min(_TOGETHER_SPARSE, 1 + count // _PARTS) if issparse(forces) else _dense_together(count)
             fill_columns(answers, lambda columns: rows @ forces[:, columns], together)
             return answers[which]
-        forces = forces.toarray() if issparse(forces) else forces
+        return self._by_equilibria(forces.toarray() if issparse(forces) else forces)
+
+    def _by_equilibria(self, forces: Floats) -> Floats:
+        """Response (n, k) to forces (3 N, k), without the compliance."""
         du = self.displacements(forces)
         answers = np.asarray(self.sensors.by_displacement @ du)
         if self.sensors.by_reactions.nnz:
             dR = np.where(self.free[:, None], 0.0, self.stiffness @ du - forces)
             answers += self.sensors.by_reactions @ dR
         return answers
+
+    def _are_by_compliance(self, count: int) -> bool:
+        """Whether responses to so many further forces are by the compliance."""
+        self._equilibria += count
+        return "_rows" in self.__dict__ or self._equilibria >= len(self.sensors)
 
     def reactions_to(self, forces: Floats) -> Floats:
         """By how much reactions (N, 3) [N] are larger under further nodal forces (N, 3) [N], to first order."""
@@ -391,16 +399,30 @@ class Linearisation:
         return toward_equilibrium(system, external, start, lambda r: solve(r.reshape(-1, 1)).reshape(-1, 3), tolerance)
 
     def answers_of_elements(self, element_forces: Any, weights: Any) -> Floats:
-        """Response (n, k) to internal forces of elements [N] times weights (m, k).
+        """Response (n, k) to internal forces of elements [N], SciPy sparse (3 N, m), times weights (m, k).
 
-        Forces are an array (m, 4, 3) on the corners, or SciPy sparse (3 N, m); weights an array, or SciPy CSC where
-        most of them are zero.
+        Weights are an array, or SciPy CSC where most of them are zero.
         """
-        if isinstance(element_forces, np.ndarray):
-            element_forces = _gathered(
-                self.system.tetrahedra, element_forces, np.arange(len(element_forces)), self.system
-            )
         return -self.answers_of_columns(element_forces @ weights)
+
+    def answers_of_components(self, element_forces: Floats, weights: Floats) -> Floats:
+        """Response (n, c, k) to components (c, m, 4, 3) of internal forces [N] on corners times weights (m, k) each."""
+        elements, count = np.arange(len(weights)), weights.shape[1]
+        components = [_gathered(self.system.tetrahedra, each, elements, self.system) for each in element_forces]
+        if not self._are_by_compliance(len(components) * count):
+            columns = [self._by_equilibria(-(component @ weights)) for component in components]
+            return np.stack(columns, axis=1)
+        rows, which = self._rows
+        answers = np.empty((len(rows), len(components), count))
+        together = max(_TOGETHER // len(components), 1)
+
+        def fill(first: int) -> None:
+            some = slice(first, first + together)
+            forces = np.concatenate([component @ weights[:, some] for component in components], axis=1)
+            answers[:, :, some] = -(rows @ forces).reshape(len(rows), len(components), -1)
+
+        in_threads(fill, range(0, count, together))
+        return answers[which]
 
     @cached_property
     def element_forces(self) -> Any:
@@ -425,6 +447,15 @@ class Linearisation:
         other = self.system if system is None else system
         other.u.assign(self.u)
         return other.internal_forces()
+
+
+def _dense_together(count: int) -> int:
+    """How many of so many columns of dense forces are computed at a time: no more than half of them, for two threads.
+
+    The same for any number of threads: bits of a product may depend on it.
+    """
+    parts = max(-(-count // _TOGETHER), 2)
+    return max(-(-count // parts), 1)
 
 
 def _element_forces(system: System, u: Floats, weights: Floats, of_moduli: bool = False) -> Any:

@@ -164,8 +164,7 @@ def stress_patches(at: Linearisation, points: Floats, sites: Floats, length: flo
     """
     weights = gaussians(at.system.model.mesh.centres, sites, length)
     forces = unit_stresses(points[at.system.tetrahedra])
-    columns = [at.answers_of_elements(forces[component], weights) for component in range(len(_PAIRS))]
-    return np.concatenate(columns, axis=1)
+    return at.answers_of_components(forces, weights).reshape(len(at.sensors), -1)
 
 
 def unit_stresses(corners: Floats) -> Floats:
