@@ -19,6 +19,7 @@ from warpbrain.report.diagnosis.description import describe
 from warpbrain.report.diagnosis.page import write_page
 from warpbrain.report.diagnosis.text import diagnosis_lines
 from warpbrain.report.files import read_state, write_summary
+from warpbrain.terminal.memory import keep_freed_memory
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import choose_folder, results_in
@@ -53,6 +54,7 @@ def diagnose(options: argparse.Namespace) -> None:
     record: Record = options.record
     say = record.say
 
+    keep_freed_memory()
     start_warp_quietly()
     device = find_device(options.device).alias
     images = warp.requested(options)
