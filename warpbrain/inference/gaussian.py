@@ -68,6 +68,34 @@ class _Spectrum:
 
 
 @dataclass(frozen=True, eq=False)
+class WhiteRows:
+    """Rows in coordinates in which the noise alone is `N(0, I)`, apart from its scale."""
+
+    rows: Floats  # (n,), or (b, n) one after the other
+    projected: Floats  # (q,) or (b, q), `W V`: on the directions
+    values: Floats  # (q,), of the spectrum
+    directions: Floats  # (n, q)
+
+    def __getitem__(self, numbers: Any) -> WhiteRows:
+        return WhiteRows(self.rows[numbers], self.projected[numbers], self.values, self.directions)
+
+    def standardised(self, scale: float) -> Floats:
+        """Rows in coordinates in which the model at a scale is `N(0, I)`, one after the other."""
+        root = np.sqrt(scale**2 + self.values)
+        result = (self.projected / (root * (root + scale))) @ self.directions.T
+        np.subtract(self.rows, result, out=result)
+        result /= scale
+        return np.asarray(result)
+
+    def weights(self, scale: float) -> Floats:
+        """`w` (q,), with which products at a scale are `(x . y - sum_j w_j p_j q_j) / scale^2`, `p` and `q` projected.
+
+        They are those of standardised rows but for rounding, which is relative to products of white ones.
+        """
+        return np.asarray(1.0 / (scale**2 + self.values))
+
+
+@dataclass(frozen=True, eq=False)
 class GaussianModel:
     """Rows with noise and normal coefficients."""
 
@@ -186,19 +214,14 @@ class GaussianModel:
 
     def standardised_at(self, rows: Floats) -> Callable[[float], Floats]:
         """`standardised` rows as a function of the scale: what no scale changes is computed once."""
-        values, directions = self._spectrum.values, self._spectrum.directions
+        white = self.white(rows)
+        return lambda scale: white.standardised(scale).T
+
+    def white(self, rows: Floats) -> WhiteRows:
+        """Rows (n,) or (n, b), of which products at any scale are known."""
         # one row after the other in memory, as the solution has them
         white = self._by_noise(rows).T
-        projected = white @ directions
-
-        def standardised(scale: float) -> Floats:
-            root = np.sqrt(scale**2 + values)
-            result = (projected / (root * (root + scale))) @ directions.T
-            np.subtract(white, result, out=result)
-            result /= scale
-            return np.asarray(result.T)
-
-        return standardised
+        return WhiteRows(white, white @ self._spectrum.directions, self._spectrum.values, self._spectrum.directions)
 
     @cached_property
     def log_determinant(self) -> float:

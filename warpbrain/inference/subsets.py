@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -40,37 +40,77 @@ class ActingColumns:
     log_volume: Floats
 
 
-class Blocks:
+@dataclass(frozen=True, eq=False)
+class _OfWidth:
+    """Products of the white rows of blocks `low` to `high`, all as wide as each other: the same at all scales."""
+
+    low: int
+    high: int
+    gram: Floats  # (b, k, k), of the columns of each block
+    residual: Floats  # (b, k), of these with the residual less the mean of the block
+    square: Floats  # (b,) or (1,), of that residual with itself
+
+
+class _Ordered:
     """Blocks of columns, one a place, those of a cause one after the other, wide causes first.
 
-    `model`: of the rows without a cause.
-    `residual` (n,).
-    `causes`: all with equally many sizes.
-    `cause`, `place` (p,): which cause and which of its places each block is.
+    `cause`, `place` (p,): which cause and which of its places each block is. `log_weights` (p, s).
+    """
+
+    cause: Ints
+    place: Ints
+    log_weights: Floats
+    _width: Ints  # (p,)
+    _first: Ints  # (p + 1,), of the columns of each
+    _sizes: Floats  # (p, s)
+    _mean: Ints  # (p,), number of the mean of each from 1 on; 0 where that is zero
+
+    def __len__(self) -> int:
+        return len(self.cause)
+
+    @cached_property
+    def cause_edges(self) -> Ints:
+        """Numbers (c + 1,) of the first block of each cause in order, and at last how many blocks there are."""
+        return np.flatnonzero(np.diff(self.cause, prepend=-1, append=-1))
+
+    def _runs(self, start: int) -> list[tuple[int, int]]:
+        """First and one past the last of each run of blocks of the same width, from `start` on."""
+        edges = (np.flatnonzero(np.diff(self._width[start:])) + 1 + start).tolist()
+        return list(itertools.pairwise([start, *edges, len(self)]))
+
+
+class Blocks(_Ordered):
+    """Every place of all causes, each by itself.
+
+    `model`: of the rows without a cause. `residual` (n,). `causes`: all with equally many sizes.
     """
 
     def __init__(self, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> None:
-        self._set_standardised(model.standardised(self._stacked(residual, causes)))
+        self._white, self._scale = model.white(self._stacked(residual, causes)), model.scale
+        self._by_width = [self._products(low, high) for low, high in self._runs(0)]
 
-    @classmethod
-    def at(cls, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> Callable[[float], Blocks]:
-        """Blocks as a function of the factor on the noise."""
-        unscaled: Blocks = object.__new__(cls)
-        standardised = model.standardised_at(unscaled._stacked(residual, causes))
+    def at(self, scale: float) -> Blocks:
+        """The same with another factor on the noise."""
+        other = copy.copy(self)
+        other._scale = scale
+        return other
 
-        def blocks_at(scale: float) -> Blocks:
-            blocks = copy.copy(unscaled)
-            blocks._set_standardised(standardised(scale))
-            return blocks
+    def _products(self, low: int, high: int) -> _OfWidth:
+        at, means = self._columns(low, high), self._mean[low:high]
+        of_block = self._white.rows[at].reshape(high - low, -1, self._white.rows.shape[1])
+        residual = self._residuals(self._white.rows, means)
+        b = (of_block @ residual[:, :, None])[:, :, 0]
+        return _OfWidth(low, high, of_block @ of_block.transpose(0, 2, 1), b, np.sum(residual**2, axis=1))
 
-        return blocks_at
+    def _columns(self, low: int, high: int) -> slice:
+        """Numbers of the rows of what is kept of all that are the columns of some blocks."""
+        before = len(self._white.rows) - self._first[-1]
+        return slice(int(before + self._first[low]), int(before + self._first[high]))
 
-    def _set_standardised(self, rows: Floats) -> None:
-        """Set standardised rows (n, 1 + m + q): residual, means and columns; each is one row of what is kept."""
-        last = rows.shape[1] - self._first[-1]
-        self._r, self._Z = rows[:, 0], rows[:, last:].T
-        # the first stands for those that are zero
-        self._means = np.concatenate([np.zeros((1, len(rows))), rows[:, 1:last].T])
+    @staticmethod
+    def _residuals(rows: Floats, means: Ints) -> Floats:
+        """The first of rows less those of means (b, ...); one for all blocks without means."""
+        return rows[0] - np.where((means > 0)[:, None], rows[means], 0.0) if means.any() else rows[:1]
 
     def _stacked(self, residual: Floats, causes: Sequence[Cause]) -> Floats:
         """Rows (n, 1 + m + q) of the residual, means that are given and columns; sets the order of blocks."""
@@ -88,29 +128,48 @@ class Blocks:
         means = [place.mean for place in places if place.mean is not None]
         return np.column_stack([residual, *means, *(place.columns for place in places)])
 
-    def __len__(self) -> int:
-        return len(self.cause)
+    def log_factors(self) -> Floats:
+        """Log Bayes factors (p, s) of each block by itself, with every size."""
+        white, weights = self._white, self._white.weights(self._scale)
+        of_residual, logs = white.projected[0] ** 2 @ weights, []
+        for run in self._by_width:
+            at = white.projected[self._columns(run.low, run.high)].reshape(*run.residual.shape, len(weights))
+            residual = self._residuals(white.projected, self._mean[run.low : run.high])
+            weighted = at * weights
+            M = run.gram - weighted @ at.transpose(0, 2, 1)
+            b = run.residual - (weighted @ residual[:, :, None])[:, :, 0]
+            change = white.rows[0] @ white.rows[0] - of_residual - run.square + residual**2 @ weights
+            log = 0.5 * change * np.ones(run.high - run.low)
+            of_scale = self._scale**2
+            logs.append(_log_factors(M / of_scale, b / of_scale, log / of_scale, self._sizes[run.low : run.high]))
+        return np.concatenate(logs)
 
-    @cached_property
-    def cause_edges(self) -> Ints:
-        """Numbers (c + 1,) of the first block of each cause in order, and at last how many blocks there are."""
-        return np.flatnonzero(np.diff(self.cause, prepend=-1, append=-1))
+    def subset(self, chosen: Ints) -> ActingBlocks:
+        """Some of the blocks by their numbers, in the same order, which may act beside others."""
+        return ActingBlocks(self, np.sort(chosen))
+
+
+class ActingBlocks(_Ordered):
+    """Few blocks, of which all products with each other are known.
+
+    `blocks`: of which they are. `keep` (p,): their numbers, in order.
+    """
+
+    def __init__(self, blocks: Blocks, keep: Ints) -> None:
+        self.cause, self.place, self.log_weights = blocks.cause[keep], blocks.place[keep], blocks.log_weights[keep]
+        self._width, self._sizes, self._mean = blocks._width[keep], blocks._sizes[keep], blocks._mean[keep]
+        self._first = np.concatenate([[0], np.cumsum(self._width)])
+        before = len(blocks._white.rows) - blocks._first[-1]
+        columns = [before + np.arange(blocks._first[k], blocks._first[k + 1]) for k in keep.tolist()]
+        rows = blocks._white[np.concatenate([np.arange(before), *columns])].standardised(blocks._scale)
+        self._r, self._Z = rows[0], rows[before:]
+        # the first stands for those that are zero
+        self._means = np.concatenate([np.zeros((1, rows.shape[1])), rows[1:before]])
 
     @cached_property
     def _gram(self) -> Floats:
-        """`Z^T Z` of all blocks: of few places, since each pair of these is weighed with every size."""
+        """`Z^T Z` of all blocks: each pair of them is weighed with every size."""
         return self._Z @ self._Z.T
-
-    def subset(self, chosen: Ints) -> Blocks:
-        """Some of the blocks by their numbers, in the same order."""
-        other: Blocks = object.__new__(Blocks)
-        keep = np.sort(chosen)
-        other.cause, other.place, other.log_weights = self.cause[keep], self.place[keep], self.log_weights[keep]
-        other._width, other._sizes = self._width[keep], self._sizes[keep]
-        other._first = np.concatenate([[0], np.cumsum(other._width)])
-        columns = np.concatenate([np.arange(self._first[k], self._first[k + 1]) for k in keep.tolist()])
-        other._r, other._Z, other._means, other._mean = self._r, self._Z[columns], self._means, self._mean[keep]
-        return other
 
     def acting(self, members: Sequence[int], sizes: Sequence[Sequence[int]]) -> ActingColumns:
         """Blocks by number as columns that act together with others, once with each row (a, m) of numbers of sizes."""
@@ -121,52 +180,46 @@ class Blocks:
         log_volume = 0.5 * np.linalg.slogdet(inverse)[1] - np.log(deviations).sum(axis=1)
         return ActingColumns(columns, self._means[self._mean[members]].sum(axis=0), inverse, log_volume)
 
-    def log_factors(self, acting: ActingColumns | None = None, start: int = 0) -> Floats:
-        """Log Bayes factors (p - start, s) of blocks from `start` on, with every size.
+    def log_factors_beside(self, acting: ActingColumns, start: int = 0) -> Floats:
+        """Log Bayes factors (a, p - start, s) of blocks from `start` on and what acts together, against neither.
 
-        `acting`: columns that act together with each block: factors (a, p - start, s) are then of both together,
-        against neither, with each combination of its sizes.
-        `start`: number of the first block.
+        With every size of a block, and each combination of sizes of what acts.
         """
-        combinations = () if acting is None else (len(acting.inverse),)
-        logs = np.empty((*combinations, len(self) - start, self._sizes.shape[1]))
-        widths = self._width[start:]
-        # those of the same width are next to each other
-        edges = np.flatnonzero(np.diff(widths)) + 1
-        for low, high in zip([0, *edges.tolist()], [*edges.tolist(), len(widths)], strict=True):
-            logs[..., low:high, :] = self._log_factors_of_width(np.arange(start + low, start + high), acting)
-        return logs
+        return np.concatenate([self._beside(acting, low, high) for low, high in self._runs(start)], axis=1)
 
-    def _log_factors_of_width(self, blocks: Ints, acting: ActingColumns | None) -> Floats:
-        """Log Bayes factors (b, s), or (a, b, s) beside what acts, of blocks that are all as wide as each other."""
-        count, width = len(blocks), int(self._width[blocks[0]])
-        at = slice(self._first[blocks[0]], self._first[blocks[-1] + 1])
-        of_block, means, sizes = self._Z[at].reshape(count, width, -1), self._mean[blocks], self._sizes[blocks]
-        if acting is None:
-            M = of_block @ of_block.transpose(0, 2, 1)
-        else:
-            numbers = np.arange(at.start, at.stop).reshape(count, width)
-            M = self._gram[numbers[:, :, None], numbers[:, None, :]]
-        r = self._r if acting is None else self._r - acting.mean
+    def _beside(self, acting: ActingColumns, low: int, high: int) -> Floats:
+        """The same (a, b, s) of blocks `low` to `high`, that are all as wide as each other."""
+        at, means = slice(int(self._first[low]), int(self._first[high])), self._mean[low:high]
+        count, numbers = high - low, np.arange(at.start, at.stop).reshape(high - low, -1)
+        width = numbers.shape[1]
+        of_block, M = self._Z[at].reshape(count, width, -1), self._gram[numbers[:, :, None], numbers[:, None, :]]
+        r = self._r - acting.mean
         # one for all blocks without means
         residual = r - self._means[means] if means.any() else r[None]
         b = (of_block @ residual[:, :, None])[:, :, 0]
         log = 0.5 * (self._r @ self._r - np.sum(residual**2, axis=1)) * np.ones(count)
-        if acting is not None:
-            A, projection = acting.inverse, self._Z[acting.numbers] @ residual.T
-            # (k, b w) and, eliminated, (a, k, b w)
-            C = self._gram[acting.numbers, at]
-            AC = A @ C
-            of_pairs = AC.reshape(*AC.shape[:2], count, width).transpose(0, 2, 3, 1)
-            M = M - of_pairs @ C.reshape(-1, count, width).transpose(1, 0, 2)
-            b = b - np.sum(of_pairs * projection.T[:, None], axis=3)
-            log = log + 0.5 * np.sum(projection * (A @ projection), axis=1) + acting.log_volume[:, None]
-        values, vectors = np.linalg.eigh(M)
-        projected = (b[..., None, :] @ vectors) ** 2
-        ratio = sizes[:, :, None] ** 2
-        grown = ratio * np.maximum(values, 0.0)[..., None, :]
-        explained = np.sum(ratio * projected / (1.0 + grown), axis=-1)
-        return np.asarray(log[..., None] + 0.5 * (explained - np.sum(np.log1p(grown), axis=-1)))
+        A, projection = acting.inverse, self._Z[acting.numbers] @ residual.T
+        # (k, b w) and, eliminated, (a, k, b w)
+        C = self._gram[acting.numbers, at]
+        AC = A @ C
+        of_pairs = AC.reshape(*AC.shape[:2], count, width).transpose(0, 2, 3, 1)
+        M = M - of_pairs @ C.reshape(-1, count, width).transpose(1, 0, 2)
+        b = b - np.sum(of_pairs * projection.T[:, None], axis=3)
+        log = log + 0.5 * np.sum(projection * (A @ projection), axis=1) + acting.log_volume[:, None]
+        return _log_factors(M, b, log, self._sizes[low:high])
+
+
+def _log_factors(M: Floats, b: Floats, log: Floats, sizes: Floats) -> Floats:
+    """Log Bayes factors (..., b, s) of blocks with `M` (..., b, k, k), `b` (..., b, k) and every size (b, s).
+
+    `log` (..., b): of what does not depend on their sizes.
+    """
+    values, vectors = np.linalg.eigh(M)
+    projected = (b[..., None, :] @ vectors) ** 2
+    ratio = sizes[:, :, None] ** 2
+    grown = ratio * np.maximum(values, 0.0)[..., None, :]
+    explained = np.sum(ratio * projected / (1.0 + grown), axis=-1)
+    return np.asarray(log[..., None] + 0.5 * (explained - np.sum(np.log1p(grown), axis=-1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +255,7 @@ class _Sums:
             self.best[causes] = best
 
     def add_blocks(
-        self, blocks: Blocks, start: int, logs: Floats, members: tuple[Member, ...], scale: float
+        self, blocks: _Ordered, start: int, logs: Floats, members: tuple[Member, ...], scale: float
     ) -> list[Configuration]:
         """Add log densities (p, s) of blocks from `start` on together with members; returns the best of each cause."""
         acting = {member.cause for member in members}
@@ -232,7 +285,7 @@ class _Sums:
 
     @staticmethod
     def _configuration(
-        blocks: Blocks, number: int, logs: Floats, members: tuple[Member, ...], scale: float
+        blocks: _Ordered, number: int, logs: Floats, members: tuple[Member, ...], scale: float
     ) -> Configuration:
         """A block with its best size, of which there are log densities (s,), after other members."""
         size = int(np.argmax(logs))
@@ -265,12 +318,12 @@ def posterior(
     `model`: of rows (n,) on which no cause acts. `residual` (n,).
     """
     sums = _Sums(1 + search.elsewhere)
-    blocks_at = Blocks.at(model, residual, causes) if causes else None
+    unscaled = Blocks(model, residual, causes) if causes else None
 
     def weighed_at(scale: float) -> tuple[float, Blocks | None, Floats]:
         """Log density without any cause, blocks and their log Bayes factors."""
         none = float(model.with_scale(scale).log_density(residual))
-        blocks = None if blocks_at is None else blocks_at(scale)
+        blocks = None if unscaled is None else unscaled.at(scale)
         return none, blocks, np.zeros((0, 0)) if blocks is None else blocks.log_factors()
 
     by_scale: list[tuple[float, float, Blocks, Floats]] = []
@@ -326,7 +379,7 @@ def _best_places(blocks: Blocks, logs: Floats, most: int) -> Ints:
     return np.concatenate(chosen)
 
 
-def _add_pairs(sums: _Sums, blocks: Blocks, none: float, scale: float) -> list[Configuration]:
+def _add_pairs(sums: _Sums, blocks: ActingBlocks, none: float, scale: float) -> list[Configuration]:
     """Add every pair of causes; returns the best configurations with each first member."""
     best = []
     for first in range(len(blocks)):
@@ -335,7 +388,7 @@ def _add_pairs(sums: _Sums, blocks: Blocks, none: float, scale: float) -> list[C
         if start == len(blocks):
             break
         sizes = range(blocks.log_weights.shape[1])
-        together = blocks.log_factors(blocks.acting([first], [[size] for size in sizes]), start)
+        together = blocks.log_factors_beside(blocks.acting([first], [[size] for size in sizes]), start)
         for size in sizes:
             member = Member(int(blocks.cause[first]), int(blocks.place[first]), size)
             logs = together[size] + blocks.log_weights[start:] + blocks.log_weights[first, size] + none
@@ -343,14 +396,14 @@ def _add_pairs(sums: _Sums, blocks: Blocks, none: float, scale: float) -> list[C
     return best
 
 
-def _add_triples(sums: _Sums, blocks: Blocks, none: float, pairs: Sequence[Configuration]) -> None:
+def _add_triples(sums: _Sums, blocks: ActingBlocks, none: float, pairs: Sequence[Configuration]) -> None:
     """Add a third cause to good pairs; of a triple that extends several pairs the greatest sum counts."""
     number = {(c, p): k for k, (c, p) in enumerate(zip(blocks.cause.tolist(), blocks.place.tolist(), strict=True))}
     by_pair: dict[tuple[int, int], _Sums] = {}
     for pair in pairs:
         members = [number[member.cause, member.place] for member in pair.members]
         sizes = [member.size for member in pair.members]
-        [factors] = blocks.log_factors(blocks.acting(members, [sizes]))
+        [factors] = blocks.log_factors_beside(blocks.acting(members, [sizes]))
         logs = factors + blocks.log_weights + none + blocks.log_weights[members, sizes].sum()
         extended = by_pair.setdefault((pair.members[0].cause, pair.members[1].cause), _Sums())
         extended.add_blocks(blocks, 0, logs, pair.members, pair.scale)
