@@ -8,8 +8,9 @@ its columns, with the residuals of the state that was reached, as long as each i
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class Base:
     effects: Effects
     nuisances: Nuisances
     unknown: dict[str, Floats]  # (n, k), columns of unknown fields, of 1 m
-    sources: tuple[Effect, ...]  # unknown, in one place
+    begun_sources: Callable[[], tuple[Effect, ...]]  # which waits for `sources`
     resistance: Floats  # (n, k), unknown, of tissue; see `resistances`
     #: Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
     model: GaussianModel
@@ -66,6 +67,11 @@ class Base:
     residual: Floats  # (n,), of the linear model with all nuisances at their prior mean
     mesh_errors: MeshErrors | None  # of the base; None: the mesh is taken for exact
     remarks: tuple[str, ...]
+
+    @cached_property
+    def sources(self) -> tuple[Effect, ...]:
+        """Unknown, in one place."""
+        return self.begun_sources()
 
     @property
     def typical_noise(self) -> float:
@@ -148,6 +154,8 @@ class BaseFinder:
 
     def _base(self, declared: SolvedState, state: SolvedState, errors: MeshErrors | None) -> Base:
         linear = _LinearModel(self, state, errors)
+        # products with the compliance, which leave Python's lock alone, beside candidates that do not
+        begun_sources = beside(partial(sources, linear.at, self._spacing, linear.typical_noise))
         unknown = fields(linear.at, linear.lengths, linear.body_forces)
         nuisances, factor = linear.nuisances, linear.noise_factor
         if errors is not None and not self._without_nuisances:
@@ -162,7 +170,7 @@ class BaseFinder:
             linear.effects,
             nuisances,
             unknown,
-            sources(linear.at, self._spacing, linear.typical_noise),
+            begun_sources,
             resistances(linear.at, self.states.times, other_volume(self.states), next(iter(unknown.values()))),
             GaussianModel(factor, nuisances.columns),
             _noises(linear, resolved=errors is None or self._without_nuisances),
