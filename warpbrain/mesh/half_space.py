@@ -11,7 +11,6 @@ speed `r` along its normal changes the integral over what is above it by
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +27,8 @@ _RULE = np.full((4, 4), _ALPHA) + (1.0 - 4.0 * _ALPHA) * np.eye(4)
 #: quadrilateral 0 1 2 3.
 _WEDGE = ((0, 1, 2, 3), (1, 2, 3, 4), (2, 3, 4, 5))
 _QUADRILATERAL = ((0, 1, 2), (0, 2, 3))
+#: Levels of a mesh whose integrals are kept.
+_KEPT = 4
 
 
 def integrals_of_shapes(mesh: TetMesh | QuadraticMesh) -> Floats:
@@ -43,13 +44,21 @@ def integrals_above(mesh: TetMesh | QuadraticMesh, up: ArrayLike, level: float) 
     `up` (3,): unit normal of the plane. `level`: its distance from the origin along `up` [m]. Returns (m, 4) or
     (m, 10) [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`; not to be written to.
     """
-    return _integrals_above(mesh, tuple(np.asarray(up, dtype=np.float64).tolist()), float(level))
+    # states of a body under other hypotheses, and those on its finer mesh, are asked for one level again and again
+    corners = mesh if isinstance(mesh, TetMesh) else mesh.corners
+    kept = corners.shared.setdefault("integrals above", {})
+    key = type(mesh), *np.asarray(up, dtype=np.float64).tolist(), float(level)
+    found = kept.get(key)
+    if found is None:
+        for earliest in list(kept)[: max(len(kept) + 1 - _KEPT, 0)]:
+            kept.pop(earliest, None)
+        found = kept[key] = _integrals_above(mesh, np.asarray(up, dtype=np.float64), float(level))
+    return np.asarray(found)
 
 
-@lru_cache(maxsize=4)
-def _integrals_above(mesh: TetMesh | QuadraticMesh, up: tuple[float, ...], level: float) -> Floats:
-    """The same, kept: states of a body under other hypotheses are asked for one level again and again."""
-    cut = _Cut(mesh, np.array(up), level)
+def _integrals_above(mesh: TetMesh | QuadraticMesh, up: Floats, level: float) -> Floats:
+    """The same, computed anew."""
+    cut = _Cut(mesh, up, level)
     whole = integrals_of_shapes(mesh)
     integrals = np.where((cut.count == 4)[:, None], whole, 0.0)
     for elements, corners, sign in cut.solids():
