@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
+
+Made = TypeVar("Made")
 
 #: Rounding errors of eigenvalues of `W^T W`, in variances of the noise, with which singular values of `W` are computed.
 _ROUNDED = 1e-3
@@ -26,6 +28,8 @@ class _Noise:
 
     def __init__(self, factor: Floats) -> None:
         self._factor = factor
+        #: What was made of it last, and of what else.
+        self.made: tuple[object, Any] | None = None
 
     @cached_property
     def covariance(self) -> Floats:
@@ -142,6 +146,14 @@ class GaussianModel:
     def noise_covariance(self) -> Floats:
         """`kappa^2 L L^T` (n, n)."""
         return self.scale**2 * self._noise.covariance
+
+    def once(self, of: object, make: Callable[[GaussianModel], Made]) -> Made:
+        """What is made of the noise, whatever its scale, and of an object; all models of the noise keep the last."""
+        known = self._noise.made
+        if known is None or known[0] is not of:
+            known = self._noise.made = of, make(self)
+        made: Made = known[1]
+        return made
 
     @cached_property
     def _noise(self) -> _Noise:

@@ -80,6 +80,11 @@ class PointNoise:
             logs = np.linalg.slogdet(noise)[1].tolist()
             self.inverse |= zip(numbers.tolist(), zip(np.linalg.inv(noise), logs, strict=True), strict=True)
 
+    @classmethod
+    def of(cls, model: GaussianModel, points: Sequence[Ints]) -> PointNoise:
+        """The same, made once for all models with that noise."""
+        return model.once(points, lambda any_model: cls(any_model, points))
+
 
 class PointRows:
     """Rows of recorded points under a model: what hypotheses with further columns have in common.
@@ -162,7 +167,7 @@ class FurtherColumns:
 
 def with_gross_errors(model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> GrossErrors:
     """Density of rows where some points may be gross errors: `PointRows`, with the causes among the columns."""
-    return PointRows(model, residual, PointNoise(model, points)).with_gross_errors(prior)
+    return PointRows(model, residual, PointNoise.of(model, points)).with_gross_errors(prior)
 
 
 def log_densities_of(
@@ -173,7 +178,7 @@ def log_densities_of(
     `model`: of the rows without any of them. `residual` (n,). `points`: rows of each point. `tried`: mean (n,) and
     columns (n, j) of each.
     """
-    rows, prior = PointRows(model, residual, PointNoise(model, points)), outliers()
+    rows, prior = PointRows(model, residual, PointNoise.of(model, points)), outliers()
     # one pass over the inverse for all
     weighted = model.precision_times(np.column_stack([np.column_stack(each) for each in tried]))
     first = np.cumsum([0, *(1 + columns.shape[1] for _, columns in tried)]).tolist()
@@ -282,7 +287,7 @@ class _Search:
             of_points = added[:, group.rows]
             less.append(precision - np.einsum("kig,kjg->ijg", of_points, of_points))
         self._precisions = less
-        log_determinant += 2.0 * float(np.log(np.diag(factor)).sum())
+        log_determinant += 2.0 * float(np.log(factor.diagonal()).sum())
         self.log_density += 0.5 * float(residual @ residual) - 0.5 * log_determinant
 
     def log_ratios(self) -> Floats:
@@ -378,7 +383,7 @@ class RowsAtScales:
     def __init__(
         self, model: GaussianModel, residual: Floats, points: Sequence[Ints], further: Floats | None = None
     ) -> None:
-        self._model, self._residual, self._noise = model, residual, PointNoise(model, points)
+        self._model, self._residual, self._noise = model, residual, PointNoise.of(model, points)
         self._further = np.zeros((len(residual), 0)) if further is None else further
         self._values, self._log_prior = scales()
         self._weighted = model.precision_at(np.column_stack([residual, self._further]))
