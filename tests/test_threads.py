@@ -5,16 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from warpbrain.threads import (
-    MOST,
-    at_once,
-    beside,
-    fill_columns,
-    in_threads,
-    is_working_beside,
-    processors,
-    thread_count,
-)
+from warpbrain.threads import MOST, beside, fill_columns, in_threads, is_working_beside, processors, thread_count
 
 
 @pytest.mark.parametrize(
@@ -117,20 +108,3 @@ def test_what_works_beside_is_known_until_it_is_done(monkeypatch):
     assert is_working_beside()
     done.set()
     assert wait() and not is_working_beside()
-
-
-@pytest.mark.parametrize("said", ["1", "2"])
-def test_of_several_at_once_each_gives_or_raises_its_own(monkeypatch, said):
-    monkeypatch.setenv("OMP_NUM_THREADS", said)
-    begun = []
-
-    def fail() -> int:
-        begun.append("failing")
-        raise ValueError("this one")
-
-    first, second = at_once([lambda: 7, fail])
-    assert first() == 7
-    # with one thread nothing is done that is not asked for
-    assert begun == ([] if said == "1" else ["failing"])
-    with pytest.raises(ValueError, match="this one"):
-        second()

@@ -84,22 +84,6 @@ def is_working_beside() -> bool:
     return any(not begun.done() for begun in _begun)
 
 
-def at_once(works: Sequence[Callable[[], Made]]) -> list[Callable[[], Made]]:
-    """What several functions make, or raise: of all at once where there may be threads, else of each when asked for."""
-    if thread_count() < 2 or is_part():
-        return list(works)
-
-    def attempt(work: Callable[[], Made]) -> Callable[[], Made]:
-        done: Future[Made] = Future()
-        try:
-            done.set_result(work())
-        except Exception as error:
-            done.set_exception(error)
-        return done.result
-
-    return in_threads(attempt, works)
-
-
 @cache
 def _pool(count: int, process: int) -> ThreadPoolExecutor:
     """Threads that stay, in one process: a copy of it would have none of them."""

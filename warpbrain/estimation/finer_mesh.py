@@ -180,17 +180,6 @@ class FinerMesh:
         # to its mesh, its model and its displacement
         self._last: tuple[Any, Model, Floats] | None = None
 
-    def beside(self) -> FinerMesh:
-        """One that knows the same states, and may solve others at the same time."""
-        other = FinerMesh(self._device)
-        other._earlier = list(self._earlier)
-        return other
-
-    def learn_from(self, other: FinerMesh) -> None:
-        """Begin at states of another one, too."""
-        known = {id(state) for state in self._earlier}
-        self._earlier = [*self._earlier, *(state for state in other._earlier if id(state) not in known)][-_KEPT - 1 :]
-
     def difference(
         self, case: Case, theta: Floats, system: System, u: Floats, reactions: Floats, tolerance: float = ROUGH
     ) -> Difference:

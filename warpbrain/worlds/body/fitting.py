@@ -10,7 +10,6 @@ searches are rough.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -516,18 +515,6 @@ class Fitter:
         self.base = base
         self.mesh_errors = base.mesh_errors
         self.finer = FinerStates(base.states) if base.mesh_errors is None else base.mesh_errors.finer
-
-    def beside(self) -> Fitter:
-        """Another one that may fit at the same time, with what this one knows now."""
-        other = copy.copy(self)
-        other.base = replace(self.base, states=self.base.states.beside())
-        other.finer = self.finer.beside(other.base.states)
-        return other
-
-    def learn_from(self, other: Fitter) -> None:
-        """Begin states on the finer mesh at those of another one, too."""
-        self.finer.learn_from(other.finer)
-        self.base.states.solves += other.base.states.solves
 
     def fit(
         self,

@@ -7,9 +7,9 @@ weighed in the linear model about its fit, where what acts already is as large a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -27,7 +27,7 @@ from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
-from warpbrain.threads import at_once, in_threads, one_thread_of_blas
+from warpbrain.threads import in_threads, one_thread_of_blas
 from warpbrain.worlds.body.base import Base, BaseFinder
 from warpbrain.worlds.body.causes import UNKNOWN, BodyCauses, causes_of, not_physics_at, unknown_effects, visible
 from warpbrain.worlds.body.dictionary import (
@@ -58,16 +58,6 @@ _MOST = 10
 _BETTER = 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class _BegunFit:
-    """The fit of a set in the linear model about a fitted one, or about the base, and what waits for it."""
-
-    candidate: WeightedSet
-    subset: WeightedSet | None
-    fitter: Fitter
-    result: Callable[[], Refit]
-
-
 class HypothesisSearch:
     """Weighs sets of causes. `spacing`: between the places of a scan [m]."""
 
@@ -82,8 +72,6 @@ class HypothesisSearch:
         self._expanded: dict[frozenset[str], Effects] = {}
         # fitted sets about which nothing is linear
         self._unstable: set[frozenset[str]] = set()
-        # fits that are done, or to be done, of sets as they were
-        self._begun: dict[frozenset[str], _BegunFit] = {}
 
     @property
     def weighted_sets(self) -> tuple[WeightedSet, ...]:
@@ -185,7 +173,6 @@ class HypothesisSearch:
                 continue
             number += 1
             if chosen.refit is None:
-                self._fit_at_once(chosen, expanded, rivals=number < _MOST)
                 self._fit(chosen.names)
                 continue
             try:
@@ -232,55 +219,22 @@ class HypothesisSearch:
         """Sets with exactly these mechanisms, the most probable first."""
         return [candidate for candidate in self.weighted_sets if frozenset(candidate.mechanisms) == mechanisms]
 
-    def _fit_at_once(self, chosen: WeightedSet, expanded: Collection[frozenset[str]], rivals: bool) -> None:
-        """Fit a set, and at the same time the one that is fitted after it unless its evidence changes that.
-
-        Where both are weighed about a fit: about the base the first fit changes too much. Either fit begins where it
-        would without the other, so that what comes out does not depend on the number of threads.
-        """
-        if chosen.names in self._begun or not self.base.at.system.device.is_cpu:
-            return
-        others = [replace(s, failure="is being fitted") if s is chosen else s for s in self.weighted_sets]
-        following = next_to_fit(others, self.probabilities, expanded, rivals)
-        if following is None or following.refit is not None:
-            return
-        if any(self._fitted_subset(each) is None for each in (chosen, following)):
-            return
-        fits = [self._fit_of(chosen, self._fitter), self._fit_of(following, self._fitter.beside())]
-        results = at_once([fit.result for fit in fits])
-        self._begun |= {
-            each.names: replace(fit, result=result)
-            for each, fit, result in zip((chosen, following), fits, results, strict=True)
-        }
-
-    def _fit_of(self, candidate: WeightedSet, fitter: Fitter) -> _BegunFit:
-        """The fit of a set as it is now, to be done."""
+    def _fit(self, names: frozenset[str]) -> None:
+        """Fit a set; one that cannot be fitted keeps the reason."""
+        candidate = self._sets[names]
+        self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
         subset = self._fitted_subset(candidate)
         if candidate.refit is None:
             source = self.base.effects if subset is None else self._expanded[subset.names]
             placed = 0 if subset is None else len(subset.effects)
-            refined = with_refined_places(self.base, candidate, self.spacing, source, placed)
-            self._sets[candidate.names] = candidate = refined
+            candidate = with_refined_places(self.base, candidate, self.spacing, source, placed)
         starts, nearby = [candidate.coordinates], None
         if self.nothing.refit is not None and subset is None:
             starts.append(self._coordinates_about(self.nothing.refit, candidate))
             nearby = self.nothing.refit.state
         about = None if subset is None else subset.refit
-        fit = partial(fitter.fit, candidate.effects, candidate.columns, starts, candidate.marginal, nearby, about)
-        return _BegunFit(candidate, subset, fitter, fit)
-
-    def _fit(self, names: frozenset[str]) -> None:
-        """Fit a set; one that cannot be fitted keeps the reason."""
-        self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
-        fit = self._begun.pop(names, None)
-        candidate = self._sets[names]
-        if fit is None or fit.candidate is not candidate or fit.subset is not self._fitted_subset(candidate):
-            fit = self._fit_of(candidate, self._fitter)
-            candidate = fit.candidate
         try:
-            refit = fit.result()
-            if fit.fitter is not self._fitter:
-                self._fitter.learn_from(fit.fitter)
+            refit = self._fitter.fit(candidate.effects, candidate.columns, starts, candidate.marginal, nearby, about)
         except CANNOT_BE_FITTED as error:
             self._sets[names] = replace(candidate, failure=str(error))
             return
@@ -363,7 +317,6 @@ class HypothesisSearch:
     def release(self) -> None:
         """Let go of factors and of the finer mesh, which no result needs: hundreds of megabytes at 5,000 nodes."""
         self._expanded.clear()
-        self._begun.clear()
         self._fitter.finer.release()
 
     def _forget_supersets(self, names: frozenset[str]) -> None:

@@ -75,16 +75,6 @@ class FinerStates:
         self.states = states
         self._finer = FinerMesh(states.device)
 
-    def beside(self, states: States) -> FinerStates:
-        """Those of the same states as others that may be solved at the same time; see `States.beside`."""
-        other = FinerStates(states)
-        other._finer = self._finer.beside()
-        return other
-
-    def learn_from(self, other: FinerStates) -> None:
-        """Begin at states of others, too."""
-        self._finer.learn_from(other._finer)
-
     def release(self) -> None:
         """Let go of the finer mesh and of all that was computed on it; a further error makes them anew."""
         self._finer = FinerMesh(self.states.device)

@@ -7,7 +7,6 @@ to all of them (Nystroem's method; Williams and Seeger 2001).
 
 from __future__ import annotations
 
-import copy
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -133,12 +132,6 @@ class States:
         self.modes = stiffness_modes(case.remaining[0], case.heterogeneity or belief("tissue.field"))
         self.solves = 0
         self._factors: dict[tuple[str, ...], KeptFactors] = {}
-
-    def beside(self) -> States:
-        """The same, solved at the same time as these by another thread."""
-        other = copy.copy(self)
-        other._near, other._factors, other.solves = dict(self._near), {}, 0
-        return other
 
     def realign(self, motion: Floats) -> None:
         """Move recordings back by a rigid motion (6,); see `realigned`."""
