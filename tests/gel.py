@@ -1,5 +1,6 @@
-"""Blocks of gel that are held on one side."""
+"""Blocks of gel that are held on one side, and beads that were tracked in them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import NeoHookean
+from warpbrain.recordings.location import locate
+from warpbrain.recordings.recording import PointsRecording
 
 
 def block_of_gel(cells: tuple[int, int, int], sides: tuple[float, float, float], axis: int, mu: float, **more) -> Case:
@@ -30,3 +33,10 @@ def block_of_gel(cells: tuple[int, int, int], sides: tuple[float, float, float],
         boundaries=(Fixed(name="foot", nodes="foot"),),
         **more,
     )
+
+
+def with_beads(case: Case, u: np.ndarray, at: np.ndarray, noise: float, rng: np.random.Generator) -> Case:
+    """A case that records a displacement of its nodes (N, 3) [m] at points (n, 3) [m], with noise [m] of each axis."""
+    moved = locate(case.mesh.points, case.mesh.tetrahedra, at).interpolate(u) + noise * rng.normal(size=at.shape)
+    beads = PointsRecording(name="beads", file="beads.csv", role="fit", points=at, displacement=moved, sigma=noise)
+    return replace(case, recordings=(beads,))

@@ -319,7 +319,12 @@ class Proposal:
     @property
     def is_there_or_not(self) -> bool:
         """Whether it has no size, only a share that says how exactly it is simulated."""
-        return self.follows in ("switch", "release")
+        return self.follows == "switch" or self.is_release
+
+    @property
+    def is_release(self) -> bool:
+        """Whether nodes that are held are released where it acts."""
+        return self.follows == "release"
 
     @property
     def changes_in_time(self) -> bool:

@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gel import block_of_gel
+from gel import block_of_gel, with_beads
 
 from warpbrain.diagnosis.diagnose import diagnose
 from warpbrain.physics.mechanisms.gravity import Gravity
-from warpbrain.recordings.location import locate
-from warpbrain.recordings.recording import PointsRecording
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
@@ -25,14 +23,11 @@ def test_its_weight_is_found(mesh_error: bool) -> None:
     """With the mesh taken for exact, and with its error as it is found."""
     sides = LENGTH, HEIGHT, HEIGHT
     case = block_of_gel((10, 3, 3), sides, axis=0, mu=5000.0, gravity_axis=(0.0, 0.0, -1.0))
-    mesh = case.mesh
     weight = Gravity(direction=(0.0, 0.0, -1.0), density=1000.0)
     model = model_of(replace(case, mechanisms=(weight,)))
     u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u
     assert -u[:, 2].min() > 0.5 * LENGTH
     rng = np.random.default_rng(0)
     x = np.array([LENGTH, HEIGHT, HEIGHT]) * rng.uniform(0.03, 0.97, (POINTS, 3))
-    moved = locate(mesh.points, mesh.tetrahedra, x).interpolate(u) + NOISE * rng.normal(size=x.shape)
-    beads = PointsRecording(name="beads", file="beads.csv", role="fit", points=x, displacement=moved, sigma=NOISE)
-    found = diagnose(replace(case, recordings=(beads,)), DiagnosisOptions(mesh_error=mesh_error), "cpu")
+    found = diagnose(with_beads(case, u, x, NOISE, rng), DiagnosisOptions(mesh_error=mesh_error), "cpu")
     assert found.decision.causes == ("gravity",)

@@ -4,14 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gel import block_of_gel
+from gel import block_of_gel, with_beads
 
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
 from warpbrain.physics.mechanisms.contact import Contact
 from warpbrain.physics.mechanisms.gravity import Gravity
-from warpbrain.recordings.location import locate
-from warpbrain.recordings.recording import PointsRecording
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
@@ -33,9 +31,7 @@ def recorded(loose_below: float) -> Case:
     u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u
     rng = np.random.default_rng(0)
     at = SIDE * rng.uniform(0.05, 0.95, (POINTS, 3))
-    moved = locate(mesh.points, mesh.tetrahedra, at).interpolate(u) + NOISE * rng.normal(size=at.shape)
-    beads = PointsRecording(name="beads", file="beads.csv", role="fit", points=at, displacement=moved, sigma=NOISE)
-    return replace(case, recordings=(beads,))
+    return with_beads(case, u, at, NOISE, rng)
 
 
 @pytest.fixture(scope="module")

@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gel import block_of_gel
+from gel import block_of_gel, with_beads
 
 from warpbrain.physics.mechanisms.traction import Traction
-from warpbrain.recordings.location import locate
-from warpbrain.recordings.recording import PointsRecording
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
@@ -24,7 +22,6 @@ SIDE, NOISE, CENTRE, POINTS = 0.06, 1e-4, np.array([0.02, 0.034, 0.06]), 60
 @pytest.fixture(scope="module")
 def search() -> HypothesisSearch:
     case = block_of_gel((6, 6, 6), (SIDE, SIDE, SIDE), axis=2, mu=1000.0)
-    mesh = case.mesh
     x, y, z = CENTRE.tolist()
     pull = Traction(centre=(x, y, z), value=(150.0, 0.0, 1200.0), radius=0.02)
     model = model_of(replace(case, mechanisms=(pull,)))
@@ -32,9 +29,7 @@ def search() -> HypothesisSearch:
     assert np.linalg.norm(u, axis=1).max() > 6e-3
     rng = np.random.default_rng(0)
     at = SIDE * rng.uniform(0.05, 1.0, (POINTS, 3))
-    moved = locate(mesh.points, mesh.tetrahedra, at).interpolate(u) + NOISE * rng.normal(size=at.shape)
-    beads = PointsRecording(name="beads", file="beads.csv", role="fit", points=at, displacement=moved, sigma=NOISE)
-    found = screened(replace(case, recordings=(beads,)), "cpu", mesh_error=False, mechanisms=["traction"])
+    found = screened(with_beads(case, u, at, NOISE, rng), "cpu", mesh_error=False, mechanisms=["traction"])
     found.fit(alone=True)
     return found
 

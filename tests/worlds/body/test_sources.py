@@ -1,11 +1,11 @@
 """What has no name and acts in one place."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 import pytest
-from gel import block_of_gel
+from gel import block_of_gel, with_beads
 from shapes import box
 
 from warpbrain.diagnosis.diagnose import diagnose
@@ -13,8 +13,6 @@ from warpbrain.diagnosis.result import sentence_of
 from warpbrain.inference.decide import UNKNOWN
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.load import Load
-from warpbrain.recordings.location import locate
-from warpbrain.recordings.recording import PointsRecording
 from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
@@ -136,9 +134,7 @@ def test_a_whirl_that_turns_tissue_far_is_not_called_by_a_name(size):
     assert np.linalg.norm(u, axis=1).max() > 0.08 * side
     rng = np.random.default_rng(1)
     x = side * rng.uniform(0.03, 0.97, (60, 3))
-    moved = locate(mesh.points, mesh.tetrahedra, x).interpolate(u) + noise * rng.normal(size=x.shape)
-    beads = PointsRecording(name="beads", file="beads.csv", role="fit", points=x, displacement=moved, sigma=noise)
-    result = diagnose(replace(case, recordings=(beads,)), None, "cpu")
+    result = diagnose(with_beads(case, u, x, noise, rng), None, "cpu")
     assert result.decision.verdict == UNKNOWN
     source = result.unknown.source
     assert source.turns and np.linalg.norm(source.centre - whirl.centre) < whirl.length

@@ -230,8 +230,8 @@ def switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effe
         except (InputError, SolveError) as error:
             return error
 
-    solved = [proposal for proposal in proposals if proposal.follows != "release"]
-    released = [proposal for proposal in proposals if proposal.follows == "release"]
+    solved = [proposal for proposal in proposals if not proposal.is_release]
+    released = [proposal for proposal in proposals if proposal.is_release]
     # the first one condenses the surface, with threads of its own
     results = [*map(attempt, released[:1]), *in_threads(attempt, released[1:]), *map(attempt, solved)]
     by_proposal = dict(zip(map(id, (*released, *solved)), results, strict=True))
@@ -243,15 +243,16 @@ def candidates_about_fit(
 ) -> Candidates:
     """The effects of a dictionary at the state of a fit, in which some mechanisms act.
 
-    What lets go depends on all that pulls: its columns are made anew at all places, unless something let go already.
-    Other switches, courses in time and what is no physics keep their columns at the base, as do all at improbable
-    places. A kind of which a case has only one is left out if it acts already.
+    Releases depend on the reactions there: their columns are computed anew at all places, unless nodes are released
+    already. Other switches, courses in time and what is no physics keep their columns at the base, as do all at
+    improbable places. A kind of which a case has only one is left out if it acts already.
 
     `candidates`: at the base. `places`: of each kind, numbers of the places whose columns are made anew.
     """
     effects = Effects(state.linearised(), mesh_errors=candidates.source.mesh_errors)
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
+    all_are_held = not any(effect.is_release for effect in acting)
     by_kind: dict[str, tuple[Effect, ...]] = {}
     for kind, at_base in candidates.effects.items():
         if kind in acting_kinds:
@@ -263,17 +264,15 @@ def candidates_about_fit(
         for k, effect in zip(smooth, effects.of([of_this_kind[k].proposed for k in smooth]), strict=True):
             if is_linear(effect, effects.at):
                 of_this_kind[k] = effect
-        if not any(effect.lets_go for effect in acting):
-            of_this_kind = released_anew(of_this_kind, effects)
-        by_kind[kind] = tuple(of_this_kind)
+        by_kind[kind] = with_releases_of(effects, of_this_kind) if all_are_held else tuple(of_this_kind)
     return replace(candidates, effects=by_kind, source=effects)
 
 
-def released_anew(of_a_kind: Sequence[Effect], effects: Effects) -> list[Effect]:
-    """Effects of a kind, those of what lets go at another state, or beside what pushes; as they were where none is."""
-    released = [number for number, effect in enumerate(of_a_kind) if effect.lets_go]
-    anew = list(of_a_kind)
-    for k, effect in zip(released, switch_effects(effects, [anew[k].proposed for k in released]), strict=True):
+def with_releases_of(effects: Effects, of_a_kind: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Effects of a kind with the columns of its releases computed by `effects`; unchanged where these cannot be."""
+    released = [number for number, effect in enumerate(of_a_kind) if effect.is_release]
+    result = list(of_a_kind)
+    for k, effect in zip(released, switch_effects(effects, [result[k].proposed for k in released]), strict=True):
         if isinstance(effect, Effect):
-            anew[k] = effect
-    return anew
+            result[k] = effect
+    return tuple(result)

@@ -93,16 +93,16 @@ class Effect:
         return self.proposal is not None and self.proposal.elsewhere is not None and not self.proposal.is_there_or_not
 
     @property
-    def lets_go(self) -> bool:
-        """Whether it is something held that lets go."""
-        return self.proposal is not None and self.proposal.follows == "release"
+    def is_release(self) -> bool:
+        """Whether nodes that are held are released where it acts."""
+        return self.proposal is not None and self.proposal.is_release
 
     def coefficients(self, z: Floats) -> Floats:
         """The proposal's own coefficients."""
         return self.proposed.mean + self.proposed.sd * z
 
-    def steady(self, z: Floats) -> list[Mechanism]:
-        """Mechanisms that act at coordinates; none of what is no physics, or changes in time."""
+    def constant_mechanisms(self, z: Floats) -> list[Mechanism]:
+        """Mechanisms of coordinates (k,) that are constant in time; none of what changes, or is no physics."""
         if self.proposal is None or self.proposal.over_time is not None or self.proposal.changes_in_time:
             return []
         return list(self.proposal.acting(self.coefficients(z)))
@@ -129,7 +129,8 @@ class Effects:
     `switches`: needed for proposals that are switches.
     `mesh_errors`: of the state: less compressible tissue locks more, which is part of the effect of a law.
     `instant`: number of the time of the state.
-    `pushing`: what acts beside all proposals, to first order, which what lets go depends on most of all.
+    `loading`: mechanisms that act beside each proposal by nodal forces. A release is of the reactions to these, too, to
+    first order; what they change of other proposals is of second order and left out.
     """
 
     def __init__(
@@ -138,10 +139,10 @@ class Effects:
         switches: SolvedSwitches | None = None,
         mesh_errors: MeshErrors | None = None,
         instant: int = -1,
-        pushing: Sequence[Mechanism] = (),
+        loading: Sequence[Mechanism] = (),
     ) -> None:
         self.at, self.mesh_errors, self._switches, self._instant = at, mesh_errors, switches, instant
-        self.pushing = tuple(pushing)
+        self.loading = tuple(loading)
         self._internal: Floats | None = None
         # systems of the same state with laws of other kinds, as long as columns are made
         self._of_other_laws: list[System] = []
@@ -154,17 +155,17 @@ class Effects:
         """The same over other sensors at the same state."""
         return Effects(at, self._switches, self.mesh_errors)
 
-    def beside(self, pushing: Sequence[Mechanism]) -> Effects:
-        """The same beside mechanisms that act by nodal forces; others are left out."""
-        acting = [mechanism for mechanism in pushing if not _faces(mechanism.__class__).isdisjoint(_PUSHING)]
-        return Effects(self.at, self._switches, self.mesh_errors, self._instant, acting)
+    def beside(self, acting: Sequence[Mechanism]) -> Effects:
+        """The same beside those mechanisms that act by nodal forces."""
+        loading = [mechanism for mechanism in acting if not _faces(mechanism.__class__).isdisjoint(_PUSHING)]
+        return Effects(self.at, self._switches, self.mesh_errors, self._instant, loading)
 
     @cached_property
-    def _reactions(self) -> Floats | None:
-        """What reactions (N, 3) are larger by [N] under what acts beside; None if nothing does."""
-        if not self.pushing:
+    def _further_reactions(self) -> Floats | None:
+        """Reactions (N, 3) [N] to what acts beside, to first order; None if nothing does."""
+        if not self.loading:
             return None
-        return self.at.reactions_to(np.sum([self._forces(m, _faces(m.__class__)) for m in self.pushing], axis=0))
+        return self.at.reactions_to(np.sum([self._forces(m, _faces(m.__class__)) for m in self.loading], axis=0))
 
     def of(
         self, proposals: Sequence[Proposal], present: Mechanism | None = None, columns_alone: bool = False
@@ -178,9 +179,7 @@ class Effects:
         each_once, by_moment = list({id(base): base for base in bases}.values()), []
         for moment in self.at.moments:
             at = moment.at
-            here = self
-            if at is not self.at:
-                here = Effects(at, self._switches, self.mesh_errors, moment.number, self.pushing)
+            here = self if at is self.at else Effects(at, self._switches, self.mesh_errors, moment.number, self.loading)
             by_moment.append(here._at_one_time(each_once, present, columns_alone))
         return [
             self._over_time(proposal, [effects[id(base)] for effects in by_moment])
@@ -264,10 +263,10 @@ class Effects:
 
     def _effect(self, proposal: Proposal, answers: Floats) -> Effect:
         if proposal.is_there_or_not:
-            if proposal.follows == "release":
+            if proposal.is_release:
                 patch = proposal.released
                 lifts = proposal.make(proposal.mean).lifts
-                answer = self.at.released(patch.members, patch.held, lifts, self._reactions)
+                answer = self.at.released(patch.members, patch.held, lifts, self._further_reactions)
             else:
                 assert self._switches is not None, "about a fit switches keep their columns"
                 answer = self._switches.effect_of(proposal.make(proposal.mean), self.at.sensors, self._instant)

@@ -149,7 +149,7 @@ class FitSearch:
         z[part] *= sizes[0] / sizes[1] if sizes[1] else 1.0
         z[first : first + len(coefficients)] = coefficients
         self._linearised_at, self._nearby = z, about or self._nearby
-        if not any(effect.lets_go for effect in self.effects[len(subset.effects) :]):
+        if not any(effect.is_release for effect in self.effects[len(subset.effects) :]):
             # a place that leads to no state nearby is given up soon: from rest, in load steps, that takes minutes
             self._solved = [(z[self._layout.nonlinear], subset.state.u)]
         if subset.mesh_share is not None:

@@ -35,7 +35,7 @@ from warpbrain.worlds.body.dictionary import (
     candidates_about_fit,
     candidates_at,
     dictionary_of,
-    released_anew,
+    with_releases_of,
 )
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
@@ -130,23 +130,23 @@ class HypothesisSearch:
         for candidate in in_threads(refine, singles):
             self._sets[candidate.names] = candidate
         for single in singles:
-            self._weigh_what_lets_go(self._sets[single.names])
+            self._weigh_releases(self._sets[single.names])
 
-    def _weigh_what_lets_go(self, single: WeightedSet) -> None:
-        """Weigh what may let go beside a mechanism that explains something, under the reactions to that.
+    def _weigh_releases(self, single: WeightedSet) -> None:
+        """Weigh releases of held nodes beside a mechanism that is more probable than nothing.
 
-        About the base the reactions are those to the declared loads: what slides or lifts off under a load that is
-        missing, too, does nothing there.
+        About the base the reactions that are released are those to the declared loads. What slides or lifts off under a
+        load that is not declared moves nothing there: the reactions to that are added, to first order.
         """
         if single.hypothesis.log_evidence <= self.nothing.hypothesis.log_evidence:
             return
         [effect], (mean, _) = single.effects, single.coefficients[0]
-        beside = self.base.effects.beside(effect.steady(mean))
+        beside = self.base.effects.beside(effect.constant_mechanisms(mean))
         of_all = self.candidates.effects.items()
-        released = {kind: of_kind for kind, of_kind in of_all if any(each.lets_go for each in of_kind)}
-        if not beside.pushing or not released.keys() - single.names:
+        released = {kind: of_kind for kind, of_kind in of_all if any(each.is_release for each in of_kind)}
+        if not beside.loading or not released.keys() - single.names:
             return
-        effects = {kind: tuple(released_anew(of_kind, beside)) for kind, of_kind in released.items()}
+        effects = {kind: with_releases_of(beside, of_kind) for kind, of_kind in released.items()}
         marginal = single.marginal
         causes = visible(causes_of(self.base, replace(self.candidates, effects=effects)), marginal.model)
         weighing = Weighing(self.base, causes, marginal.sizes, single)
@@ -252,7 +252,7 @@ class HypothesisSearch:
 
     def _move(self, fitted: WeightedSet) -> None:
         """Fit a fitted set where its mechanisms are better placed."""
-        self._listener.stage(f"places of {' and '.join(sorted(fitted.names))}")
+        self._listener.stage(f"fit at neighbouring places: {' and '.join(sorted(fitted.names))}")
         self._sets[fitted.names] = moved = moved_about_fit(self.base, self._fitter, fitted, self.spacing)
         if moved.refit is not fitted.refit:
             self._forget_supersets(fitted.names)

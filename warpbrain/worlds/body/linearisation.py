@@ -83,10 +83,10 @@ class HeldSurface:
         self._R = np.einsum("aki,ai->ak", self._frames, at.reactions[self.members])
         self._released: dict[tuple[bytes, bool], Floats] = {}
 
-    def under(self, more: Floats) -> HeldSurface:
-        """The same where reactions are larger by some (N, 3) [N]."""
+    def with_further(self, reactions: Floats) -> HeldSurface:
+        """The same with further reactions (N, 3) [N]."""
         other = copy.copy(self)
-        other._R = self._R + np.einsum("aki,ai->ak", self._frames, more[self.members])
+        other._R = self._R + np.einsum("aki,ai->ak", self._frames, reactions[self.members])
         other._released = {}
         return other
 
@@ -300,19 +300,19 @@ class Linearisation:
         A[:, ~free] = held[different]
         return A, which.ravel()
 
-    def released(self, patch: Bools, held: Bools, lifts: bool, more: Floats | None = None) -> Floats:
+    def released(self, patch: Bools, held: Bools, lifts: bool, further: Floats | None = None) -> Floats:
         """Change (n,) of what is recorded if held nodes are released, to first order.
 
         They slide along the surface; where they are under tension they also leave it, if they can.
 
-        `patch` (N,). `held` (N,): the surface that the patch is a part of, all of whose components are held. `more`
-        (N, 3): what reactions are larger by [N], see `reactions_to`. `SolveError` if too little holds the body without
-        the patch.
+        `patch` (N,). `held` (N,): the surface that the patch is a part of, all of whose components are held. `further`
+        (N, 3): reactions [N] beside those of the state, as of `reactions_to`. `SolveError` if too little holds the body
+        without the patch.
         """
         key = held.tobytes()
         with self._surface_lock:
             surface = self._surface(key, held)
-        moved = (surface if more is None else surface.under(more)).moved(patch, lifts)
+        moved = (surface if further is None else surface.with_further(further)).moved(patch, lifts)
         loose = np.flatnonzero(moved)
         return np.asarray(self._surface_responses[key][:, loose] @ moved[loose])
 
@@ -367,8 +367,7 @@ class Linearisation:
         du = self.displacements(forces)
         answers = np.asarray(self.sensors.by_displacement @ du)
         if self.sensors.by_reactions.nnz:
-            dR = np.where(self.free[:, None], 0.0, self.stiffness @ du - forces)
-            answers += self.sensors.by_reactions @ dR
+            answers += self.sensors.by_reactions @ self._reactions_at(du, forces)
         return answers
 
     def _are_by_compliance(self, count: int) -> bool:
@@ -377,10 +376,13 @@ class Linearisation:
         return "_rows" in self.__dict__ or self._equilibria >= len(self.sensors)
 
     def reactions_to(self, forces: Floats) -> Floats:
-        """By how much reactions (N, 3) [N] are larger under further nodal forces (N, 3) [N], to first order."""
+        """Reactions (N, 3) [N] to further nodal forces (N, 3) [N], to first order."""
         flat = forces.reshape(-1, 1)
-        du = self.displacements(flat)
-        return np.where(self.free[:, None], 0.0, self.stiffness @ du - flat).reshape(forces.shape)
+        return self._reactions_at(self.displacements(flat), flat).reshape(forces.shape)
+
+    def _reactions_at(self, du: Floats, forces: Floats) -> Floats:
+        """Change of reactions (3 N, k) [N] with displacements (3 N, k) [m] under forces (3 N, k) [N]; 0 where free."""
+        return np.where(self.free[:, None], 0.0, self.stiffness @ du - forces)
 
     def displacements(self, forces: Floats) -> Floats:
         """Of all components (3 N, k) [m] under nodal forces (3 N, k) [N]."""

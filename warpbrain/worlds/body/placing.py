@@ -226,8 +226,8 @@ def with_refined_places(
         residual = candidate.residual + effect.mean
         apart, about = spacing, source
         if effect.proposed.is_there_or_not:
-            # what lets go: centres are as far apart as those of a scan's patches
-            apart, about = BETWEEN * base.at.sensors.radius, source.beside(_pushing_beside(candidate, number, placed))
+            # a release: centres are as far apart as those of a scan's patches
+            apart, about = BETWEEN * base.at.sensors.radius, source.beside(_acting_beside(candidate, number, placed))
         best, gain, log_share = best_in_cell(base, about, effect, size, apart, without, residual)
         columns = candidate.columns.copy()
         columns[:, part] = best.columns
@@ -245,14 +245,14 @@ def with_refined_places(
     return replace(candidate, refined=True)
 
 
-def _pushing_beside(candidate: WeightedSet, number: int, placed: int) -> list[Mechanism]:
-    """Mechanisms beside one of a set that its linear model is not about: all but the first ones, which were placed."""
+def _acting_beside(candidate: WeightedSet, number: int, placed: int) -> list[Mechanism]:
+    """Mechanisms of a set, without those of one effect and of the first ones, which act where it was linearised."""
     acting = list(zip(candidate.effects, candidate.coefficients, strict=True))
     return [
         mechanism
         for other, (effect, (mean, _)) in enumerate(acting)
         if other >= placed and other != number
-        for mechanism in effect.steady(mean)
+        for mechanism in effect.constant_mechanisms(mean)
     ]
 
 

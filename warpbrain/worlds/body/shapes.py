@@ -67,9 +67,9 @@ def columns_of_other_shapes(
     made = Effects(at, mesh_errors=mesh_errors)
     for number, (effect, z) in enumerate(zip(effects[:SHAPED_EFFECTS], coefficients, strict=False)):
         proposed = effect.proposed
-        if proposed.elsewhere is None or proposed.is_there_or_not or proposed.over_time is not None:
+        if not effect.is_placed or proposed.over_time is not None:
             continue
-        assert proposed.centre is not None and proposed.radius is not None
+        assert proposed.elsewhere is not None and proposed.centre is not None and proposed.radius is not None
         here = proposed.elsewhere(proposed.centre, proposed.radius)
         others = places_about(at.system.model, proposed, _BESIDE * proposed.radius)
         size = effect.coefficients(z)

@@ -30,7 +30,7 @@ def next_to_fit(
     expanded: Collection[frozenset[str]],
     rivals: bool = True,
 ) -> WeightedSet | None:
-    """The set that is fitted next, if it is fitted is moved, or else its supersets are weighed; None to stop.
+    """The set that is fitted next, or at neighbouring places, or whose supersets are weighed; None to stop.
 
     `sets`: the most probable first.
     `probabilities` (s,).
@@ -99,8 +99,10 @@ def _is_settled(named: Sequence[WeightedSet], expanded: Collection[frozenset[str
 
     That one is fitted, since it is what the verdict rests on, and one that is fitted is expanded.
     """
-    if named[0].refit is None or named[0].may_move:
-        return not named[0].is_open
+    if named[0].is_open:
+        return False
+    if named[0].refit is None:
+        return True
     fitted = (candidate for candidate in named if candidate.refit is not None)
     return any(candidate.names in expanded or len(candidate.names) > 2 for candidate in fitted)
 

@@ -260,7 +260,7 @@ class WeightedSet:
     #: it is fitted itself. None if its linear model is about a fit, whose gain it has already.
     inherited_gain: float | None = 0.0
     refined: bool = False  # whether its mechanisms are at the best places within their cells
-    moved: bool = False  # whether these were looked at about its fit
+    moved: bool = False  # whether it was fitted at neighbouring places, too
     #: Log of the part of these places in the evidence of a set that is not fitted, which is a sum over all places.
     log_share: float = 0.0
 
@@ -276,12 +276,12 @@ class WeightedSet:
 
     @property
     def is_open(self) -> bool:
-        """Whether it may be fitted yet, or be fitted with its mechanisms better placed."""
+        """Whether a fit of it, or at neighbouring places, is still to be done."""
         return self.may_move if self.refit is not None else not self.failure
 
     @property
     def may_move(self) -> bool:
-        """Whether it is fitted with mechanisms in places beside which none was looked at."""
+        """Whether it is fitted, with mechanisms whose neighbouring places were not looked at."""
         return self.refit is not None and not self.moved and any(effect.is_placed for effect in self.effects)
 
     @property
