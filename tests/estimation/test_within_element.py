@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from warpbrain.estimation.within_element import change_over_element, turn_over_element
 from warpbrain.inference.noise import noise_covariance
+from warpbrain.recordings.closest import closest_points
 
 RANDOM = np.random.default_rng(4)
 CLOUD = RANDOM.uniform(-0.03, 0.03, size=(40, 3))
@@ -74,7 +75,7 @@ def test_flat_faces_leave_a_part_of_the_turn() -> None:
         within = RANDOM.dirichlet([1.0, 1.0, 1.0], size=len(faces))
         places = np.einsum("ki,kij->kj", within, points[faces])
         left = 0.02 - np.linalg.norm(places - [0.01, 0.0, 0.03], axis=1)
-        turn = np.linalg.norm(turn_over_element(points, faces), axis=1)
+        turn = np.linalg.norm(turn_over_element(points, faces, closest_points(places, points, faces)), axis=1)
         # what is believed of the part that a mesh does not show holds the exact one, root 3 over 8
         assert 0.1 < np.sqrt(np.mean(left**2) / np.mean(turn**2)) < 0.3
         turns.append(np.median(turn))
@@ -83,8 +84,25 @@ def test_flat_faces_leave_a_part_of_the_turn() -> None:
 
 def test_a_plane_does_not_turn_and_a_turned_surface_turns_alike() -> None:
     plane = pyvista.Plane().triangulate()
-    assert not turn_over_element(np.asarray(plane.points, dtype=np.float64), plane.regular_faces).any()
+    points, faces = np.asarray(plane.points, dtype=np.float64), plane.regular_faces
+    assert not turn_over_element(points, faces, closest_points(points, points, faces)).any()
     sphere = pyvista.Icosphere(nsub=1)
     points, rotation = np.asarray(sphere.points, dtype=np.float64), Rotation.from_rotvec([0.3, -1.0, 0.5]).as_matrix()
-    here, there = (turn_over_element(each, sphere.regular_faces) for each in (points, points @ rotation.T))
-    np.testing.assert_allclose(np.linalg.norm(there, axis=1), np.linalg.norm(here, axis=1), rtol=1e-12)
+    faces = sphere.regular_faces
+    at = closest_points(points[faces].mean(axis=1), points, faces)
+    here, there = (np.linalg.norm(turn_over_element(each, faces, at), axis=1) for each in (points, points @ rotation.T))
+    np.testing.assert_allclose(there, here, rtol=1e-12)
+
+
+def test_a_surface_turns_alike_on_both_sides_of_an_edge() -> None:
+    # edges of other lengths and angles on each side
+    sphere = pyvista.Icosphere(nsub=1).decimate(0.4)
+    points, faces = np.asarray(sphere.points, dtype=np.float64), sphere.regular_faces
+    ends = points[faces[:, :2]]
+    share = RANDOM.uniform(size=(len(faces), 1))
+    on_edges = share * ends[:, 0] + (1.0 - share) * ends[:, 1]
+    to_middle = 1e-9 * (points[faces].mean(axis=1) - on_edges)
+    within, beyond = (closest_points(on_edges + sign * to_middle, points, faces) for sign in (1.0, -1.0))
+    assert np.mean(within.face != beyond.face) > 0.9
+    turns = [turn_over_element(points, faces, at) for at in (within, beyond)]
+    np.testing.assert_allclose(*turns, rtol=1e-6)

@@ -348,7 +348,7 @@ def _surface(case: Case, recording: SurfaceRecording, rows: Ints) -> _Made:
         rigid = -np.einsum("nj,njk->nk", directions, moved_back_columns(positions, motion, centre))
         return side * closest.distance, rigid, by_displacement, csr_matrix(shape)
 
-    turn = turn_over_element(mesh.points, faces)[closest_points(positions, mesh.points, faces).face]
+    turn = turn_over_element(mesh.points, faces, closest_points(positions, mesh.points, faces))
     return rows, np.ones(len(rows)), 1, positions, np.zeros(len(rows)), turn[:, None], at
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh.surface import SIDES, feature_normals
+from warpbrain.recordings.closest import ClosestPoints
 
 #: Rounds of weighted least squares that come to least absolute deviations, and the least of these, relative to the
 #: displacement: smaller ones are alike.
@@ -55,19 +56,22 @@ def change_over_element(points: Floats, displacement: Floats, edges: Floats) -> 
     return np.asarray(edges[:, None, None] * gradients.transpose(0, 2, 1))
 
 
-def turn_over_element(points: Floats, faces: NDArray[np.integer]) -> Floats:
+def turn_over_element(points: Floats, faces: NDArray[np.integer], at: ClosestPoints) -> Floats:
     """Change of a surface's distance from its flat faces over an edge: edge length times tilt of the corners' normals.
 
     Between its corners a flat face is not on the smooth surface that was meshed. Of a sphere of radius `R` and
     equilateral faces of edge `h` the corners' normals are tilted by `h / (sqrt(3) R)` from that of the face, and the
     mean gap is `h^2 / (8 R)`: sqrt(3) / 8 = 0.22 of what is returned.
 
-    `points` (n, 3): of the nodes [m]. `faces` (k, 3): node ids, oriented outwards. Returns (k, 3): mean edge of each
-    face times the root mean square, over its corners, of each component of the corner's normal less the face's [m];
-    zero of a plane.
+    `points` (n, 3): of the nodes [m]. `faces` (k, 3): node ids, oriented outwards. `at`: m points of the surface.
+    Returns (m, 3): root mean square over the corners, by their weights at each point, of each component of the normal
+    there less those of the faces that meet there, times the mean edge of each face [m]; zero of a plane. It is the same
+    on both sides of an edge.
     """
     normals = feature_normals(points, faces)[0]
-    tilt = normals[:, 4:] - normals[:, :1]
     sides = points[faces[:, SIDES]]
     edges = np.linalg.norm(sides[:, :, 1] - sides[:, :, 0], axis=2).mean(axis=1)
-    return np.asarray(edges[:, None] * np.sqrt(np.mean(tilt**2, axis=1)))
+    squares = np.zeros((len(points), 3))
+    np.add.at(squares, faces, (edges[:, None, None] * (normals[:, 4:] - normals[:, :1])) ** 2)
+    squares /= np.maximum(np.bincount(faces.ravel(), minlength=len(points)), 1)[:, None]
+    return np.asarray(np.sqrt(np.einsum("mc,mck->mk", at.weights, squares[faces[at.face]])))
