@@ -41,7 +41,7 @@ from warpbrain.physics.mechanism import ClosedSurface, Mechanism, ParameterError
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.physics.term import Body, KernelTerm
-from warpbrain.physics.words import Values, measured, name_of_set
+from warpbrain.physics.words import Values, measured
 
 STATES = ("fixed", "sliding", "lifting")
 #: Tangential displacement [m] over which friction builds up.
@@ -148,7 +148,7 @@ class Contact(Mechanism):
             on_surface=True,
             centre=patch.centre,
             radius=patch.radius,
-            region=name_of_set(patch.surface),
+            region=f"surface '{patch.surface}', which is held",
         )
 
     def skull(self, mesh: TetMesh) -> tuple[Floats, NDArray[np.int32]]:
