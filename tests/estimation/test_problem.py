@@ -119,7 +119,7 @@ def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
     drawn = replace(Noise.of(rows, rows.sigma, 0.0, outliers(), 1.5), inflation=np.where(wrong, 8.0, 1.0))
     covariance = drawn.model.noise_covariance
     residual = np.linalg.cholesky(covariance) @ random.normal(size=450)
-    found = Likelihood().noise(rows, residual, residual, np.zeros((450, 0)))
+    found = Likelihood().noise(rows, residual, np.zeros((450, 0)))
     assert not (found.gross & ~wrong).any() and found.gross.sum() >= 6
     verify(
         "factor on the noise of 450 recorded numbers, 8 of 150 points gross errors",
@@ -130,7 +130,7 @@ def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
     expected = multivariate_normal(np.zeros(450), covariance).logpdf(residual) + drawn.log_prior
     assert drawn.log_evidence(residual, np.zeros((450, 0))) == pytest.approx(expected)
     undeclared = rows_of(where, np.nan)
-    found = Likelihood().noise(undeclared, residual, residual, np.zeros((450, 0)))
+    found = Likelihood().noise(undeclared, residual, np.zeros((450, 0)))
     verify(
         "standard deviation of a noise that is not declared, 8 of 150 points gross errors",
         "standard deviation with which they were drawn",
@@ -142,8 +142,8 @@ def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
 def test_no_point_is_a_gross_error_where_there_are_none() -> None:
     rows = rows_of(np.zeros((3, 3)), 1e-3)
     residual = np.full(3, 1.0)
-    assert Likelihood().noise(rows, residual, residual, np.zeros((3, 0))).gross.all()
-    assert not Likelihood(None).noise(rows, residual, residual, np.zeros((3, 0))).gross.any()
+    assert Likelihood().noise(rows, residual, np.zeros((3, 0))).gross.all()
+    assert not Likelihood(None).noise(rows, residual, np.zeros((3, 0))).gross.any()
 
 
 def test_points_are_located_anew_where_they_or_the_mesh_are_others() -> None:

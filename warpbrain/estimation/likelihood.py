@@ -158,16 +158,20 @@ class Likelihood:
 
     outliers: Outliers | None = field(default_factory=outliers)
 
-    def noise(self, rows: Sensors, left: Floats, expected: Floats, columns: Floats) -> Noise:
-        """The most probable noise about a fit, which leaves residuals `left` (n,).
+    def noise(self, rows: Sensors, expected: Floats, columns: Floats) -> Noise:
+        """The most probable noise about a fit.
 
-        In the middle of the prior they are `expected` (n,), by the linear model about the fit, and one standard
+        In the middle of the prior residuals are `expected` (n,), by the linear model about the fit, and one standard
         deviation of each number that is estimated changes them by `columns` (n, k).
         """
         sigma, declared, undeclared = _beginnings(rows)
-        for members in undeclared:
-            size = typical_size(left[members] / sigma[members], rows.groups[members])
-            sigma[members] *= max(size, LEAST_SIGMA)
+        left = expected
+        for _ in range(2 if undeclared else 0):
+            for members in undeclared:
+                size = typical_size(left[members] / sigma[members], rows.groups[members])
+                sigma[members] = np.maximum(size * sigma[members], LEAST_SIGMA)
+            # a fit as rough as what is expected: what it leaves is where the search begins
+            left = expected - columns @ GaussianModel(np.diag(sigma), columns).coefficients(expected)[0]
 
         def settled(noise: Noise) -> Noise:
             """Gross errors, undeclared noise and scale in turn until they stay."""

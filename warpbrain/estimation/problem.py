@@ -174,7 +174,7 @@ class Problem:
         columns = self.columns(rows, state.theta, nuisances, derivatives)
         prior = self.mode.gaussian
         z = np.concatenate([np.linalg.solve(prior.factor, state.theta - prior.mean), self._standardised(nuisances)])
-        return self.likelihood.noise(rows, rows.residual, rows.residual + columns @ z, columns)
+        return self.likelihood.noise(rows, rows.residual + columns @ z, columns)
 
     def columns(self, rows: Sensors, theta: Floats, nuisances: Floats, derivatives: tuple[Floats, Floats]) -> Floats:
         """What one standard deviation of each parameter and nuisance changes of what is recorded: (n, p + q)."""
