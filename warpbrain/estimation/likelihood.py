@@ -20,8 +20,8 @@ from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.estimation.observations import Sensors
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
-from warpbrain.inference.noise import Outliers, log_scale_density, noise_factor, outliers, scales
+from warpbrain.inference.gross_errors import columns_of_inflation, louder, with_gross_errors
+from warpbrain.inference.noise import Outliers, log_scale_density, outliers, scales
 
 #: An undeclared noise is no smaller [m] or [N]: below this it is rounding of the computation.
 LEAST_SIGMA = 1e-9
@@ -67,9 +67,7 @@ class Noise:
     @classmethod
     def of(cls, rows: Sensors, sigma: Floats, unresolved: float, outliers: Outliers | None, scale: float) -> Noise:
         """Noise of rows that are all sound."""
-        covariance = rows.noise_covariance(sigma, unresolved * rows.over_element)
-        sound = GaussianModel(noise_factor(covariance, sigma), np.zeros((len(rows), 0)))
-        return cls(rows, sigma, unresolved, outliers, sound, scale, np.ones(len(rows.points)))
+        return cls(rows, sigma, unresolved, outliers, rows.noise(sigma, unresolved), scale, np.ones(len(rows.points)))
 
     @property
     def gross(self) -> Bools:
@@ -85,9 +83,7 @@ class Noise:
     def _model_at_one(self) -> GaussianModel:
         if not self.gross.any():
             return self.sound
-        excess = columns_of_inflation(self.sound, self.rows.points, self.inflation)
-        covariance = self.sound.noise_covariance + excess @ excess.T
-        return GaussianModel(noise_factor(covariance, self.sigma), self.sound.columns)
+        return louder(self.sound, columns_of_inflation(self.sound, self.rows.points, self.inflation))
 
     @cached_property
     def log_prior(self) -> float:
