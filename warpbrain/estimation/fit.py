@@ -183,7 +183,7 @@ class GaussNewton:
         if start is None:
             state, derivatives = self._first()
         else:
-            state, derivatives = start.point.state, (start.linearised.du, start.linearised.dR)
+            state, derivatives = start.point.state, start.linearised.derivatives
             known = start.point.nuisances
             nuisances[len(nuisances) - len(known) :] = known
         last: Noise | None = None
@@ -193,7 +193,7 @@ class GaussNewton:
             point = problem.at(state, nuisances, noise)
             tolerance = self.tolerance if number else max(_ROUGHLY, self.tolerance)
             point, linearised, left = self._descend(point, problem.linearise(point, derivatives), tolerance)
-            derivatives = linearised.du, linearised.dR
+            derivatives = linearised.derivatives
             point = problem.at_best(problem.at(point.state, nuisances, noise))
             state, nuisances, last = point.state, point.nuisances, noise
             if settled:

@@ -99,7 +99,7 @@ def predictions(
 
     if not observations.recordings:
         return ()
-    problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised
+    problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised.derivatives
     centre, motion = problem.observations.centre, problem.nuisances.motion(point.nuisances)
     rest = np.zeros_like(point.state.u)
     seen = problem.nuisances.observed(point.state, point.nuisances)
@@ -107,7 +107,7 @@ def predictions(
     moments = problem.forward.moments
     run = compared(case, point.state.u, point.state.reactions, moments)
     fitted = compared(realigned(case, motion, centre), *seen, moments)
-    columns = problem.columns(after, estimate.theta, point.nuisances, (derivatives.du, derivatives.dR))
+    columns = problem.columns(after, estimate.theta, point.nuisances, derivatives)
     deviations = np.sqrt(np.einsum("np,pq,nq->n", columns, joint, columns))
     results = []
     for number, name in enumerate(after.names):
@@ -369,7 +369,7 @@ class Posterior(Shown):
     def joint_covariance(self) -> Floats:
         """Of parameters and nuisances in standard deviations of their prior by Laplace, shape (p + q, p + q)."""
         point, linearised, problem = self.best.point, self.best.linearised, self.best.problem
-        columns = problem.columns(point.rows, self.theta, point.nuisances, (linearised.du, linearised.dR))
+        columns = problem.columns(point.rows, self.theta, point.nuisances, linearised.derivatives)
         return point.model.of_noise(columns, point.noise.scale).coefficients(point.residual)[1]
 
     @property

@@ -58,6 +58,10 @@ class Nuisances:
             deviations.append(self.registration.deviations)
         return Gaussian(np.concatenate(means), np.diag(np.concatenate(deviations) ** 2))
 
+    def standardised(self, values: Floats) -> Floats:
+        """Values (q,) as coordinates `xi` (q,)."""
+        return (values - self.prior.mean) / self.prior.standard_deviations
+
     def observed(self, state: State, values: Floats) -> tuple[Floats, Floats]:
         """Displacement and reactions (n, 3) without the error of the mesh."""
         if self.error is None:
@@ -109,6 +113,11 @@ class Linearised:
     du: Floats  # (p, N, 3), of the displacement [m] by `theta`
     dR: Floats  # (p, N, 3), of the reactions [N]
 
+    @property
+    def derivatives(self) -> tuple[Floats, Floats]:
+        """Those of the state."""
+        return self.du, self.dR
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -141,22 +150,19 @@ class Problem:
         return self._point(state, point.nuisances, rows, point.noise, point.model)
 
     def _point(self, state: State, nuisances: Floats, rows: Sensors, noise: Noise, model: GaussianModel) -> Point:
-        residual = rows.residual + model.columns @ self._standardised(nuisances)
+        residual = rows.residual + model.columns @ self.nuisances.standardised(nuisances)
         misfit = -float(model.log_density(residual)) - noise.log_prior
         objective = misfit + self.mode.gaussian.negative_log(state.theta)
         return Point(state, nuisances, rows, noise, model, residual, misfit, objective)
-
-    def _standardised(self, nuisances: Floats) -> Floats:
-        prior = self.nuisances.prior
-        return (nuisances - prior.mean) / prior.standard_deviations
 
     def at_best(self, point: Point) -> Point:
         """The same with nuisances linear about their most probable values; no equilibrium is solved."""
         prior = self.nuisances.prior
         for _ in range(_MOST):
-            xi, covariance = point.model.coefficients(point.residual)
-            change = xi - self._standardised(point.nuisances)
-            if np.linalg.norm(np.linalg.solve(np.linalg.cholesky(covariance), change)) <= _AT_BEST:
+            xi, _ = point.model.coefficients(point.residual)
+            change = xi - self.nuisances.standardised(point.nuisances)
+            seen = point.model.whitened(point.model.columns @ change)
+            if np.linalg.norm(np.concatenate([seen, change])) <= _AT_BEST:
                 break
             point = self.at(point.state, prior.mean + prior.standard_deviations * xi, point.noise)
         return point
@@ -170,10 +176,11 @@ class Problem:
 
     def likely_noise(self, state: State, nuisances: Floats, derivatives: tuple[Floats, Floats]) -> Noise:
         """The most probable noise about a state with its derivatives, everything that is estimated integrated out."""
-        rows = self.seen(state, nuisances)
+        rows, prior = self.seen(state, nuisances), self.mode.gaussian
         columns = self.columns(rows, state.theta, nuisances, derivatives)
-        prior = self.mode.gaussian
-        z = np.concatenate([np.linalg.solve(prior.factor, state.theta - prior.mean), self._standardised(nuisances)])
+        z = np.concatenate(
+            [np.linalg.solve(prior.factor, state.theta - prior.mean), self.nuisances.standardised(nuisances)]
+        )
         return self.likelihood.noise(rows, rows.residual + columns @ z, columns)
 
     def columns(self, rows: Sensors, theta: Floats, nuisances: Floats, derivatives: tuple[Floats, Floats]) -> Floats:
