@@ -1,4 +1,4 @@
-"""Gradients of the objective against differences of it, and noise against draws and SciPy's distributions."""
+"""Columns and gradients against differences, what is integrated out against SciPy's distributions, noise as drawn."""
 
 from dataclasses import replace
 
@@ -46,49 +46,55 @@ SHAPE = 0.1 * np.random.default_rng(5).normal(size=len(NAMES) - 1)
 VALUES = np.array([1.2, *SHAPE, 1e-4, -2e-4, 5e-5, 0.03, 0.08, -0.05])
 
 
-def gradient_at(problem: Problem, point: Point) -> np.ndarray:
-    """Of the objective by parameters and nuisances, from the jacobian of the residuals."""
-    rows = point.noise.standardised(problem.linearise(point).jacobian), point.noise.standardised(point.rows.residual)
-    return rows[0].T @ rows[1] + problem.prior.precision @ (point.coordinates - problem.prior.mean)
+@pytest.fixture(scope="module")
+def point(problem: Problem) -> Point:
+    """Beside the tissue that the error of the mesh was computed at, with the noise that is likely there."""
+    state = problem.forward.solve(THETA + np.array([0.1, -0.05]))
+    noise = problem.likely_noise(state, VALUES, problem.forward.differentiate(state))
+    return problem.at(state, VALUES, noise)
 
 
-@pytest.mark.parametrize("known", [False, True])
-def test_the_gradient_is_that_of_the_objective(problem: Problem, known: bool) -> None:
-    # beside the tissue that the error of the mesh was computed at
-    here = np.concatenate([THETA + np.array([0.1, -0.05]), VALUES])
-    point = problem.at(problem.forward.solve(here[:2]), VALUES)
-    noise = None
-    if known:
-        point = problem.with_likely_noise(point, problem.linearise(point))
-        noise = point.noise
-
-    states = {}
-
-    def objective(point: np.ndarray) -> float:
-        theta = tuple(point[:2])
-        if theta not in states:
-            states[theta] = problem.forward.solve(point[:2])
-        return problem.at(states[theta], point[2:], noise).objective
-
-    gradient = gradient_at(problem, problem.at(problem.forward.solve(here[:2]), VALUES, noise))
+def test_columns_are_differences_of_what_is_seen(problem: Problem, point: Point) -> None:
+    theta = point.state.theta
+    columns = problem.columns(point.rows, theta, VALUES, problem.forward.differentiate(point.state))
+    columns[:, :2] = columns[:, :2] @ np.linalg.inv(problem.mode.gaussian.factor)
+    columns[:, 2:] /= problem.nuisances.prior.standard_deviations
     steps = np.array([*[1e-3] * (2 + len(NAMES)), *[1e-6] * 3, *[1e-5] * 3])
     for k, step in enumerate(steps):
-        beside = [objective(here + sign * step * np.eye(len(here))[k]) for sign in (1.0, -1.0)]
-        expected = (beside[0] - beside[1]) / (2.0 * step)
-        scale_of = np.abs(gradient[k]) + 1e-6 * np.abs(gradient).max() / step
-        assert abs(gradient[k] - expected) < 1e-4 * scale_of
+        sides = []
+        for sign in (1.0, -1.0):
+            there = np.concatenate([theta, VALUES]) + sign * step * np.eye(len(steps))[k]
+            state = problem.forward.solve(there[:2]) if k < 2 else point.state
+            sides.append(problem.seen(state, there[2:]).residual)
+        expected = -(sides[0] - sides[1]) / (2.0 * step)
+        # of surfaces the closest point moves along the surface
+        assert np.linalg.norm(columns[:, k] - expected) < 1e-3 * np.linalg.norm(expected)
 
 
-def test_nuisances_are_at_their_best_and_integrated_out(problem: Problem) -> None:
-    state = problem.forward.solve(THETA)
-    point = problem.at(state, problem.nuisances.prior.mean)
-    noise = problem.with_likely_noise(point, problem.linearise(point)).noise
-    misfit, best = problem.without_nuisances(state, problem.nuisances.prior.mean, noise)
-    gradient = gradient_at(problem, best)[2:]
-    size = np.sqrt(np.diag(problem.linearise(best).hessian)[2:])
-    assert np.abs(gradient / size).max() < 1e-4
-    other, _ = problem.without_nuisances(state, VALUES, noise)
-    assert other == pytest.approx(misfit, abs=1e-3)
+def test_nuisances_are_integrated_out_of_the_objective_and_of_its_gradient(problem: Problem, point: Point) -> None:
+    # the same by a covariance of all that is not known, as SciPy has it
+    covariance = point.noise.model.noise_covariance + point.model.columns @ point.model.columns.T
+    expected = -multivariate_normal(np.zeros(len(covariance)), covariance).logpdf(point.residual)
+    assert point.misfit == pytest.approx(expected - point.noise.log_prior)
+    linearised, prior = problem.linearise(point), problem.mode.gaussian
+    J, r = (point.model.standardised(rows) for rows in (linearised.columns, point.residual))
+    gradient = prior.precision @ (point.state.theta - prior.mean) - J.T @ r
+    for k in range(2):
+        ends = [point.state.theta + step * np.eye(2)[k] for step in (1e-3, -1e-3)]
+        sides = [problem.beside(point, problem.forward.solve(end)).objective for end in ends]
+        assert gradient[k] == pytest.approx((sides[0] - sides[1]) / 2e-3, rel=1e-4, abs=1e-3)
+
+
+def test_nuisances_are_linear_about_their_best_values_wherever_these_are_sought_from(problem: Problem, point) -> None:
+    best, other = (
+        problem.at_best(problem.at(point.state, values, point.noise))
+        for values in (VALUES, problem.nuisances.prior.mean)
+    )
+    assert other.misfit == pytest.approx(best.misfit, abs=1e-3)
+    # what is left and the prior pull alike: no values are more probable
+    xi = (best.nuisances - problem.nuisances.prior.mean) / problem.nuisances.prior.standard_deviations
+    white = best.noise.model.whitened(np.column_stack([best.rows.residual, best.model.columns]))
+    np.testing.assert_allclose(white[:, 1:].T @ white[:, 0], xi, atol=1e-4 * (1.0 + np.abs(xi).max()))
 
 
 def rows_of(where: np.ndarray, sigma: float) -> Sensors:
@@ -110,9 +116,10 @@ def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
     np.testing.assert_array_equal(rows.points, np.arange(450).reshape(150, 3))
     wrong = np.zeros(150, dtype=bool)
     wrong[:8] = True
-    drawn = Noise(rows, rows.sigma, 1.5, np.where(wrong, 8.0, 1.0), outliers())
-    residual = 1.5 * drawn.factor @ random.normal(size=450)
-    found = Likelihood().noise(rows, residual, residual, np.zeros((450, 0)))
+    drawn = replace(Noise.of(rows, rows.sigma, 0.0, outliers(), 1.5), inflation=np.where(wrong, 8.0, 1.0))
+    covariance = drawn.model.noise_covariance
+    residual = np.linalg.cholesky(covariance) @ random.normal(size=450)
+    found = Likelihood().noise(rows, residual, np.zeros((450, 0)))
     assert not (found.gross & ~wrong).any() and found.gross.sum() >= 6
     verify(
         "factor on the noise of 450 recorded numbers, 8 of 150 points gross errors",
@@ -120,11 +127,10 @@ def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
         abs(found.scale / 1.5 - 1.0),
         0.1,
     )
-    covariance = 2.25 * drawn.factor @ drawn.factor.T
-    expected = -multivariate_normal(np.zeros(450), covariance).logpdf(residual) - drawn.log_prior
-    assert drawn.negative_log(residual) == pytest.approx(expected)
+    expected = multivariate_normal(np.zeros(450), covariance).logpdf(residual) + drawn.log_prior
+    assert drawn.log_evidence(residual, np.zeros((450, 0))) == pytest.approx(expected)
     undeclared = rows_of(where, np.nan)
-    found = Likelihood().noise(undeclared, residual, residual, np.zeros((450, 0)))
+    found = Likelihood().noise(undeclared, residual, np.zeros((450, 0)))
     verify(
         "standard deviation of a noise that is not declared, 8 of 150 points gross errors",
         "standard deviation with which they were drawn",
@@ -136,8 +142,8 @@ def test_noise_and_gross_errors_are_found_as_they_were_drawn(verify) -> None:
 def test_no_point_is_a_gross_error_where_there_are_none() -> None:
     rows = rows_of(np.zeros((3, 3)), 1e-3)
     residual = np.full(3, 1.0)
-    assert Likelihood().noise(rows, residual, residual, np.zeros((3, 0))).gross.all()
-    assert not Likelihood(None).noise(rows, residual, residual, np.zeros((3, 0))).gross.any()
+    assert Likelihood().noise(rows, residual, np.zeros((3, 0))).gross.all()
+    assert not Likelihood(None).noise(rows, residual, np.zeros((3, 0))).gross.any()
 
 
 def test_points_are_located_anew_where_they_or_the_mesh_are_others() -> None:

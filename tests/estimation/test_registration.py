@@ -75,9 +75,9 @@ def test_an_exact_rigid_motion_is_recovered(seed: int, surface: bool, verify) ->
     nuisances = Nuisances(registration=Registration(1.0, 10.0))
     problem = Problem(forward, observations, mode, Likelihood(), nuisances)
     state = forward.solve(THETA)
-    rows = problem.at(state, np.zeros(6)).rows
-    exact = Noise(rows, np.full(len(rows), 1e-5), 1.0, np.ones(len(rows.points)), None)
-    _, best = problem.without_nuisances(state, np.zeros(6), exact)
+    rows = problem.seen(state, np.zeros(6))
+    exact = Noise.of(rows, np.full(len(rows), 1e-5), 0.0, None, 1.0)
+    best = problem.at_best(problem.at(state, np.zeros(6), exact))
     # about the mean of what was recorded, which the shift moved: the shift is turned along
     away = best.nuisances - np.concatenate([Rotation.from_rotvec(by[3:]).apply(by[:3]), by[3:]])
     verify(

@@ -45,10 +45,11 @@ def test_derivatives_over_times_are_differences(case: Case, verify) -> None:
     forward = Forward(case, THETA, "cpu", moments=moments)
     mode = PriorMode(1.0, Gaussian(THETA, np.eye(1)), np.full(1, -np.inf), np.full(1, np.inf))
     problem = Problem(forward, Observations.to_fit(case, moments), mode, Likelihood(), Nuisances())
-    point = problem.at(forward.solve(THETA), np.zeros(0))
-    column = problem.linearise(point).jacobian[:, 0]
-    sides = [problem.at(forward.solve(THETA + step), np.zeros(0)).rows.residual for step in (1e-3, -1e-3)]
-    difference = (sides[0] - sides[1]) / 2e-3
+    state = forward.solve(THETA)
+    rows = problem.seen(state, np.zeros(0))
+    [column] = problem.columns(rows, THETA, np.zeros(0), forward.differentiate(state)).T
+    sides = [problem.seen(forward.solve(THETA + step), np.zeros(0)).residual for step in (1e-3, -1e-3)]
+    difference = -(sides[0] - sides[1]) / 2e-3
     verify(
         "derivative by stiffness of displacements at two times, and of displacements between these, under a weight "
         "that changes",
@@ -56,7 +57,7 @@ def test_derivatives_over_times_are_differences(case: Case, verify) -> None:
         float(np.linalg.norm(column - difference) / np.linalg.norm(difference)),
         2e-5,
     )
-    assert np.abs(problem.at(forward.solve(np.log([WHITE.mu])), np.zeros(0)).rows.residual).max() < 1e-8
+    assert np.abs(problem.seen(forward.solve(np.log([WHITE.mu])), np.zeros(0)).residual).max() < 1e-8
 
 
 def test_tissue_is_found_and_unseen_times_are_predicted(case: Case, verify) -> None:

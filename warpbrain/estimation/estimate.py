@@ -166,13 +166,7 @@ class Estimation:
         # what is only the start of something better need not be exact
         final = self.options.discretisation is None or nuisances.error is not None
         tolerance = self.options.tolerance if final else max(self.options.tolerance, _BEFORE)
-        search = GaussNewton(problem, tolerance, self.listener.step)
-        if start is None:
-            fitted = search.solve()
-        else:
-            values = nuisances.prior.mean.copy()
-            values[len(values) - len(start.point.nuisances) :] = start.point.nuisances
-            fitted = search.solve(start.point.state, values)
+        fitted = GaussNewton(problem, tolerance, self.listener.step).solve(start)
         if not fitted.converged:
             self._remarks.append(f"{text}: not converged")
         return fitted

@@ -1,8 +1,8 @@
 """The most probable parameters, and the posterior as the normal distribution that fits it there (Laplace).
 
 Each equilibrium on the way is begun where the derivatives of the last better one (`warpbrain.simulation.sensitivity`)
-say it will be. Far from the estimate most of a residual is no noise yet. So the noise is first taken to be as large as
-the residuals say, again and again; then noise and estimate are found in turn, see `likelihood`.
+say it will be. Noise and estimate are found in turn: about each point the noise that is likely with everything that is
+estimated integrated out, see `likelihood`, and with that noise the estimate.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import State
-from warpbrain.estimation.likelihood import IndependentNoise
+from warpbrain.estimation.likelihood import Noise
 from warpbrain.estimation.parameters import Gaussian, Parameters
 from warpbrain.estimation.problem import Linearised, Point, Problem
 from warpbrain.inference.least_squares import minimise
@@ -26,16 +26,15 @@ from warpbrain.inference.least_squares import minimise
 _STIFFER = 4
 #: There is no estimate if fewer rows than this share are something else.
 _FEWEST_EXPLAINED = 0.1
-#: Tolerance while noise is not known yet, how often it is found again, and until it changes by less than this part.
-_ROUGHLY, _ROUNDS, _SETTLED = 0.1, 8, 0.1
+#: Tolerance while noise is not known yet, and how often it is found again.
+_ROUGHLY, _ROUNDS = 0.1, 8
 
 
 @dataclass(frozen=True, eq=False)
 class Laplace:
     """A normal posterior of the parameters.
 
-    Nuisances are integrated out: the information of the data alone, `I`, is that of `theta` less what the nuisances
-    could explain as well (its Schur complement). Beside the prior covariance `L L^T` its measure is `L^T I L`: along an
+    Beside the prior covariance `L L^T` the measure of the information `I` of the data alone is `L^T I L`: along an
     eigenvector of the eigenvalue `e` the data know `e` times as much as the prior, and the variance falls to
     `1/(1 + e)` of what it was.
     """
@@ -44,17 +43,6 @@ class Laplace:
     theta: Floats  # (p,), its mean: the estimate
     prior: Gaussian
     information: Floats  # (p, p)
-
-    @classmethod
-    def of(cls, problem: Problem, theta: Floats, linearised: Linearised) -> Laplace:
-        """The posterior at the most probable parameters (p,) of a problem, linearised there."""
-        p = len(problem.parameters)
-        information, joint = linearised.information[:p, :p], linearised.hessian
-        # metres, radians and plain numbers: one size for all
-        size = np.sqrt(np.diag(joint[p:, p:]))
-        mixed = joint[p:, :p] / size[:, None]
-        information = information - mixed.T @ np.linalg.solve(joint[p:, p:] / np.outer(size, size), mixed)
-        return cls(problem.parameters, theta, problem.mode.gaussian, information)
 
     @cached_property
     def posterior(self) -> Gaussian:
@@ -133,16 +121,16 @@ class Estimate:
     @cached_property
     def laplace(self) -> Laplace:
         """The normal distribution that fits the posterior there."""
-        return Laplace.of(self.problem, self.theta, self.linearised)
+        prior = self.problem.mode.gaussian
+        return Laplace(self.problem.parameters, self.theta, prior, self.linearised.information)
 
     @cached_property
     def log_evidence(self) -> float:
         """Log probability of what was recorded and of this mode, by Laplace, up to what all modes have in common."""
-        prior, point = self.problem.mode, self.point
-        misfit, _ = self.problem.without_nuisances(point.state, point.nuisances, point.noise)
+        prior = self.problem.mode
         log_volume = 0.5 * float(np.linalg.slogdet(self.laplace.posterior.covariance)[1])
         log_volume -= float(np.log(np.diag(prior.gaussian.factor)).sum())
-        return float(np.log(prior.share)) + log_volume - misfit - prior.gaussian.negative_log(self.theta)
+        return float(np.log(prior.share)) + log_volume - self.point.objective
 
     def predicted(self, theta: Floats) -> State:
         """The state of other parameters, to first order about the estimate."""
@@ -184,41 +172,38 @@ class GaussNewton:
         self._on_step = on_step
         self._history: list[GaussNewtonStep] = []
 
-    def solve(self, start: State | None = None, nuisances: Floats | None = None) -> Estimate:
-        """Go from a state and nuisances (q,) to the estimate.
+    def solve(self, start: Estimate | None = None) -> Estimate:
+        """Go to the estimate from one with other nuisances, or from the middle of the prior.
 
-        By default from the middle of the prior, and then the first stage is that of large residuals: `InputError` if
-        its laws are not stable, `SolveError` if there is no equilibrium to start from.
+        `InputError` if the laws there are not stable, `SolveError` if there is no equilibrium to start from.
         """
-        problem = self.problem
-        values = problem.nuisances.prior.mean if nuisances is None else nuisances
+        problem, prior = self.problem, self.problem.nuisances.prior
         self._history = []
+        nuisances = prior.mean.copy()
         if start is None:
-            point, linearised = self._first(values)
-            # downhill with noise as large as what is left each time
-            for _ in range(_ROUNDS):
-                last = point.noise
-                point, linearised, _ = self._descend(point, linearised, _ROUGHLY)
-                point = problem.at(point.state, point.nuisances)
-                if np.abs(np.log(point.noise.sigma / last.sigma)).max() < _SETTLED:
-                    break
+            state, derivatives = self._first()
         else:
-            point = problem.at(start, values)
-            linearised = problem.linearise(point)
+            state, derivatives = start.point.state, start.linearised.derivatives
+            known = start.point.nuisances
+            nuisances[len(nuisances) - len(known) :] = known
+        last: Noise | None = None
         for number in range(_ROUNDS):
-            last = point.noise
-            point = problem.with_likely_noise(point, linearised)
-            settled = not isinstance(last, IndependentNoise) and point.noise.is_near(last)
+            noise = problem.likely_noise(state, nuisances, derivatives)
+            settled = last is not None and noise.is_near(last)
+            point = problem.at(state, nuisances, noise)
             tolerance = self.tolerance if number else max(_ROUGHLY, self.tolerance)
-            point, linearised, left = self._descend(point, linearised, tolerance)
+            point, linearised, left = self._descend(point, problem.linearise(point, derivatives), tolerance)
+            derivatives = linearised.derivatives
+            point = problem.at_best(problem.at(point.state, nuisances, noise))
+            state, nuisances, last = point.state, point.nuisances, noise
             if settled:
                 break
-        linearised = problem.linearise(point, (linearised.du, linearised.dR))
+        linearised = problem.linearise(point, derivatives)
         # farther away it is rounding of the objective, or nothing better lies this way
         return Estimate(problem, point, linearised, left <= 10.0 * tolerance, tuple(self._history))
 
-    def _first(self, values: Floats) -> tuple[Point, Linearised]:
-        """The middle of the prior; something stiffer if there is no stable equilibrium."""
+    def _first(self) -> tuple[State, tuple[Floats, Floats]]:
+        """The middle of the prior, and its derivatives; something stiffer if there is no stable equilibrium."""
         problem, mode = self.problem, self.problem.mode
         theta = np.clip(mode.gaussian.mean, mode.low, mode.high)
         problem.parameters.require_possible(theta)
@@ -226,8 +211,8 @@ class GaussNewton:
         why = ""
         for times in range(_STIFFER + 1):
             try:
-                point = problem.at(problem.forward.solve(theta + times * stiffer), values)
-                return point, problem.linearise(point)
+                state = problem.forward.solve(theta + times * stiffer)
+                return state, problem.forward.differentiate(state)
             except SolveError as error:
                 why = str(error)
         raise SolveError(f"in the middle of the prior, and up to {math.exp(_STIFFER):.0f} times stiffer: {why}")
@@ -235,41 +220,37 @@ class GaussNewton:
     def _descend(self, point: Point, linearised: Linearised, tolerance: float) -> tuple[Point, Linearised, float]:
         """Downhill with one noise to where a step is no longer worth it; and how long it is.
 
-        Coordinates are steps from the start in units of the reach of a parameter, and of ten standard deviations of
-        what is estimated along, since the first step goes no farther than one unit.
+        Coordinates are steps from the start in units of the reach of a parameter, since the first step goes no farther
+        than one unit.
         """
-        problem, start, newton = self.problem, point, 0
+        problem, mode, start, newton = self.problem, self.problem.mode, point, 0
         best, trial = (point, linearised), (point, linearised)
-        along = problem.nuisances.prior.standard_deviations
-        scale = np.concatenate([problem.parameters.reach, 10.0 * along])
-        whitening = np.linalg.inv(problem.prior.factor)
-        open_ends = ((problem.mode.low, -np.inf), (problem.mode.high, np.inf))
-        low, high = (np.pad(end, (0, len(along)), constant_values=sign) for end, sign in open_ends)
-        x0 = start.coordinates
-        bounds = np.minimum((low - x0) / scale, 0.0), np.maximum((high - x0) / scale, 0.0)
+        scale, whitening = problem.parameters.reach, np.linalg.inv(mode.gaussian.factor)
+        x0 = start.state.theta
+        bounds = np.minimum((mode.low - x0) / scale, 0.0), np.maximum((mode.high - x0) / scale, 0.0)
 
         def rows(z: Floats) -> Floats:
             """In standard deviations, those of the prior among them."""
             nonlocal newton, trial
             there = start
             if z.any():
-                theta, nuisances = np.split(x0 + scale * z, [len(problem.parameters)])
+                theta = x0 + scale * z
                 problem.parameters.require_possible(theta)
                 here, derivatives = best
                 # where derivatives say the state will be
                 predicted = here.state.u + np.tensordot(theta - here.state.theta, derivatives.du, axes=1)
                 state = problem.forward.solve_from(theta, (predicted, here.state.u))
                 newton += state.newton_iterations
-                there = problem.at(state, nuisances, start.noise)
+                there = problem.beside(start, state)
                 if there.objective < here.objective:
                     trial = there, problem.linearise(there)
-            white = start.noise.standardised(there.rows.residual)
-            return np.concatenate([white, whitening @ (there.coordinates - problem.prior.mean)])
+            white = start.model.standardised(there.residual)
+            return np.concatenate([white, whitening @ (there.state.theta - mode.gaussian.mean)])
 
         def columns(_z: Floats) -> Floats:
             nonlocal best
             best = trial
-            return np.concatenate([start.noise.standardised(best[1].jacobian), whitening]) * scale
+            return np.concatenate([-start.model.standardised(best[1].columns), whitening]) * scale
 
         def on_step(decrement: float, share: float) -> None:
             nonlocal newton

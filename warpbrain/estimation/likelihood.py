@@ -5,9 +5,6 @@ factor that nobody knows exactly, and points whose noise is many times larger (`
 `inference.gross_errors`). About a fit everything is linear, with columns of one standard deviation of all that is
 estimated: `w` and `kappa` are those that are most probable with these integrated out, and so is a standard deviation
 that was not declared. The fit goes on with them until they stay as they are.
-
-Far from the estimate most of a residual is no noise yet. There each recording's noise is taken to be independent and as
-large as its residuals are, but no less than declared.
 """
 
 from __future__ import annotations
@@ -23,9 +20,8 @@ from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.estimation.observations import Sensors
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import with_gross_errors
-from warpbrain.inference.noise import Outliers, log_scale_density, noise_factor, outliers, scales
-from warpbrain.recordings.comparison import root_mean_square
+from warpbrain.inference.gross_errors import columns_of_inflation, louder, with_gross_errors
+from warpbrain.inference.noise import Outliers, log_scale_density, outliers, scales
 
 #: An undeclared noise is no smaller [m] or [N]: below this it is rounding of the computation.
 LEAST_SIGMA = 1e-9
@@ -62,10 +58,16 @@ class Noise:
 
     rows: Sensors
     sigma: Floats  # (n,), of the independent part of each number, at a scale of 1
+    unresolved: float  # part of the change over an element that the mesh does not show
+    outliers: Outliers | None  # what was believed of gross errors; None: there are none
+    sound: GaussianModel  # of the noise at a scale of 1 if nothing is a gross error
     scale: float  # factor on all of it
     inflation: Floats  # (g,), how many times larger the noise of each point is: 1, or more of a gross error
-    outliers: Outliers | None  # what was believed of them; None: there are none
-    unresolved: float = 0.0  # part of the change over an element that the mesh does not show
+
+    @classmethod
+    def of(cls, rows: Sensors, sigma: Floats, unresolved: float, outliers: Outliers | None, scale: float) -> Noise:
+        """Noise of rows that are all sound."""
+        return cls(rows, sigma, unresolved, outliers, rows.noise(sigma, unresolved), scale, np.ones(len(rows.points)))
 
     @property
     def gross(self) -> Bools:
@@ -73,18 +75,15 @@ class Noise:
         return self.inflation > 1.0
 
     @cached_property
-    def _covariance(self) -> Floats:
-        """Of the noise at a scale of 1 (n, n), without gross errors."""
-        return self.rows.noise_covariance(self.sigma, self.unresolved * self.rows.over_element)
+    def model(self) -> GaussianModel:
+        """Of rows without anything that is estimated, at this scale and with these gross errors."""
+        return self._model_at_one.with_scale(self.scale)
 
     @cached_property
-    def factor(self) -> Floats:
-        """Lower factor (n, n) of the covariance at a scale of 1, with gross errors in it."""
-        covariance = self._covariance.copy()
-        for number in np.flatnonzero(self.gross).tolist():
-            numbers = self.rows.points[number]
-            covariance[np.ix_(numbers, numbers)] *= self.inflation[number] ** 2
-        return noise_factor(covariance, self.sigma)
+    def _model_at_one(self) -> GaussianModel:
+        if not self.gross.any():
+            return self.sound
+        return louder(self.sound, columns_of_inflation(self.sound, self.rows.points, self.inflation))
 
     @cached_property
     def log_prior(self) -> float:
@@ -96,21 +95,9 @@ class Noise:
         return log_density
 
     @cached_property
-    def _model(self) -> GaussianModel:
-        return GaussianModel(self.factor, np.zeros((len(self.rows), 0)), self.scale)
-
-    def negative_log(self, residual: Floats) -> float:
-        """`-ln p` of residuals (n,), with that of the noise itself."""
-        return -float(self._model.log_density(residual)) - self.log_prior
-
-    def standardised(self, numbers: Floats) -> Floats:
-        """Numbers (n, ...) in coordinates in which noise is independent and of unit variance."""
-        return self._model.whitened(numbers)
-
-    @cached_property
     def deviation(self) -> Floats:
         """Of each number (n,), with what neighbours share and without gross errors."""
-        return self.scale * np.sqrt(np.diag(self._covariance))
+        return self.scale * np.sqrt(np.diag(self.sound.noise_covariance))
 
     def is_near(self, other: Noise) -> bool:
         """Whether another one has the same gross errors and nearly the same size."""
@@ -119,59 +106,32 @@ class Noise:
 
     def log_evidence(self, expected: Floats, columns: Floats) -> float:
         """`ln p` of residuals (n,) with columns (n, k) integrated out, and of the noise itself."""
-        return float(self._model.with_columns(columns).log_density(expected)) + self.log_prior
+        return float(self.model.with_columns(columns).log_density(expected)) + self.log_prior
 
     def with_gross_errors(self, expected: Floats, columns: Floats) -> Noise:
         """The same with the most probable gross errors; arguments as of `log_evidence`."""
         if self.outliers is None or not self.rows.points:
             return self
-        sound = self._but(self.scale, np.ones_like(self.inflation))
-        model = sound._model.with_columns(columns)
+        model = self.sound.of_noise(columns, self.scale)
         inflation = with_gross_errors(model, expected, self.rows.points, self.outliers).inflation
-        return self if np.array_equal(inflation, self.inflation) else sound._but(self.scale, inflation)
+        return self if np.array_equal(inflation, self.inflation) else replace(self, inflation=inflation)
 
     def with_likely_scale(self, expected: Floats, columns: Floats) -> Noise:
         """The same with the most probable factor on it."""
         low, *_, high = sorted(scales()[0].tolist())
-        model = self._model.of_noise(columns)
-        return self._but(_likely_scale(model, expected, low, high, log_scale_density), self.inflation)
-
-    def _but(self, scale: float, inflation: Floats) -> Noise:
-        """The same of another scale, or with other gross errors: what neither changes is not made again."""
-        other = replace(self, scale=scale, inflation=inflation)
-        other.__dict__["_covariance"] = self._covariance
-        if np.array_equal(other.inflation, self.inflation):
-            other.__dict__["factor"] = self.factor
-            other.__dict__["_model"] = self._model.of_noise(self._model.columns, other.scale)
+        model = self.model.of_noise(columns)
+        other = replace(self, scale=_likely_scale(model, expected, low, high, log_scale_density))
+        other.__dict__["_model_at_one"] = self._model_at_one
         return other
 
     def with_likely_sigma(self, members: Bools, expected: Floats, columns: Floats) -> Noise:
         """The same with another size of a recording (n,) that declares none: the likeliest of its own rows."""
-        model = self._model.of_noise(columns).rows(members)
+        model = self.model.of_noise(columns).rows(members)
         size = _likely_scale(model, expected[members], math.exp(-2.0), math.exp(2.0))
         likely = np.maximum(size / self.scale * self.sigma, LEAST_SIGMA)
-        return replace(self, sigma=np.where(members, likely, self.sigma))
-
-
-class IndependentNoise(Noise):
-    """Independent noise, sound and of a scale of 1, for the way to the estimate."""
-
-    @classmethod
-    def as_large_as(cls, rows: Sensors) -> IndependentNoise:
-        """As large as the residuals of each recording are, but no less than declared."""
-        sigma, declared, undeclared = _beginnings(rows)
-        for each, least in ((declared, 1.0), (undeclared, LEAST_SIGMA)):
-            for members in each:
-                sigma[members] *= max(root_mean_square(rows.residual[members] / sigma[members]), least)
-        return cls(rows, sigma, 1.0, np.ones(len(rows.points)), None)
-
-    def negative_log(self, residual: Floats) -> float:
-        """`-ln p` of residuals (n,), up to a constant."""
-        return float(np.sum(np.log(self.sigma) + 0.5 * self.standardised(residual) ** 2))
-
-    def standardised(self, numbers: Floats) -> Floats:
-        """Numbers (n, ...) in units of the noise."""
-        return np.asarray((numbers.T / self.sigma).T)
+        sigma = np.where(members, likely, self.sigma)
+        other = Noise.of(self.rows, sigma, self.unresolved, self.outliers, self.scale)
+        return replace(other, inflation=self.inflation)
 
 
 def _likely_scale(
@@ -194,16 +154,20 @@ class Likelihood:
 
     outliers: Outliers | None = field(default_factory=outliers)
 
-    def noise(self, rows: Sensors, left: Floats, expected: Floats, columns: Floats) -> Noise:
-        """The most probable noise about a fit, which leaves residuals `left` (n,).
+    def noise(self, rows: Sensors, expected: Floats, columns: Floats) -> Noise:
+        """The most probable noise about a fit.
 
-        In the middle of the prior they are `expected` (n,), by the linear model about the fit, and one standard
+        In the middle of the prior residuals are `expected` (n,), by the linear model about the fit, and one standard
         deviation of each number that is estimated changes them by `columns` (n, k).
         """
         sigma, declared, undeclared = _beginnings(rows)
-        for members in undeclared:
-            size = typical_size(left[members] / sigma[members], rows.groups[members])
-            sigma[members] *= max(size, LEAST_SIGMA)
+        left = expected
+        for _ in range(2 if undeclared else 0):
+            for members in undeclared:
+                size = typical_size(left[members] / sigma[members], rows.groups[members])
+                sigma[members] = np.maximum(size * sigma[members], LEAST_SIGMA)
+            # a fit as rough as what is expected: what it leaves is where the search begins
+            left = expected - columns @ GaussianModel(np.diag(sigma), columns).coefficients(expected)[0]
 
         def settled(noise: Noise) -> Noise:
             """Gross errors, undeclared noise and scale in turn until they stay."""
@@ -218,14 +182,15 @@ class Likelihood:
                     break
             return noise
 
-        start = Noise(rows, sigma, 1.0, np.ones(len(rows.points)), self.outliers)
+        start = Noise.of(rows, sigma, 0.0, self.outliers, 1.0)
         # gross errors first, and all points sound first
         starts = [start] if self.outliers is None else [start, start.with_likely_scale(expected, columns)]
         best = max((settled(begun) for begun in starts), key=lambda noise: noise.log_evidence(expected, columns))
         if not rows.over_element.any() or self.outliers is None:
             return best
         for part in beliefs("mesh.unresolved")[1:].tolist():
-            other = settled(replace(best, unresolved=part))
+            begun = Noise.of(rows, best.sigma, part, self.outliers, best.scale)
+            other = settled(replace(begun, inflation=best.inflation))
             if other.log_evidence(expected, columns) < best.log_evidence(expected, columns):
                 break
             best = other

@@ -24,7 +24,8 @@ from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
 from warpbrain.estimation.within_element import change_over_element, turn_over_element
-from warpbrain.inference.noise import noise_covariance
+from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.noise import noise_covariance, noise_factor
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.quality import extent
 from warpbrain.mesh.surface import feature_normals
@@ -86,9 +87,14 @@ class Sensors:
         ends = np.flatnonzero(np.diff(self.groups[rows])) + 1
         return tuple(np.split(rows, ends)) if len(rows) else ()
 
-    def noise_covariance(self, sigma: Floats, unresolved: Floats | None = None) -> Floats:
-        """Covariance (n, n) of the noise at a scale of 1; `unresolved` (n, 3) as of `warpbrain.inference.noise`."""
-        return noise_covariance(self.positions, self.directions, self.times, sigma, self.radius, unresolved)
+    def noise(self, sigma: Floats, unresolved: float = 0.0) -> GaussianModel:
+        """Of the noise alone, at a scale of 1.
+
+        `sigma` (n,): of its independent part. `unresolved`: part of the change over an element that a mesh hides.
+        """
+        hidden = unresolved * self.over_element
+        covariance = noise_covariance(self.positions, self.directions, self.times, sigma, self.radius, hidden)
+        return GaussianModel(noise_factor(covariance, sigma), np.zeros((len(self), 0)))
 
     def of_rows(self, rows: Ints | Bools, time: float | None = None) -> Sensors:
         """Some of the rows (k,), or (n,) bool; with `time` [s] as if recorded then, and counted from rest."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.moments import Moments
 from warpbrain.estimation.finer_mesh import DiscretisationError
 from warpbrain.estimation.fit import Estimate, probabilities
+from warpbrain.estimation.likelihood import Noise
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
@@ -92,13 +93,13 @@ def predictions(
 ) -> tuple[Prediction, ...]:
     """Recordings of one role, ``"fit"`` or ``"check"``, beside an estimate.
 
-    `joint` (p + q, p + q) is the covariance of parameters and nuisances.
+    `joint` (p + q, p + q) is the covariance of parameters and nuisances in standard deviations of their prior.
     """
     from scipy.special import ndtri
 
     if not observations.recordings:
         return ()
-    problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised
+    problem, point, derivatives = estimate.problem, estimate.point, estimate.linearised.derivatives
     centre, motion = problem.observations.centre, problem.nuisances.motion(point.nuisances)
     rest = np.zeros_like(point.state.u)
     seen = problem.nuisances.observed(point.state, point.nuisances)
@@ -106,8 +107,8 @@ def predictions(
     moments = problem.forward.moments
     run = compared(case, point.state.u, point.state.reactions, moments)
     fitted = compared(realigned(case, motion, centre), *seen, moments)
-    jacobian = problem.nuisances.jacobian(after, point.state.theta, point.nuisances, derivatives.du, derivatives.dR)
-    deviations = np.sqrt(np.einsum("np,pq,nq->n", jacobian, joint, jacobian))
+    columns = problem.columns(after, estimate.theta, point.nuisances, derivatives)
+    deviations = np.sqrt(np.einsum("np,pq,nq->n", columns, joint, columns))
     results = []
     for number, name in enumerate(after.names):
         members = np.flatnonzero(after.recordings == number)
@@ -119,9 +120,9 @@ def predictions(
             # of a recording that was not fitted, its gross errors beside what the estimate knows of it
             undeclared = np.isnan(seen_rows.sigma)
             sigmas = np.where(undeclared, 1.0 / np.sqrt(seen_rows.weights), seen_rows.sigma)
-            noise = replace(noise, rows=seen_rows, sigma=sigmas, inflation=np.ones(len(seen_rows.points)))
+            noise = Noise.of(seen_rows, sigmas, noise.unresolved, noise.outliers, noise.scale)
             if not undeclared.any():
-                noise = noise.with_gross_errors(seen_rows.residual, jacobian[members] @ np.linalg.cholesky(joint))
+                noise = noise.with_gross_errors(seen_rows.residual, columns[members] @ np.linalg.cholesky(joint))
         noise_rows = members if role == "fit" else members - members[0]
         known = role == "fit" or first.sigma is not None
         gross = noise.gross[[k for k, at in enumerate(noise.rows.points) if noise_rows[0] <= at[0] <= noise_rows[-1]]]
@@ -366,19 +367,18 @@ class Posterior(Shown):
 
     @cached_property
     def joint_covariance(self) -> Floats:
-        """Of parameters and nuisances by Laplace, shape (p + q, p + q)."""
-        information = self.best.linearised.hessian
-        # metres, radians and plain numbers: one size for all
-        size = np.sqrt(np.diag(information))
-        return np.asarray(np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size))
+        """Of parameters and nuisances in standard deviations of their prior by Laplace, shape (p + q, p + q)."""
+        point, linearised, problem = self.best.point, self.best.linearised, self.best.problem
+        columns = problem.columns(point.rows, self.theta, point.nuisances, linearised.derivatives)
+        return point.model.of_noise(columns, point.noise.scale).coefficients(point.residual)[1]
 
     @property
     def nuisances(self) -> tuple[tuple[str, float, float], ...]:
         """Name, estimate and standard deviation of each."""
-        p = len(self.parameters)
-        names = self.best.problem.nuisances.names
-        values, deviations = self.best.point.nuisances, np.sqrt(np.diag(self.joint_covariance))[p:]
-        return tuple(zip(names, values.tolist(), deviations.tolist(), strict=True))
+        nuisances, values = self.best.problem.nuisances, self.best.point.nuisances
+        variances = np.diag(self.joint_covariance)[len(self.parameters) :]
+        deviations = nuisances.prior.standard_deviations * np.sqrt(variances)
+        return tuple(zip(nuisances.names, values.tolist(), deviations.tolist(), strict=True))
 
     @cached_property
     def identifiability(self) -> Identifiability:

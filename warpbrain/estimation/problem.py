@@ -1,8 +1,12 @@
 """Likelihood times prior of a case's parameters, at a point and to first order about it.
 
-Beside the tissue nuisances are estimated: what acts on the recordings and is no property of it, the error of the mesh
-(`finer_mesh`), 37 numbers, and a rigid error of registration, six. Both have normal distributions beforehand and are
-integrated out of what is said of the tissue.
+Beside the tissue nuisances act on the recordings, which are no property of it: the error of the mesh (`finer_mesh`), 37
+numbers, and a rigid error of registration, six. As in a diagnosis they are columns `U` of a linear model
+
+    r = U xi + e,   xi ~ N(0, I),   e: the noise (`likelihood`)
+
+of what was recorded less what parameters make of it, and integrated out. The motion is no linear thing, nor is the
+error of the mesh: they are linear about values that are found again and again until they are the most probable ones.
 """
 
 from __future__ import annotations
@@ -16,15 +20,16 @@ from warpbrain.arrays import Floats
 from warpbrain.estimation.finer_mesh import NAMES as DISCRETISATION_NAMES
 from warpbrain.estimation.finer_mesh import Discretisation, DiscretisationError
 from warpbrain.estimation.forward import Forward, State
-from warpbrain.estimation.likelihood import IndependentNoise, Likelihood, Noise
+from warpbrain.estimation.likelihood import Likelihood, Noise
 from warpbrain.estimation.observations import Observations, Sensors
 from warpbrain.estimation.parameters import Gaussian, Parameters, PriorMode
 from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
-from warpbrain.inference.least_squares import minimise
+from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.recordings.base import Registration
 
-#: Nuisances are at their best when the next step is shorter than this [standard deviations].
-_AT_BEST = 1e-5
+#: Nuisances are at their best when they move by less than this [standard deviations of what is known of them then], and
+#: how often they are moved at most.
+_AT_BEST, _MOST = 1e-4, 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +46,6 @@ class Nuisances:
         first = DISCRETISATION_NAMES if self.error is not None else ()
         return first + (REGISTRATION_NAMES if self.registration is not None else ())
 
-    def __len__(self) -> int:
-        return len(self.names)
-
     @cached_property
     def prior(self) -> Gaussian:
         """Before anything was observed."""
@@ -55,6 +57,10 @@ class Nuisances:
             means.append(np.zeros(6))
             deviations.append(self.registration.deviations)
         return Gaussian(np.concatenate(means), np.diag(np.concatenate(deviations) ** 2))
+
+    def standardised(self, values: Floats) -> Floats:
+        """Values (q,) as coordinates `xi` (q,)."""
+        return (values - self.prior.mean) / self.prior.standard_deviations
 
     def observed(self, state: State, values: Floats) -> tuple[Floats, Floats]:
         """Displacement and reactions (n, 3) without the error of the mesh."""
@@ -68,20 +74,20 @@ class Nuisances:
         return np.zeros(6) if self.registration is None else values[-6:]
 
     def columns(self, rows: Sensors, theta: Floats, values: Floats) -> Floats:
-        """Derivatives (n, q) of the residuals of rows by the nuisances."""
+        """What one standard deviation of each changes of what is recorded, about values (q,): (n, q)."""
         blocks = [np.zeros((len(rows), 0))]
         if self.error is not None:
-            blocks.append(-rows.answers_in_time(*self.error.by_values(theta, values[: len(DISCRETISATION_NAMES)])))
+            blocks.append(rows.answers_in_time(*self.error.by_values(theta, values[: len(DISCRETISATION_NAMES)])))
         if self.registration is not None:
-            blocks.append(-rows.rigid)
-        return np.concatenate(blocks, axis=1)
+            blocks.append(rows.rigid)
+        return np.concatenate(blocks, axis=1) @ self.prior.factor
 
-    def jacobian(self, rows: Sensors, theta: Floats, values: Floats, du: Floats, dR: Floats) -> Floats:
-        """Derivatives (n, p + q) of residuals by `theta`, from those of the state (p, n, 3), and by the nuisances."""
+    def tissue_columns(self, rows: Sensors, values: Floats, du: Floats, dR: Floats) -> Floats:
+        """What parameters change of what is recorded (n, p), by the derivatives (p, n, 3) of the state."""
         if self.error is not None:
             more_du, more_dR = self.error.by_theta(values[: len(DISCRETISATION_NAMES)])
             du, dR = du + more_du, dR + more_dR
-        return np.concatenate([-rows.answers_in_time(du, dR), self.columns(rows, theta, values)], axis=1)
+        return rows.answers_in_time(du, dR)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,27 +95,28 @@ class Point:
     """Parameters with everything that is known there."""
 
     state: State
-    nuisances: Floats  # (q,)
-    rows: Sensors  # with a rigid motion of what was recorded taken off
+    nuisances: Floats  # (q,), values that they are linear about
+    rows: Sensors  # with these taken off
     noise: Noise
-    misfit: float  # `-ln` of the likelihood and of the nuisances' density
+    model: GaussianModel  # of the rows, with the nuisances as its columns
+    residual: Floats  # (n,), of that model: with nuisances in the middle of their prior
+    misfit: float  # `-ln` of the likelihood
     objective: float  # with that of the prior
-
-    @property
-    def coordinates(self) -> Floats:
-        """Parameters and nuisances, shape (p + q,)."""
-        return np.concatenate([self.state.theta, self.nuisances])
 
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """Derivatives of the objective at a point by `theta` and the nuisances, p + q numbers."""
+    """A point to first order in `theta`."""
 
-    jacobian: Floats  # (n, p + q), of the residuals
-    information: Floats  # (p + q, p + q), of the data alone
-    hessian: Floats  # of the objective, to first order in the residuals: positive definite
+    columns: Floats  # (n, p), change of what is recorded by `theta`
+    information: Floats  # (p, p), of the data alone
     du: Floats  # (p, N, 3), of the displacement [m] by `theta`
     dR: Floats  # (p, N, 3), of the reactions [N]
+
+    @property
+    def derivatives(self) -> tuple[Floats, Floats]:
+        """Those of the state."""
+        return self.du, self.dR
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,58 +134,56 @@ class Problem:
         """What `theta` means."""
         return self.forward.parameters
 
-    @cached_property
-    def prior(self) -> Gaussian:
-        """Of parameters and nuisances together."""
-        from scipy.linalg import block_diag
+    def seen(self, state: State, nuisances: Floats) -> Sensors:
+        """What was recorded beside a state, values of nuisances (q,) taken off."""
+        return self.observations.at(*self.nuisances.observed(state, nuisances), motion=self.nuisances.motion(nuisances))
 
-        tissue, nuisances = self.mode.gaussian, self.nuisances.prior
-        mean = np.concatenate([tissue.mean, nuisances.mean])
-        return Gaussian(mean, block_diag(tissue.covariance, nuisances.covariance))
+    def at(self, state: State, nuisances: Floats, noise: Noise) -> Point:
+        """The objective at a state, nuisances linear about some values (q,) of them."""
+        rows = self.seen(state, nuisances)
+        model = noise.model.of_noise(self.nuisances.columns(rows, state.theta, nuisances), noise.scale)
+        return self._point(state, nuisances, rows, noise, model)
 
-    def at(self, state: State, nuisances: Floats, noise: Noise | None = None) -> Point:
-        """The objective at a state; noise that is as large as the residuals are, unless it is known."""
-        seen = self.nuisances.observed(state, nuisances)
-        rows = self.observations.at(*seen, motion=self.nuisances.motion(nuisances))
-        known = IndependentNoise.as_large_as(rows) if noise is None else noise
-        misfit = known.negative_log(rows.residual) + self.nuisances.prior.negative_log(nuisances)
-        return Point(state, nuisances, rows, known, misfit, misfit + self.mode.gaussian.negative_log(state.theta))
+    def beside(self, point: Point, state: State) -> Point:
+        """The objective at a state near a point, with the same columns of nuisances."""
+        rows = self.seen(state, point.nuisances)
+        return self._point(state, point.nuisances, rows, point.noise, point.model)
+
+    def _point(self, state: State, nuisances: Floats, rows: Sensors, noise: Noise, model: GaussianModel) -> Point:
+        residual = rows.residual + model.columns @ self.nuisances.standardised(nuisances)
+        misfit = -float(model.log_density(residual)) - noise.log_prior
+        objective = misfit + self.mode.gaussian.negative_log(state.theta)
+        return Point(state, nuisances, rows, noise, model, residual, misfit, objective)
+
+    def at_best(self, point: Point) -> Point:
+        """The same with nuisances linear about their most probable values; no equilibrium is solved."""
+        prior = self.nuisances.prior
+        for _ in range(_MOST):
+            xi, _ = point.model.coefficients(point.residual)
+            change = xi - self.nuisances.standardised(point.nuisances)
+            seen = point.model.whitened(point.model.columns @ change)
+            if np.linalg.norm(np.concatenate([seen, change])) <= _AT_BEST:
+                break
+            point = self.at(point.state, prior.mean + prior.standard_deviations * xi, point.noise)
+        return point
 
     def linearise(self, point: Point, derivatives: tuple[Floats, Floats] | None = None) -> Linearised:
         """Derivatives at a point, from those of its state, or `SolveError` if that is unstable."""
         du, dR = self.forward.differentiate(point.state) if derivatives is None else derivatives
-        jacobian = self.nuisances.jacobian(point.rows, point.state.theta, point.nuisances, du, dR)
-        J = point.noise.standardised(jacobian)
-        return Linearised(jacobian, J.T @ J, J.T @ J + self.prior.precision, du, dR)
+        columns = self.nuisances.tissue_columns(point.rows, point.nuisances, du, dR)
+        J = point.model.standardised(columns)
+        return Linearised(columns, J.T @ J, du, dR)
 
-    def with_likely_noise(self, point: Point, linearised: Linearised) -> Point:
-        """The point with the most probable noise, everything that is estimated integrated out about it."""
-        columns, residual = linearised.jacobian @ self.prior.factor, point.rows.residual
-        expected = residual + linearised.jacobian @ (self.prior.mean - point.coordinates)
-        noise = self.likelihood.noise(point.rows, residual, expected, columns)
-        return self.at(point.state, point.nuisances, noise)
+    def likely_noise(self, state: State, nuisances: Floats, derivatives: tuple[Floats, Floats]) -> Noise:
+        """The most probable noise about a state with its derivatives, everything that is estimated integrated out."""
+        rows, prior = self.seen(state, nuisances), self.mode.gaussian
+        columns = self.columns(rows, state.theta, nuisances, derivatives)
+        z = np.concatenate(
+            [np.linalg.solve(prior.factor, state.theta - prior.mean), self.nuisances.standardised(nuisances)]
+        )
+        return self.likelihood.noise(rows, rows.residual + columns @ z, columns)
 
-    def without_nuisances(self, state: State, start: Floats, noise: Noise) -> tuple[float, Point]:
-        """`-ln` of the likelihood of a state with the nuisances integrated out (Laplace), and their best values.
-
-        No equilibrium is solved: nuisances act on what is observed of the state.
-        """
-        prior, point = self.nuisances.prior, self.at(state, start, noise)
-        if len(self.nuisances) == 0:
-            return point.misfit, point
-        size = prior.standard_deviations
-
-        def rows(z: Floats) -> Floats:
-            nonlocal point
-            point = self.at(state, prior.mean + size * z, noise)
-            return np.concatenate([noise.standardised(point.rows.residual), z])
-
-        def columns(z: Floats) -> Floats:
-            at = self.nuisances.columns(point.rows, state.theta, prior.mean + size * z)
-            return np.concatenate([noise.standardised(at * size), np.eye(len(z))])
-
-        z, _ = minimise(rows, columns, (start - prior.mean) / size, _AT_BEST)
-        rows(z)
-        W = columns(z)
-        log_volume = np.linalg.slogdet(W.T @ W)[1] - 2.0 * np.log(size).sum()
-        return point.misfit + 0.5 * float(log_volume), point
+    def columns(self, rows: Sensors, theta: Floats, nuisances: Floats, derivatives: tuple[Floats, Floats]) -> Floats:
+        """What one standard deviation of each parameter and nuisance changes of what is recorded: (n, p + q)."""
+        tissue = self.nuisances.tissue_columns(rows, nuisances, *derivatives) @ self.mode.gaussian.factor
+        return np.concatenate([tissue, self.nuisances.columns(rows, theta, nuisances)], axis=1)

@@ -70,8 +70,8 @@ class Target:
         return min(self.modes, key=lambda mode: mode.laplace.posterior.negative_log(theta))
 
     def _log_density(self, state: State, start: Point) -> float:
-        misfit, _ = self.problem.without_nuisances(state, start.nuisances, start.noise)
-        return float(self.prior.log_density(state.theta)) - misfit
+        point = self.problem.at_best(self.problem.at(state, start.nuisances, start.noise))
+        return float(self.prior.log_density(state.theta)) - point.misfit
 
     def _possible(self, theta: Floats) -> bool:
         try:

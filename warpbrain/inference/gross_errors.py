@@ -203,6 +203,12 @@ def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation
     return np.concatenate(blocks, axis=1)
 
 
+def louder(model: GaussianModel, excess: Floats) -> GaussianModel:
+    """The noise of a model alone, with excess noise, columns (n, e), in it."""
+    factor: Floats = np.asarray(np.linalg.cholesky(model.noise_covariance + excess @ excess.T), dtype=np.float64)
+    return GaussianModel(factor, np.zeros((len(factor), 0)))
+
+
 class _Search:
     """The inflation of each point, and the inverse of the covariance with them, as updates of that with none.
 
@@ -355,9 +361,7 @@ class Marginal(Summed):
     @cached_property
     def noise(self) -> GaussianModel:
         """Of the noise alone, with the excess noise of gross errors."""
-        covariance = self.model.noise_covariance + self.excess @ self.excess.T
-        factor: Floats = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-        return GaussianModel(factor, np.zeros((len(factor), 0)))
+        return louder(self.model, self.excess)
 
     def coordinates(self, residual: Floats) -> Floats:
         """Mean of the coefficients (q,) of the hypothesis after residuals (n,)."""

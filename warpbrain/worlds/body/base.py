@@ -22,7 +22,7 @@ from warpbrain.estimation.registration import registration_of
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.gross_errors import columns_of_inflation, with_gross_errors
-from warpbrain.inference.noise import noise_factor, outliers, scales
+from warpbrain.inference.noise import outliers, scales
 from warpbrain.mesh.refinement import finer_mesh
 from warpbrain.simulation.locking import on_linear_elements
 from warpbrain.threads import beside
@@ -157,10 +157,10 @@ class BaseFinder:
         # products with the compliance, which leave Python's lock alone, beside candidates that do not
         begun_sources = beside(partial(sources, linear.at, self._spacing, linear.typical_noise))
         unknown = fields(linear.at, linear.lengths, linear.body_forces)
-        nuisances, factor = linear.nuisances, linear.noise_factor
+        nuisances, noise = linear.nuisances, linear.noise_model
         if errors is not None and not self._without_nuisances:
             smooth = unknown[next(iter(unknown))]
-            nuisances = _with_likely_fraction(nuisances, factor, linear.residual, linear.typical_noise * smooth)
+            nuisances = _with_likely_fraction(nuisances, noise, linear.residual, linear.typical_noise * smooth)
         return Base(
             self.states,
             self.prior,
@@ -172,7 +172,7 @@ class BaseFinder:
             unknown,
             begun_sources,
             resistances(linear.at, self.states.times, other_volume(self.states), next(iter(unknown.values()))),
-            GaussianModel(factor, nuisances.columns),
+            noise.of_noise(nuisances.columns),
             _noises(linear, resolved=errors is None or self._without_nuisances),
             linear.noise,
             linear.points,
@@ -187,7 +187,7 @@ class BaseFinder:
         # until points of a surface are compared with the right faces the registration may seem wrong by more than it is
         registration, factor = nuisances.part("registration"), belief("registration.rough")
         columns = np.column_stack([nuisances.columns, linear.smooth_force, factor * nuisances.columns[:, registration]])
-        model = GaussianModel(linear.noise_factor, columns)
+        model = linear.noise_model.of_noise(columns)
         values, log_prior = scales()
         model = model.with_scale(model.likely_scale(linear.residual, values, log_prior))
         inflation = with_gross_errors(model, linear.residual, linear.points, outliers()).inflation
@@ -241,7 +241,7 @@ class _LinearModel:
         #: Columns of smooth forces as large as the residuals.
         self.smooth_force = size * smooth
         self.noise = noise_of(sensors, self.residual, self.nuisances.columns, smooth)
-        self.noise_factor = noise_factor(sensors.noise_covariance(self.noise), self.noise)
+        self.noise_model = sensors.noise(self.noise)
         self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
         self.points = sensors.points
 
@@ -260,23 +260,20 @@ class _LinearModel:
 
 def _noises(linear: _LinearModel, resolved: bool) -> tuple[GaussianModel, ...]:
     """Noise with each size of what the mesh does not resolve; the first one alone if that is `resolved`."""
-    sensors, nothing = linear.at.sensors, np.zeros((len(linear.noise), 0))
+    sensors = linear.at.sensors
     sizes = beliefs("mesh.unresolved")
     visible = sizes.max() * np.linalg.norm(sensors.over_element, axis=1) > _UNSEEN * linear.noise
-    factors = [linear.noise_factor]
-    for size in sizes[1:].tolist() if visible.any() and not resolved else []:
-        covariance = sensors.noise_covariance(linear.noise, size * sensors.over_element)
-        factors.append(noise_factor(covariance, linear.noise))
-    return tuple(GaussianModel(factor, nothing) for factor in factors)
+    further = sizes[1:].tolist() if visible.any() and not resolved else []
+    return linear.noise_model, *(sensors.noise(linear.noise, size) for size in further)
 
 
-def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats, smooth: Floats) -> Nuisances:
+def _with_likely_fraction(nuisances: Nuisances, noise: GaussianModel, residual: Floats, smooth: Floats) -> Nuisances:
     """Nuisances with the posterior root mean square of the unknown part of the mesh's error.
 
     It depends on the mesh, the load and the sensors; if it is overestimated it hides what is missing. Its evidence is
     that of models with and without a smooth force, so that a missing cause is not taken for an error of the mesh.
 
-    `factor` (n, n): of the noise.
+    `noise`: without columns.
     `residual` (n,).
     `smooth` (n, k): columns of a smooth force as large as the noise.
     """
@@ -286,7 +283,7 @@ def _with_likely_fraction(nuisances: Nuisances, factor: Floats, residual: Floats
     values, log_prior = scales()
     scores = []
     for fraction in fractions.tolist():
-        model = GaussianModel(factor, nuisances.with_fraction(fraction).columns)
+        model = noise.of_noise(nuisances.with_fraction(fraction).columns)
         models = [model, *(model.with_columns(size * smooth) for size in beliefs("unknown.sizes")[1:-1].tolist())]
         logs = [alternative.log_marginal(residual, values, log_prior) for alternative in models]
         scores.append(logsumexp([logs[0], logsumexp(logs[1:]) - np.log(len(logs) - 1)]))

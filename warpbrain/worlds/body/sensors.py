@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats, Ints
-from warpbrain.estimation.likelihood import Likelihood, typical_size
+from warpbrain.estimation.likelihood import Likelihood
 from warpbrain.estimation.observations import Sensors as Sensors
 from warpbrain.estimation.registration import rigid_columns
 from warpbrain.mesh import TetMesh
@@ -91,12 +91,8 @@ def noise_of(sensors: Sensors, residual: Floats, nuisances: Floats, field: Float
     lengths = sensors.is_displacement
     size = root_mean_square(residual[lengths]) if lengths.any() else 0.0
     columns = np.column_stack([nuisances, max(size, 1e-9) * field])
-    # a smooth fit as rough as the residuals are: what it leaves is where the search begins
-    typical = max(typical_size(residual, sensors.groups), 1e-12)
-    W = columns / typical
-    left = residual - columns @ np.linalg.solve(np.eye(W.shape[1]) + W.T @ W, W.T @ (residual / typical))
     # what the mesh does not resolve is found with each set of causes
     resolved = replace(sensors, over_element=np.zeros_like(sensors.over_element))
-    noise = Likelihood().noise(resolved, left, residual, columns)
+    noise = Likelihood().noise(resolved, residual, columns)
     # a factor on noise of which none is declared is its size
     return noise.scale * noise.sigma if undeclared.all() else noise.sigma
