@@ -43,7 +43,7 @@ from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.placing import Weighing, moved_about_fit, with_refined_places
 from warpbrain.worlds.body.states import States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
-from warpbrain.worlds.body.weighted_set import Refit, WeightedSet, evidence_of
+from warpbrain.worlds.body.weighted_set import Refit, SetMarginal, WeightedSet, evidence_of
 
 #: Places of each cause of which pairs are made, and sets that are weighed with gross errors of their own.
 _PLACES, _SETS = 20, 12
@@ -223,32 +223,42 @@ class HypothesisSearch:
         """Fit a set; one that cannot be fitted keeps the reason."""
         candidate = self._sets[names]
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
+        fitted, gain = self._fitted(candidate)
+        if candidate.otherwise is not None:
+            otherwise = replace(candidate.otherwise, inherited_gain=candidate.inherited_gain)
+            ways = (fitted, gain), self._fitted(otherwise.with_evidence(candidate.hypothesis.log_evidence))
+            fitted, gain = max(ways, key=lambda way: (way[0].refit is not None, way[0].hypothesis.log_evidence))
+        self._sets[names] = fitted
+        if fitted.refit is not None:
+            self._pass_on(gain, names)
+            self._refit_subsets(names)
+
+    def _fitted(self, candidate: WeightedSet) -> tuple[WeightedSet, float]:
+        """A set that is fitted, and its gain over the linear model about the base; itself with why it cannot be."""
         subset = self._fitted_subset(candidate)
         if candidate.refit is None:
             source = self.base.effects if subset is None else self._expanded[subset.names]
             placed = 0 if subset is None else len(subset.effects)
             candidate = with_refined_places(self.base, candidate, self.spacing, source, placed)
-        starts, nearby = [candidate.coordinates], None
+        starts, nearby, screened = [candidate.coordinates], None, candidate.marginal
         if self.nothing.refit is not None and subset is None:
-            starts.append(self._coordinates_about(self.nothing.refit, candidate))
+            coordinates, screened = self._about_nothing(self.nothing.refit, candidate)
+            starts.append(coordinates)
             nearby = self.nothing.refit.state
         about = None if subset is None else subset.refit
         try:
-            refit = self._fitter.fit(candidate.effects, candidate.columns, starts, candidate.marginal, nearby, about)
+            refit = self._fitter.fit(candidate.effects, candidate.columns, starts, screened, nearby, about)
         except CANNOT_BE_FITTED as error:
-            self._sets[names] = replace(candidate, failure=str(error))
-            return
+            return replace(candidate, failure=str(error)), 0.0
         gain = refit.log_evidence - candidate.marginal.log_evidence
-        if not names:
+        if not candidate.names:
             # what the fit without any cause gains is of tissue and registration, and is gained by all others; a search
             # that ended too early must not make everything else look better
             gain = max(gain, 0.0)
         inherited = candidate.inherited_gain or 0.0
-        gain = inherited + _of_all_places(gain - inherited, candidate.log_share)
-        fitted = candidate.fitted(refit)
-        self._sets[names] = fitted.with_evidence(candidate.hypothesis.log_evidence - inherited + gain)
-        self._pass_on(gain, names)
-        self._refit_subsets(names)
+        further = _of_all_places(gain - inherited, candidate.log_share)
+        fitted = candidate.fitted(refit).with_evidence(candidate.hypothesis.log_evidence + further)
+        return fitted, inherited + further
 
     def _move(self, fitted: WeightedSet) -> None:
         """Fit a fitted set where its mechanisms are better placed."""
@@ -341,13 +351,21 @@ class HypothesisSearch:
         same = [subset for subset in subsets if subset.effects == candidate.effects[: len(subset.effects)]]
         return max(same, key=lambda subset: len(subset.names), default=None)
 
-    def _coordinates_about(self, nothing: Refit, candidate: WeightedSet) -> Floats:
-        """The most probable coordinates of a set in the linear model about the fit without any cause."""
+    def _about_nothing(self, nothing: Refit, candidate: WeightedSet) -> tuple[Floats, SetMarginal]:
+        """The most probable coordinates of a set in the linear model about the fit without any cause.
+
+        And the noise and gross errors that they are found with, of that model or of the one about the base: in which of
+        them the set is more probable. Far from the base sound points look like gross errors, and a fit that begins with
+        these does not find them sound again: it would lose to other sets for the state that it was weighed about.
+        """
+        nuisances, base = self.base.nuisances, self.base
         columns = np.column_stack([nothing.columns, candidate.columns[:, len(nothing.nuisances) :]])
-        nuisances = self.base.nuisances
+        residual = nothing.linear + candidate.residual - base.residual
+        _, marginal = evidence_of(base, columns, residual, nothing.marginal.scale, nothing.marginal.sizes)
+        if marginal.log_evidence < candidate.marginal.log_evidence:
+            marginal = candidate.marginal
         columns = nuisances.with_family(UNKNOWN_MESH, columns, candidate.columns[:, nuisances.part(UNKNOWN_MESH)])
-        model = GaussianModel(candidate.marginal.noise.noise_factor, columns)
-        return model.coefficients(nothing.linear + candidate.residual - self.base.residual)[0]
+        return GaussianModel(marginal.noise.noise_factor, columns).coefficients(residual)[0], marginal
 
     def _weigh_supersets(self, fitted: WeightedSet, refit: Refit) -> None:
         """Weigh every set of one cause more than a fitted one in the linear model about its fit."""
@@ -396,7 +414,7 @@ class HypothesisSearch:
                 log_prior=hypothesis.log_prior + fitted.hypothesis.log_prior,
                 log_evidence=fitted.hypothesis.log_evidence + gain,
             )
-            yield replace(candidate, hypothesis=joint, inherited_gain=None)
+            yield replace(candidate, hypothesis=joint, inherited_gain=None, otherwise=None)
 
 
 def _keep_better(sets: dict[frozenset[str], WeightedSet], candidate: WeightedSet) -> None:

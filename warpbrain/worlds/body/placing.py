@@ -169,8 +169,14 @@ class Weighing:
         log_evidence = float(np.logaddexp.reduce(logs) - np.logaddexp.reduce(shares))
         best = int(np.argmax(logs))
         of_places = float(np.logaddexp.reduce([configuration.log_share for configuration in configurations]))
-        log_share = min(float(logs[best] - np.logaddexp.reduce(logs)) + of_places, 0.0)
-        return replace(weighed[best].with_evidence(log_evidence), log_share=log_share)
+        log_shares = np.minimum(logs - np.logaddexp.reduce(logs) + of_places, 0.0)
+        weighed = [
+            replace(each.with_evidence(log_evidence), log_share=share)
+            for each, share in zip(weighed, log_shares.tolist(), strict=True)
+        ]
+        # what has no name acts as a field, which is linear, or as a source, which is not: in fits they are not as alike
+        others = [k for k in np.argsort(-logs).tolist() if weighed[k].acting != weighed[best].acting]
+        return replace(weighed[best], otherwise=weighed[others[0]] if others else None)
 
     def _weigh_at(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
         """The same as if its best configuration stood for all places."""
