@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from warpbrain.atomic import write_text
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.reading import read_case
 from warpbrain.cases.specimen import Specimen
@@ -24,7 +25,7 @@ from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.report.diagnosis.description import describe
 from warpbrain.report.diagnosis.files import write_curves, write_explained
-from warpbrain.report.diagnosis.page import write_page
+from warpbrain.report.diagnosis.page import page_of
 from warpbrain.report.diagnosis.text import diagnosis_lines
 from warpbrain.report.files import write_summary
 from warpbrain.terminal.quiet import start_warp_quietly
@@ -122,7 +123,7 @@ def diagnose(case: Case, out: Path, ends: bool = True) -> tuple[SpecimenDiagnosi
     if found.explained is not None:
         write_explained(beside / "explained", found.explained)
     write_summary(beside / "diagnosis.json", said)
-    write_page(beside / "report.html", found, said)
+    write_text(beside / "report.html", page_of(found, said))
     print(*diagnosis_lines(said), "", sep="\n", flush=True)
     return found, said
 

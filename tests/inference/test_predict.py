@@ -86,3 +86,21 @@ def test_random_draws_do_not_depend_on_axes_or_order(model, doubled):
         along_own_axes(other, mixed @ others[0], mixed @ residual),
     )
     np.testing.assert_allclose(mixed @ first, second, atol=1e-9)
+
+
+def test_nothing_is_drawn_where_draws_cannot_say_less(model, monkeypatch):
+    random = np.random.default_rng(6)
+    fields, sizes = [random.normal(size=(N, 3))], np.array([1.0])
+    row = draws(model, 1, random)[:, 0]
+
+    def p_of(bound: float, random: np.random.Generator) -> float:
+        return predictive_p(model, fields, sizes, row, 99, random, bound=bound)
+
+    both = [np.random.default_rng(7) for _ in range(2)]
+    alone = p_of(1.0, both[0])
+    assert p_of(0.5 * alone, np.random.default_rng(7)) == 0.5 * alone < alone
+    monkeypatch.setattr(FieldFactors, "of", None)
+    assert p_of(1e-9, both[1]) == 1e-9
+    # what is drawn next is the same
+    monkeypatch.undo()
+    assert p_of(1.0, both[0]) == p_of(1.0, both[1])

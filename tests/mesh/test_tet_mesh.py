@@ -132,6 +132,26 @@ def test_other_node_sets_share_what_is_known():
         other.node_sets["high"][0] = True
 
 
+def test_what_is_asked_again_and_again_is_made_once():
+    mesh, asked = two(), []
+
+    def volumes(times: float) -> np.ndarray:
+        def make() -> np.ndarray:
+            asked.append(times)
+            return times * mesh.volumes
+
+        return mesh.with_node_sets({}).made_once(("volumes", times), make)
+
+    assert volumes(2.0) is volumes(2.0)
+    with pytest.raises(ValueError, match="read-only"):
+        volumes(2.0)[0] = 1.0
+    for times in range(3, 12):
+        np.testing.assert_array_equal(volumes(times), times * mesh.volumes)
+    # only the last ones are kept
+    np.testing.assert_array_equal(volumes(2.0), 2.0 * mesh.volumes)
+    assert asked == [2.0, *range(3, 12), 2.0]
+
+
 def test_the_same_part_is_taken_out_once():
     mesh = two()
     first, second = np.array([True, False]), np.array([False, True])

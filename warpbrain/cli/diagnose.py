@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from warpbrain.atomic import safe_name
+from warpbrain.atomic import safe_name, write_text
 from warpbrain.cases.shipped import find_case
 from warpbrain.cli import warp
 from warpbrain.cli.log import note_case
@@ -16,13 +16,14 @@ from warpbrain.estimation.options import Listener
 from warpbrain.kernels.module import find_device
 from warpbrain.report.diagnosis import files
 from warpbrain.report.diagnosis.description import describe
-from warpbrain.report.diagnosis.page import write_page
+from warpbrain.report.diagnosis.page import page_of, pictures_of
 from warpbrain.report.diagnosis.text import diagnosis_lines
 from warpbrain.report.files import read_state, write_summary
 from warpbrain.terminal.memory import keep_freed_memory
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import choose_folder, results_in
+from warpbrain.threads import beside
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 
@@ -69,6 +70,8 @@ def diagnose(options: argparse.Namespace) -> None:
     summary = describe(diagnosis, chosen, device)
     say(*diagnosis_lines(summary), sep="\n")
     with results_in(out, record, options.overwrite):
+        # most of what is left to do, beside files for which factors are computed
+        drawing = beside(lambda: pictures_of(diagnosis, summary))
         for name, write in tables.items():
             write(out / name, diagnosis)
         record.files += ["report.html", "diagnosis.json", *tables]
@@ -78,6 +81,6 @@ def diagnose(options: argparse.Namespace) -> None:
         # after all that it speaks of: whoever finds it finds the others
         write_summary(out / "diagnosis.json", summary)
         state = None if case.specimen is not None else read_state(out / "state.vtu")
-        write_page(out / "report.html", diagnosis, summary, state)
+        write_text(out / "report.html", page_of(diagnosis, summary, state, drawing()))
         if images is not None and state is not None:
             warp.warp(state, out, images, record, options.quiet)

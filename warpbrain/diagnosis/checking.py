@@ -130,15 +130,16 @@ class Confirming:
         of `1 / b` at most if none acts (Markov's inequality).
         """
         levels = [level / 2.0 for level in (self._alpha, belief("fits.significance"))]
-        by_draws = self._predictive_p(nothing, True, levels)
         bound = float(np.exp(-max(self.search.log_bayes_factor, 0.0) / calibration().temperature))
-        return min(1.0, 2.0 * min(by_draws, bound))
+        return min(1.0, 2.0 * self._predictive_p(nothing, True, levels, bound))
 
     def p_left(self, weighted_set: WeightedSet) -> float:
         """p-value of the hypothesis that a set is all that acts, against unknown fields."""
         return self._predictive_p(weighted_set, False, [self._alpha])
 
-    def _predictive_p(self, weighted_set: WeightedSet, mechanisms: bool, levels: Sequence[float]) -> float:
+    def _predictive_p(
+        self, weighted_set: WeightedSet, mechanisms: bool, levels: Sequence[float], bound: float = 1.0
+    ) -> float:
         fields, weights = [], []
         for cause in self.search.causes.causes:
             if cause.kind is Kind.UNKNOWN or (mechanisms and cause.kind is Kind.PHYSICS):
@@ -150,7 +151,7 @@ class Confirming:
                 weights += [-np.log(len(columns))] * len(columns)
         logs = np.array(weights) - np.logaddexp.reduce(weights)
         model, residual, sizes = weighted_set.marginal.model, weighted_set.residual, beliefs("unknown.sizes")
-        return predictive_p(model, fields, sizes, residual, self._draws, self._random, logs, levels)
+        return predictive_p(model, fields, sizes, residual, self._draws, self._random, logs, levels, bound)
 
     def held_out_for(self, weighted_set: WeightedSet) -> HeldOut:
         """Held-out blocks for a set: scattered points if all its effects are local, else regions."""

@@ -176,12 +176,19 @@ def predictive_p(
     random: np.random.Generator,
     weights: Floats | None = None,
     levels: Sequence[float] = (),
+    bound: float = 1.0,
 ) -> float:
     """Probability that the Bayes factor of the fields (`FieldFactors`) is as large in rows drawn from the model.
+
+    `bound`: of which it is known that it is no larger; nothing is drawn where draws cannot say less.
 
     `draws` rows are drawn, and then as many again as there are, until the p-value is `_DEVIATIONS` standard errors away
     from each of the `levels` that it will be compared with; `_MOST_DRAWS` times `draws` at most.
     """
+    if bound < 1.0 / (1 + _MOST_DRAWS * draws):
+        # what is drawn after this is the same
+        random.spawn(1)
+        return bound
     factors = FieldFactors(model, fields, sizes, weights)
     observed, draw, drawn = factors.of(residual[:, None])[0], factors.drawn(residual), np.zeros(0)
     while True:
@@ -191,7 +198,7 @@ def predictive_p(
         p = p_value(observed, drawn)
         uncertain = _DEVIATIONS * np.sqrt(p * (1.0 - p) / len(drawn))
         if all(abs(p - level) > uncertain for level in levels) or len(drawn) >= _MOST_DRAWS * draws:
-            return p
+            return min(p, bound)
 
 
 def p_value(observed: float, drawn: Sequence[float] | Floats) -> float:

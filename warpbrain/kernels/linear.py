@@ -204,8 +204,9 @@ class ConjugateGradient(abc.ABC):
     directions, to tell an indefinite matrix. ``beyond(x, factor, y)`` adds to `y` a factor times the product of `x`
     with what belongs to `A` and is in no block, whose diagonal blocks are in the matrix (and are taken off there).
 
-    `nodes` are where the rows are [m], (n, 3), and 1 for free components, 0 for constrained ones, (n,) of vec3: on the
-    CPU block-Jacobi has a coarse space then, if the matrix is large, and `solve` cannot be captured in a graph.
+    `nodes` are where the rows are [m], (n, 3), 1 for free components, 0 for constrained ones, (n,) of vec3, and what
+    gives their `compact_order`, which matrices of one mesh share: on the CPU block-Jacobi has a coarse space then, if
+    the matrix is large, and `solve` cannot be captured in a graph.
     """
 
     def __init__(
@@ -220,7 +221,7 @@ class ConjugateGradient(abc.ABC):
         max_iterations: int,
         watch_curvature: bool = False,
         beyond: Callable[[wp.array, float, wp.array], None] | None = None,
-        nodes: tuple[Floats, wp.array] | None = None,
+        nodes: tuple[Floats, wp.array, Callable[[], Any]] | None = None,
     ) -> None:
         self._matrix, self._diagonal, self._b, self._x = matrix, diagonal, right_hand_side, solution
         self._precision, self._tolerance, self._max_iterations = precision, tolerance, max_iterations
@@ -316,6 +317,16 @@ class OneLaunchGradient(ConjugateGradient):
 _AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
 
 
+def compact_order(points: Floats) -> NDArray[np.intp]:
+    """Rows at points (n, 3) in an order in which those of each aggregate of a coarse space are close together."""
+    size = CHUNK * _chunks_of_aggregate(len(points))
+    return _bisected(np.ascontiguousarray(points.T), np.arange(len(points)), size)
+
+
+def _chunks_of_aggregate(rows: int) -> int:
+    return -(-rows // (CHUNK * _AGGREGATES))
+
+
 def _bisected(points: Floats, rows: NDArray[np.intp], size: int) -> NDArray[np.intp]:
     """Rows in an order in which each run of so many, but for the last, is close together; ascending within it.
 
@@ -352,8 +363,7 @@ class CoresGradient(ConjugateGradient):
         self._partial = self._zeros((chunks, 4))
         self._sync = self._zeros(sync_words(MOST), wp.uint64)
         self._outcome = self._zeros(8)
-        # chunks of an aggregate
-        self._aggregate = -(-chunks // _AGGREGATES)
+        self._aggregate = _chunks_of_aggregate(size)
         self._no_copy = self._zeros(0, wp.mat33f)
         self._no_space = [
             *(self._zeros(0, vec3) for _ in range(2)), self._zeros((0, 0)),
@@ -365,10 +375,10 @@ class CoresGradient(ConjugateGradient):
         #: How a solve ended that did with the copy.
         self._refined: tuple[float, float, float, float] | None = None
 
-    def _make_copy(self, points: Floats, free: wp.array) -> NDArray[np.intp]:
+    def _make_copy(self, points: Floats, free: wp.array, ordered: Callable[[], Any]) -> NDArray[np.intp]:
         """Make room for copy and coarse space; returns the order of rows."""
         A, size, vec3 = self._matrix, self._size, self._precision.vec3
-        order = _bisected(np.ascontiguousarray(points.T), np.arange(size), CHUNK * self._aggregate)
+        order = ordered()
         number = np.empty_like(order)
         number[order] = np.arange(size)
         offsets = A.offsets.numpy()
@@ -449,9 +459,11 @@ class CoresGradient(ConjugateGradient):
         launch_together(self._on_cores.conjugate_gradients, self._size, inputs, self._device)
         return tuple(self._outcome.numpy()[:4].tolist())
 
-    def _refine(self, tolerance: float, points: Floats, free: wp.array) -> tuple[float, float, float, float] | None:
+    def _refine(
+        self, tolerance: float, points: Floats, free: wp.array, ordered: Callable[[], Any]
+    ) -> tuple[float, float, float, float] | None:
         """Solve with the copy, in rounds; how that ended as `_ended` says it, None if it was of no use."""
-        order = self._order = self._make_copy(points, free) if self._order is None else self._order
+        order = self._order = self._make_copy(points, free, ordered) if self._order is None else self._order
         if self._is_stale:
             self._renew()
             self._is_stale = False

@@ -27,8 +27,6 @@ _RULE = np.full((4, 4), _ALPHA) + (1.0 - 4.0 * _ALPHA) * np.eye(4)
 #: quadrilateral 0 1 2 3.
 _WEDGE = ((0, 1, 2, 3), (1, 2, 3, 4), (2, 3, 4, 5))
 _QUADRILATERAL = ((0, 1, 2), (0, 2, 3))
-#: Levels of a mesh whose integrals are kept.
-_KEPT = 4
 
 
 def integrals_of_shapes(mesh: TetMesh | QuadraticMesh) -> Floats:
@@ -44,16 +42,9 @@ def integrals_above(mesh: TetMesh | QuadraticMesh, up: ArrayLike, level: float) 
     `up` (3,): unit normal of the plane. `level`: its distance from the origin along `up` [m]. Returns (m, 4) or
     (m, 10) [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`; not to be written to.
     """
-    # states of a body under other hypotheses, and those on its finer mesh, are asked for one level again and again
+    above, key = np.asarray(up, dtype=np.float64), (type(mesh), "integrals above", float(level))
     corners = mesh if isinstance(mesh, TetMesh) else mesh.corners
-    kept = corners.shared.setdefault("integrals above", {})
-    key = type(mesh), *np.asarray(up, dtype=np.float64).tolist(), float(level)
-    found = kept.get(key)
-    if found is None:
-        for earliest in list(kept)[: max(len(kept) + 1 - _KEPT, 0)]:
-            kept.pop(earliest, None)
-        found = kept[key] = _integrals_above(mesh, np.asarray(up, dtype=np.float64), float(level))
-    return np.asarray(found)
+    return corners.made_once((*key, *above.tolist()), lambda: _integrals_above(mesh, above, float(level)))
 
 
 def _integrals_above(mesh: TetMesh | QuadraticMesh, up: Floats, level: float) -> Floats:
@@ -69,7 +60,6 @@ def _integrals_above(mesh: TetMesh | QuadraticMesh, up: Floats, level: float) ->
         np.add.at(integrals, elements, sign * part)
     below = cut.count == 3
     integrals[below] += whole[below]
-    integrals.flags.writeable = False
     return integrals
 
 

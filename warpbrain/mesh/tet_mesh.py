@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -15,6 +15,8 @@ from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh.surface import EDGES, FACES, boundary_faces, in_rows, interface_faces
 
+#: What is kept of that which is made of a mesh's elements again and again.
+_KEPT = 6
 #: A coordinate [m] beyond this is no place.
 LARGEST = 1e12
 
@@ -186,6 +188,19 @@ class TetMesh:
     def shared(self) -> dict[str, Any]:
         """What was made of its elements, of all meshes alike that differ from it in their node sets only."""
         return {}
+
+    def made_once(self, key: Hashable, make: Callable[[], NDArray[Any]]) -> Any:
+        """What is made of its elements, not to be written to, of which the last few are kept (`shared`).
+
+        States of a body under other hypotheses, and those on its finer mesh, ask for the same again and again.
+        """
+        kept = self.shared.setdefault("made once", {})
+        if (found := kept.get(key)) is None:
+            for earliest in list(kept)[: max(len(kept) + 1 - _KEPT, 0)]:
+                kept.pop(earliest, None)
+            found = kept[key] = make()
+            found.flags.writeable = False
+        return found
 
     def with_node_sets(self, sets: Mapping[str, ArrayLike]) -> TetMesh:
         """The same mesh with other sets of nodes: only these are checked, and nothing that is known is made again.

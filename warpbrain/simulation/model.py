@@ -283,7 +283,7 @@ class Model:
     @cached_property
     def _whole_forces(self) -> list[Floats]:
         """Nodal forces (n, 3) [N] of each load at factor 1 on all of the tissue, for every step of a motion."""
-        return self._at_nodes(self.unit_forces, np.ones(len(self.mesh.tetrahedra)))
+        return [load.nodal_forces(self.quadratic or self.mesh) for load in self.loads]
 
     def _at_nodes(self, unit_forces: Sequence[Floats], part: Floats) -> list[Floats]:
         """Forces of each load on the nodes (n, 3) [N], those on the volume times the part (m,) of it that is left."""

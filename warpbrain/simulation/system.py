@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -17,7 +18,7 @@ from warp.sparse import BsrMatrix, bsr_zeros
 from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.kernels.assembly import assembly_kernels
-from warpbrain.kernels.linear import LinearSolver, conjugate_gradient, solver_kernels
+from warpbrain.kernels.linear import LinearSolver, compact_order, conjugate_gradient, solver_kernels
 from warpbrain.kernels.module import begin_loading, find_device, find_precision
 from warpbrain.kernels.multicore import launch
 from warpbrain.kernels.ten_nodes import quadratic_kernels
@@ -514,7 +515,8 @@ class System:
         factors : KeptFactors, optional
             Of states nearby, for an indefinite matrix.
         """
-        kind = conjugate_gradient(self.device, only_blocks=self.assembled)
+        kind, mesh = conjugate_gradient(self.device, only_blocks=self.assembled), self.model.node_mesh
+        ordered = partial(mesh.made_once, "compact order", partial(compact_order, mesh.points))
         plain = kind(
             self.matrix,
             self.diagonal,
@@ -525,7 +527,7 @@ class System:
             max_iterations=max_iterations,
             watch_curvature=watch_curvature,
             beyond=None if self.assembled else self._add_beyond_blocks,
-            nodes=(self.model.node_mesh.points, self.free) if at_rest else None,
+            nodes=(mesh.points, self.free, ordered) if at_rest else None,
         )
         if self._coupled:
             return CoupledSolver(self, self._coupled, plain, factors or KeptFactors(), tolerance)

@@ -53,7 +53,7 @@ def words(page):
 @pytest.mark.parametrize("verdict", [v for v in VERDICTS if v != "named"])
 def test_every_verdict_has_a_page(small_diagnosis, verdict, monkeypatch):
     # pictures are the same for all
-    monkeypatch.setattr("warpbrain.report.diagnosis.page._pictures", lambda *_: {})
+    monkeypatch.setattr("warpbrain.report.diagnosis.page.pictures_of", lambda *_: {})
     found = replace(verdict_of(small_diagnosis, verdict), next_measurement=())
     page = page_of(found, describe(found, OPTIONS, "cpu"))
     assert f'class="badge">{verdict}<' in page
@@ -97,7 +97,7 @@ def test_points_that_are_all_set_aside_have_no_figure(small_diagnosis, summary, 
 
 
 def test_words_of_a_case_are_no_markup(small_diagnosis, monkeypatch):
-    monkeypatch.setattr("warpbrain.report.diagnosis.page._pictures", lambda *_: {})
+    monkeypatch.setattr("warpbrain.report.diagnosis.page.pictures_of", lambda *_: {})
     bad = "</title><script>alert(1)</script>"
     found = replace(
         small_diagnosis,

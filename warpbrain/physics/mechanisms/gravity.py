@@ -254,6 +254,10 @@ class Gravity(BodyForce, Mechanism):
             force = force + (self.tissue_density - CSF_DENSITY) * STANDARD_GRAVITY * whole * self._turned
         return force
 
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
+        corners = mesh if isinstance(mesh, TetMesh) else mesh.corners
+        return corners.made_once((type(mesh), repr(self)), lambda: super(Gravity, self).nodal_forces(mesh))
+
     def unit_forces_rate(self, mesh: TetMesh | QuadraticMesh, along: Along) -> Floats:
         whole = integrals_of_shapes(mesh)[:, :, None]
         up_rate = along(lambda gravity: gravity._up)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from pathlib import Path
 from typing import Any
 
-from warpbrain.atomic import write_text
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.inference.decide import CANNOT_SAY, GROUP, NAMED, NAMED_AND_REST, NOT_PHYSICS, NOTHING, UNKNOWN
 from warpbrain.report.body_sections import known_displacement
@@ -30,21 +28,27 @@ _BADGES = {
 }
 
 
-def write_page(
-    path: Path, diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None
-) -> None:
-    """Write the page of a diagnosis; arguments as of `page_of`."""
-    write_text(path, page_of(diagnosis, summary, state))
+def page_of(
+    diagnosis: Diagnosis | SpecimenDiagnosis,
+    summary: dict[str, Any],
+    state: SavedState | None = None,
+    drawn: dict[str, Any] | None = None,
+) -> str:
+    """The page; `summary` is its `diagnosis.json`, `state` its `state.vtu`: how well the displacement is known.
 
-
-def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], state: SavedState | None = None) -> str:
-    """The page; `summary` is its `diagnosis.json`, `state` its `state.vtu`: how well the displacement is known."""
+    `drawn`: what `pictures_of` has made, if that was begun before.
+    """
     recorded = Recorded.of(diagnosis) if isinstance(diagnosis, Diagnosis) else None
+    drawn = pictures_of(diagnosis, summary) if drawn is None else drawn
+    if state is not None and isinstance(diagnosis, Diagnosis):
+        anatomy = pictures.Anatomy(diagnosis, summary)
+        places = [float(anatomy.centre[view.axis]) for view in VIEWS]
+        drawn = {**drawn, "known": known_displacement(state, anatomy.mesh, places)}
     shown = text.shown_of(summary)
     sections, facts = sections_of(
         "diagnosis.html",
         summary=summary,
-        pictures=defaultdict(str, _pictures(diagnosis, summary, recorded, state)),
+        pictures=defaultdict(str, drawn),
         shown=shown,
         aside=[] if recorded is None else recorded.aside,
         chances={candidate["mechanism"]: candidate["probability"] for candidate in summary["ranking"]},
@@ -54,15 +58,11 @@ def page_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any], s
     return document(f"{verdict}: {title}", top, sections)
 
 
-def _pictures(
-    diagnosis: Diagnosis | SpecimenDiagnosis,
-    summary: dict[str, Any],
-    recorded: Recorded | None,
-    state: SavedState | None,
-) -> dict[str, Any]:
-    """Figures and the 3-D view by name; of what was not recorded there are none."""
-    if recorded is None or not isinstance(diagnosis, Diagnosis):
-        return {"curves": pictures.curves_figure(diagnosis)} if isinstance(diagnosis, SpecimenDiagnosis) else {}
+def pictures_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -> dict[str, Any]:
+    """Figures and the 3-D view by name, but for that of the state; of what was not recorded there are none."""
+    if not isinstance(diagnosis, Diagnosis):
+        return {"curves": pictures.curves_figure(diagnosis)}
+    recorded = Recorded.of(diagnosis)
     anatomy = pictures.Anatomy(diagnosis, summary)
     drawn: dict[str, Any] = {"map": pictures.map_figure(anatomy)}
     points = recorded.lengths.any() and not recorded.vectors.aside.all()
@@ -70,9 +70,6 @@ def _pictures(
         drawn["residuals"] = pictures.residuals_figure(anatomy, recorded)
     if recorded.counted.any():
         drawn["agreement"] = pictures.agreement_figure(summary, recorded)
-    if state is not None:
-        places = [float(anatomy.centre[view.axis]) for view in VIEWS]
-        drawn["known"] = known_displacement(state, anatomy.mesh, places)
     view = pictures.view_of(anatomy, recorded if points else None)
     drawn["view"] = viewer(view, "what is left", "Arrows go from the computed to the observed place.")
     if summary["confusion"]["rows"]:

@@ -24,7 +24,7 @@ from warpbrain.estimation.options import Listener
 from warpbrain.estimation.parameters import Gaussian
 from warpbrain.inference import GaussianModel, Search, posterior
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.causes import Hypothesis
+from warpbrain.inference.causes import Cause, Hypothesis
 from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads, one_thread_of_blas
@@ -120,10 +120,8 @@ class HypothesisSearch:
             noise_factor = nothing.noise.noise_factor / nothing.scale
             models.append(GaussianModel(noise_factor, base.nuisances.columns))
         weighing = Weighing(base, self._visible, nothing.sizes)
-        for model in models:
-            screened = posterior(model, base.residual, self._visible.causes, _search(most=2))
-            for candidate in in_threads(partial(weighing.weigh, screened=model), _most_probable(screened)):
-                _keep_better(self._sets, candidate)
+        for _, candidate in _weighed(weighing, models, base.residual, self._visible.causes, most=2):
+            _keep_better(self._sets, candidate)
         # a local cause that has been missed by half a cell seems to do nothing
         singles = [candidate for candidate in self._sets.values() if len(candidate.acting) == len(candidate.names) == 1]
         refine = partial(with_refined_places, base, spacing=self.spacing, source=base.effects)
@@ -151,7 +149,7 @@ class HypothesisSearch:
         causes = visible(causes_of(self.base, replace(self.candidates, effects=effects)), marginal.model)
         weighing = Weighing(self.base, causes, marginal.sizes, single)
         unscaled = GaussianModel(marginal.noise.noise_factor / marginal.scale, single.columns)
-        for superset in self._supersets(single, causes, weighing, unscaled):
+        for superset in self._supersets(single, causes, weighing, [unscaled]):
             _keep_better(self._sets, replace(superset, inherited_gain=0.0))
 
     def fit(self, alone: bool = False) -> None:
@@ -375,7 +373,8 @@ class HypothesisSearch:
             # what acts beside may be what moved them
             noise_factors.append(marginal.model.noise_factor)
         models = [GaussianModel(marginal.scale * factor, fitted.columns) for factor in noise_factors]
-        likely = [likely_places(m, fitted.residual, self.causes.causes, _PLACES_ABOUT_FIT) for m in models]
+        places_of = partial(likely_places, residual=fitted.residual, causes=self.causes.causes, most=_PLACES_ABOUT_FIT)
+        likely = in_threads(places_of, models)
         places = {name: np.unique([each[name] for each in likely]) for name in likely[0]}
         candidates = candidates_about_fit(refit.state, fitted.effects, self.candidates, places)
         self._expanded[fitted.names] = candidates.source
@@ -384,9 +383,9 @@ class HypothesisSearch:
         causes = visible(causes, marginal.model)
         best: dict[frozenset[str], WeightedSet] = {}
         weighing = Weighing(self.base, causes, marginal.sizes, fitted)
-        for factor in noise_factors:
-            for superset in self._supersets(fitted, causes, weighing, GaussianModel(factor, fitted.columns)):
-                _keep_better(best, superset)
+        unscaled = [GaussianModel(factor, fitted.columns) for factor in noise_factors]
+        for superset in self._supersets(fitted, causes, weighing, unscaled):
+            _keep_better(best, superset)
         fits = {names for names, known in self._sets.items() if known.refit is not None}
         placed = len(fitted.effects)
         refine = partial(with_refined_places, self.base, spacing=self.spacing, source=candidates.source, placed=placed)
@@ -394,16 +393,13 @@ class HypothesisSearch:
             self._sets[superset.names] = superset
 
     def _supersets(
-        self, fitted: WeightedSet, causes: BodyCauses, weighing: Weighing, unscaled: GaussianModel
+        self, fitted: WeightedSet, causes: BodyCauses, weighing: Weighing, unscaled: Sequence[GaussianModel]
     ) -> Iterator[WeightedSet]:
         """The most probable sets of one cause more than a fitted one, with that at the best place of a scan.
 
-        `unscaled`: model of the rows with the fitted causes, at a scale of one.
+        `unscaled`: models of the rows with the fitted causes, at a scale of one.
         """
-        screened = posterior(unscaled, fitted.residual, causes.causes, _search(most=1))
-        hypotheses = [hypothesis for hypothesis in _most_probable(screened, singles=False) if hypothesis.causes]
-        weighed = in_threads(partial(weighing.weigh, screened=unscaled), hypotheses)
-        for hypothesis, candidate in zip(hypotheses, weighed, strict=True):
+        for hypothesis, candidate in _weighed(weighing, unscaled, fitted.residual, causes.causes, most=1):
             # both with gross errors of their own
             gain = candidate.hypothesis.log_evidence - fitted.marginal.log_evidence
             # causes in the order of their effects
@@ -415,6 +411,25 @@ class HypothesisSearch:
                 log_evidence=fitted.hypothesis.log_evidence + gain,
             )
             yield replace(candidate, hypothesis=joint, inherited_gain=None, otherwise=None)
+
+
+def _weighed(
+    weighing: Weighing, models: Sequence[GaussianModel], residual: Floats, causes: Sequence[Cause], most: int
+) -> Iterator[tuple[Hypothesis, WeightedSet]]:
+    """The most probable sets of so many causes at most, under each of several models of the rows (n,).
+
+    Of pairs at most also that without any cause, and every single one; else neither.
+    """
+    pairs, search = most > 1, _search(most)
+    screened = in_threads(lambda model: posterior(model, residual, causes, search), models)
+    tasks = [
+        (hypothesis, model)
+        for model, of_model in zip(models, screened, strict=True)
+        for hypothesis in _most_probable(of_model, pairs)
+        if pairs or hypothesis.causes
+    ]
+    weighed = in_threads(lambda task: weighing.weigh(*task), tasks)
+    return zip((hypothesis for hypothesis, _ in tasks), weighed, strict=True)
 
 
 def _keep_better(sets: dict[frozenset[str], WeightedSet], candidate: WeightedSet) -> None:

@@ -96,7 +96,8 @@ class HeldSurface:
         components = (3 * self.members[:, None] + np.arange(3)).ravel()
         held = sensors.by_reactions[:, ~free] @ at.stiffness[~free][:, components]
         direct = np.asarray((sensors.by_displacement[:, components] + held).todense())
-        direct -= (self._coupling.T @ at.compliance[:, free].T).T
+        rows, which = at._rows
+        direct -= (self._coupling.T @ rows.T[free]).T[which]
         along = np.einsum("naj,akj->nak", direct.reshape(len(direct), -1, 3), self._frames)
         return np.asarray(along).reshape(direct.shape)
 
@@ -269,7 +270,7 @@ class Linearisation:
         other = copy.copy(self)
         other.sensors = sensors
         other._surface_responses, other._equilibria = {}, 0
-        for name in ("compliance", "_rows", "_moments"):
+        for name in ("_rows", "_moments"):
             other.__dict__.pop(name, None)
         return other
 
@@ -279,14 +280,11 @@ class Linearisation:
         return extent(self.system.model.mesh.points)
 
     @cached_property
-    def compliance(self) -> Floats:
-        """`A` (n, 3 N), made when it is needed: for few forces equilibria are cheaper."""
-        rows, which = self._rows
-        return np.asarray(rows[which])
-
-    @cached_property
     def _rows(self) -> tuple[Floats, NDArray[np.intp]]:
-        """Distinct rows of `A`, and the number of its row for each sensor (n,): several times share one row."""
+        """Distinct rows of `A`, and the number of its row for each sensor (n,): several times share one row.
+
+        Made when they are needed: for few forces equilibria are cheaper.
+        """
         free, sensors = self.free, self.sensors
         by_R = sensors.by_reactions[:, ~free]
         moved = (sensors.by_displacement[:, free] + by_R @ self._held_free).tocsr()
@@ -330,18 +328,18 @@ class Linearisation:
         flat = np.asarray(forces).reshape(-1, len(self.free))
         return self.answers_of_columns(flat.T).reshape(len(self.sensors), *np.shape(forces)[:-2])
 
-    def answers_of_patches(self, weights: Floats) -> Floats:
-        """Response (n, s, 3) to forces of 1 N in each direction, spread over nodes with weights (N, s)."""
+    def answers_of_patches(self, weights: Floats, directions: Sequence[int] = (0, 1, 2)) -> Floats:
+        """Response (n, s, d) to forces of 1 N in each of d directions, spread over nodes with weights (N, s)."""
         rows, which = self._rows
-        answers = np.empty((3, weights.shape[1], len(rows)))
+        answers = np.empty((len(directions), weights.shape[1], len(rows)))
         together = _dense_together(weights.shape[1])
 
         def fill(task: tuple[int, int]) -> None:
-            axis, first = task
+            number, first = task
             columns = slice(first, first + together)
-            answers[axis, columns] = (rows[:, axis::3] @ weights[:, columns]).T
+            answers[number, columns] = (rows[:, directions[number] :: 3] @ weights[:, columns]).T
 
-        in_threads(fill, list(itertools.product(range(3), range(0, weights.shape[1], together))))
+        in_threads(fill, list(itertools.product(range(len(directions)), range(0, weights.shape[1], together))))
         return np.asarray(answers.transpose(2, 1, 0)[which])
 
     def answers_of_columns(self, forces: Any) -> Floats:

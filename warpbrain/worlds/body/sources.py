@@ -143,8 +143,9 @@ def _force_columns(at: Linearisation, centres: Floats, length: float) -> Floats:
     weights = _shares(mesh, centres, length)
     arms = (mesh.points[:, None] - centres) / length
     pushes = at.answers_of_patches(weights).transpose(0, 2, 1)
-    moments = [at.answers_of_patches(weights * arms[:, :, axis]) for axis in range(3)]
-    turns = [moments[i][..., j] - moments[j][..., i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    # forces along the axis after each, and along the one before it, times the arms along it
+    moments = [at.answers_of_patches(weights * arms[..., i], ((i + 1) % 3, (i - 1) % 3)) for i in range(3)]
+    turns = [moments[i - 2][..., 0] - moments[i - 1][..., 1] for i in range(3)]
     return np.concatenate([pushes, np.stack(turns, axis=1)], axis=1)
 
 

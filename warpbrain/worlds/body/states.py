@@ -36,6 +36,7 @@ from warpbrain.simulation.model import Material, all_substituted
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
+from warpbrain.threads import beside
 from warpbrain.worlds.body.consolidation import bound_term, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors, spread_points
@@ -118,6 +119,9 @@ class States:
 
     def __init__(self, case: Case, device: str | None = None, role: str = "fit") -> None:
         self.case = case = with_free_surfaces(case)
+        mesh, sd = case.remaining[0], case.heterogeneity or belief("tissue.field")
+        # in a thread, while recordings are located
+        modes = beside(lambda: stiffness_modes(mesh, sd))
         self.device = device
         self.parameters = Parameters.of(case)
         self.times = times_of_states(case, role)
@@ -129,7 +133,7 @@ class States:
         self._near: dict[float, Floats] = {}
         self.centre = self._observations_of(case).centre
         self.realign(self.motion)
-        self.modes = stiffness_modes(case.remaining[0], case.heterogeneity or belief("tissue.field"))
+        self.modes = modes()
         self.solves = 0
         self._factors: dict[tuple[str, ...], KeptFactors] = {}
 
