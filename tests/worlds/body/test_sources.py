@@ -52,9 +52,21 @@ def test_they_move_what_is_recorded_as_far_as_its_noise(small_diagnosis, at, eff
     for effect in effects:
         square = np.sum(effect.columns[rows] ** 2, axis=1).mean()
         by_length.setdefault(effect.proposed.radius, []).append(square)
-    assert len(by_length) == 6
+    assert len(by_length) == 7
     for squares in by_length.values():
         np.testing.assert_allclose(np.sqrt(np.mean(squares)), noise, rtol=1e-9)
+
+
+def test_the_longest_force_is_the_same_throughout(at, effects):
+    """Or runs around an axis: with the angular velocity of a rigid body, whatever its centre."""
+    mesh = at.system.model.mesh
+    longest = max((effect for effect in effects if _is_force(effect)), key=lambda effect: effect.proposed.radius)
+    away = mesh.points - mesh.points.mean(axis=0)
+    motions = [*np.tile(np.eye(3)[:, None], (1, len(away), 1)), *np.cross(np.eye(3)[:, None], away)]
+    answers = at.answers(mesh.node_volumes[:, None] * np.array(motions))
+    for answer in answers.T:
+        left = answer - longest.columns @ np.linalg.lstsq(longest.columns, answer, rcond=None)[0]
+        assert np.linalg.norm(left) < 0.05 * np.linalg.norm(answer)
 
 
 def test_a_force_has_its_resultant_and_a_stress_none(at):
@@ -120,6 +132,34 @@ class Whirl(Load):
         arm = (mesh.points - np.array(self.centre)) / self.length
         density = self.size * np.exp(-0.5 * np.sum(arm**2, axis=1))
         return np.asarray((mesh.node_volumes * density)[:, None] * np.cross(np.array(self.axis), arm))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sideways(Load):
+    """The same body force everywhere [N/m3]."""
+
+    density: tuple[float, float, float]
+    kind: ClassVar[str] = "sideways"
+
+    def nodal_forces(self, mesh):
+        return np.asarray(mesh.node_volumes[:, None] * np.array(self.density))
+
+
+@pytest.mark.slow(10)
+@pytest.mark.parametrize("density", [(3000.0, 0.0, 0.0), (0.0, -4000.0, 0.0)])
+def test_a_force_throughout_the_body_is_not_called_by_a_name(density):
+    side, noise = 0.1, 3e-4
+    case = block_of_gel((6, 6, 6), (side, side, side), axis=2, mu=1000.0, gravity_axis=(0.0, 0.0, -1.0))
+    u = EquilibriumSolver(System(model_of(case), "cpu")).solve(Sideways(density=density).nodal_forces(case.mesh)).u
+    rng = np.random.default_rng(2)
+    result = diagnose(with_beads(case, u, side * rng.uniform(0.03, 0.97, (60, 3)), noise, rng), None, "cpu")
+    assert result.decision.verdict == UNKNOWN
+    assert "throughout the body" in sentence_of(result)
+    # to the noise, each component of it; how large it is depends on how stiff tissue is, which no known load tells
+    source = result.unknown.source
+    assert source.error < 1.5 * np.sqrt(3.0) * noise < 0.5 * source.without
+    cosine = source.force @ density / np.linalg.norm(source.force) / np.linalg.norm(density)
+    assert cosine > 0.95
 
 
 @pytest.mark.parametrize("size", [12e3, pytest.param(40e3, marks=pytest.mark.slow(10))])
