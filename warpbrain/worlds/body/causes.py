@@ -162,8 +162,8 @@ def _unknown_cause(base: Base, effects: Sequence[Effect]) -> Cause:
     lengths = np.array([0.0 if effect.proposal is None else effect.proposed.radius for effect in effects])
     _, groups, counts = np.unique(lengths, return_inverse=True, return_counts=True)
     counts[0] -= bool(base.resistance.size)
-    local = belief("unknown.in_one_place")
-    shares = np.where(lengths == 0.0, 1.0 - local, local / (len(counts) - 1)) / counts[groups]
+    local = belief("unknown.in_one_place") if len(counts) > 1 else 0.0
+    shares = np.where(lengths == 0.0, 1.0 - local, local / max(len(counts) - 1, 1)) / counts[groups]
     if base.resistance.size:
         shares *= 1.0 - belief("unknown.resistance")
         shares[0], places[0] = belief("unknown.resistance"), replace(places[0], label=RESISTANCE)

@@ -111,6 +111,9 @@ def _sources(at: Linearisation, centres: Floats, length: float, is_force: bool, 
     columns = at.summed_in_time(about)  # (n, 6, s)
     rows = at.sensors.is_displacement
     rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
+    if not columns.any():
+        # between two states that are the same a constant load moves nothing, whatever its size
+        return []
     sd = np.empty(len(_STRESSES))
     for part in (slice(0, 3), slice(3, 6)) if is_force else (slice(0, 5), slice(5, 6)):
         share = (part.stop - part.start) / len(sd)
