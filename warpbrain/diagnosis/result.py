@@ -218,9 +218,8 @@ def _source_in_words(source: FittedSource, extent: float) -> str:
     sd = float(np.linalg.norm(source.force / max(size, 1e-300) * source.force_sd))
     kind = "a stress" if source.is_stress else "a force that runs around an axis" if source.turns else "a force"
     net = "" if source.is_stress or source.turns else f" of {measured(size, sd, 'N')}"
-    where = f"about {place(source.centre, extent)}, within {number(1e3 * source.length)} mm"
-    if source.length > extent:
-        where = "throughout the body"
+    near = f"about {place(source.centre, extent)}, within {number(1e3 * source.length)} mm"
+    where = "throughout the body" if source.length > extent else near
     return (
         f"Fitted as {kind}{net} {where}, it leaves {length(source.error)} at points that were not fitted, "
         f"{length(source.without)} without it."

@@ -20,7 +20,7 @@ from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.estimation.observations import Sensors
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import columns_of_inflation, louder, with_gross_errors
+from warpbrain.inference.gross_errors import columns_of_inflation, noise_with_excess, with_gross_errors
 from warpbrain.inference.noise import Outliers, log_scale_density, outliers, scales
 
 #: An undeclared noise is no smaller [m] or [N]: below this it is rounding of the computation.
@@ -83,7 +83,7 @@ class Noise:
     def _model_at_one(self) -> GaussianModel:
         if not self.gross.any():
             return self.sound
-        return louder(self.sound, columns_of_inflation(self.sound, self.rows.points, self.inflation))
+        return noise_with_excess(self.sound, columns_of_inflation(self.sound, self.rows.points, self.inflation))
 
     @cached_property
     def log_prior(self) -> float:

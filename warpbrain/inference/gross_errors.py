@@ -203,8 +203,8 @@ def columns_of_inflation(model: GaussianModel, points: Sequence[Ints], inflation
     return np.concatenate(blocks, axis=1)
 
 
-def louder(model: GaussianModel, excess: Floats) -> GaussianModel:
-    """The noise of a model alone, with excess noise, columns (n, e), in it."""
+def noise_with_excess(model: GaussianModel, excess: Floats) -> GaussianModel:
+    """The noise of a model, without its columns, to which the covariance `E E^T` of columns `E` (n, e) is added."""
     factor: Floats = np.asarray(np.linalg.cholesky(model.noise_covariance + excess @ excess.T), dtype=np.float64)
     return GaussianModel(factor, np.zeros((len(factor), 0)))
 
@@ -361,7 +361,7 @@ class Marginal(Summed):
     @cached_property
     def noise(self) -> GaussianModel:
         """Of the noise alone, with the excess noise of gross errors."""
-        return louder(self.model, self.excess)
+        return noise_with_excess(self.model, self.excess)
 
     def coordinates(self, residual: Floats) -> Floats:
         """Mean of the coefficients (q,) of the hypothesis after residuals (n,)."""

@@ -180,13 +180,13 @@ def predictive_p(
 ) -> float:
     """Probability that the Bayes factor of the fields (`FieldFactors`) is as large in rows drawn from the model.
 
-    `bound`: of which it is known that it is no larger; nothing is drawn where draws cannot say less.
+    `bound`: an upper bound on that probability; nothing is drawn if it is below the least p-value that draws can give.
 
     `draws` rows are drawn, and then as many again as there are, until the p-value is `_DEVIATIONS` standard errors away
     from each of the `levels` that it will be compared with; `_MOST_DRAWS` times `draws` at most.
     """
     if bound < 1.0 / (1 + _MOST_DRAWS * draws):
-        # what is drawn after this is the same
+        # the generator is left as after drawing, so that later draws are the same
         random.spawn(1)
         return bound
     factors = FieldFactors(model, fields, sizes, weights)

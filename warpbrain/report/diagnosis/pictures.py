@@ -40,9 +40,13 @@ class Anatomy:
     """The body of a diagnosis with what its map says; `summary` is its `diagnosis.json`."""
 
     def __init__(self, diagnosis: Diagnosis, summary: dict[str, Any]) -> None:
-        self.mesh, self.summary = diagnosis.base.at.system.model.mesh, summary
-        self.fields = file_of_map(diagnosis).point_data
+        self.mesh, self.summary, self._diagnosis = diagnosis.base.at.system.model.mesh, summary, diagnosis
         self.threshold = summary["map"]["threshold"]
+
+    @cached_property
+    def fields(self) -> dict[str, Any]:
+        """Those of the map at the nodes, by name."""
+        return file_of_map(self._diagnosis).point_data
 
     @cached_property
     def ball(self) -> tuple[Floats, float] | None:

@@ -221,18 +221,22 @@ class HypothesisSearch:
         """Fit a set; one that cannot be fitted keeps the reason."""
         candidate = self._sets[names]
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
-        fitted, gain = self._fitted(candidate)
-        if candidate.otherwise is not None:
-            otherwise = replace(candidate.otherwise, inherited_gain=candidate.inherited_gain)
-            ways = (fitted, gain), self._fitted(otherwise.with_evidence(candidate.hypothesis.log_evidence))
-            fitted, gain = max(ways, key=lambda way: (way[0].refit is not None, way[0].hypothesis.log_evidence))
+        candidates = [candidate]
+        if candidate.alternative is not None:
+            alternative = replace(candidate.alternative, inherited_gain=candidate.inherited_gain)
+            candidates.append(alternative.with_evidence(candidate.hypothesis.log_evidence))
+        fits = map(self._fitted, candidates)
+        fitted, gain = max(fits, key=lambda fit: (fit[0].refit is not None, fit[0].hypothesis.log_evidence))
         self._sets[names] = fitted
         if fitted.refit is not None:
             self._pass_on(gain, names)
             self._refit_subsets(names)
 
     def _fitted(self, candidate: WeightedSet) -> tuple[WeightedSet, float]:
-        """A set that is fitted, and its gain over the linear model about the base; itself with why it cannot be."""
+        """The set at its fit, and the gain in log evidence over the linear model about the base.
+
+        If it cannot be fitted, the set with the reason (`failure`), and zero.
+        """
         subset = self._fitted_subset(candidate)
         if candidate.refit is None:
             source = self.base.effects if subset is None else self._expanded[subset.names]
@@ -350,11 +354,11 @@ class HypothesisSearch:
         return max(same, key=lambda subset: len(subset.names), default=None)
 
     def _about_nothing(self, nothing: Refit, candidate: WeightedSet) -> tuple[Floats, SetMarginal]:
-        """The most probable coordinates of a set in the linear model about the fit without any cause.
+        """The most probable coordinates (q + e + k,) of a set in the linear model about the fit without any cause.
 
-        And the noise and gross errors that they are found with, of that model or of the one about the base: in which of
-        them the set is more probable. Far from the base sound points look like gross errors, and a fit that begins with
-        these does not find them sound again: it would lose to other sets for the state that it was weighed about.
+        And the evidence of the set, with its noise and gross errors, in that model or in the one about the base, in
+        whichever it is larger. Far from the base sound points look like gross errors, and a fit that begins with these
+        keeps them: the set would seem less probable only because it was weighed about the wrong state.
         """
         nuisances, base = self.base.nuisances, self.base
         columns = np.column_stack([nothing.columns, candidate.columns[:, len(nothing.nuisances) :]])
@@ -410,7 +414,7 @@ class HypothesisSearch:
                 log_prior=hypothesis.log_prior + fitted.hypothesis.log_prior,
                 log_evidence=fitted.hypothesis.log_evidence + gain,
             )
-            yield replace(candidate, hypothesis=joint, inherited_gain=None, otherwise=None)
+            yield replace(candidate, hypothesis=joint, inherited_gain=None, alternative=None)
 
 
 def _weighed(

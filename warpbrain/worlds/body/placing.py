@@ -174,9 +174,11 @@ class Weighing:
             replace(each.with_evidence(log_evidence), log_share=share)
             for each, share in zip(weighed, log_shares.tolist(), strict=True)
         ]
-        # what has no name acts as a field, which is linear, or as a source, which is not: in fits they are not as alike
-        others = [k for k in np.argsort(-logs).tolist() if weighed[k].acting != weighed[best].acting]
-        return replace(weighed[best], otherwise=weighed[others[0]] if others else None)
+        # the unknown is a field, linear in every fit, or a source, which acts through an equilibrium: which one fits
+        # better cannot be seen in the linear model
+        ordered = (weighed[k] for k in np.argsort(-logs).tolist())
+        alternative = next((other for other in ordered if other.acting != weighed[best].acting), None)
+        return replace(weighed[best], alternative=alternative)
 
     def _weigh_at(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
         """The same as if its best configuration stood for all places."""

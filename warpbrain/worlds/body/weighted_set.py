@@ -261,8 +261,8 @@ class WeightedSet:
     inherited_gain: float | None = 0.0
     refined: bool = False  # whether its mechanisms are at the best places within their cells
     moved: bool = False  # whether it was fitted at neighbouring places, too
-    #: The same causes where the unknown acts otherwise: as a source in one place, or as a field; to be fitted, too.
-    otherwise: WeightedSet | None = None
+    #: The same causes with the unknown as a source if it is a field here, or the reverse; fitted beside it.
+    alternative: WeightedSet | None = None
     #: Log of the part of these places in the evidence of a set that is not fitted, which is a sum over all places.
     log_share: float = 0.0
 
@@ -324,7 +324,7 @@ class WeightedSet:
             columns=refit.columns,
             marginal=refit.marginal,
             refit=refit,
-            otherwise=None,
+            alternative=None,
         )
 
     def without(self, mechanism: str, base: Base) -> WeightedSet:
