@@ -118,7 +118,7 @@ class Confirming:
         self._held_out = {local: HeldOut(sensors, local) for local in (False, True)}
         #: Columns (n, m) of a smooth force as large as the noise, of which random patterns are mixtures.
         self.modes = search.base.typical_noise * along_own_axes(
-            search.base.model, next(iter(search.base.unknown.values())), search.base.residual
+            search.base.model, next(iter(search.base.unknown.values())).columns, search.base.residual
         )
 
     def p_of_nothing(self, nothing: WeightedSet) -> float:
@@ -227,7 +227,7 @@ class Confirming:
     def ceiling(self, nothing: WeightedSet, held_out: HeldOut) -> float:
         """Least held-out error [m] with an unknown field of any size."""
         base, sizes = self.search.base, beliefs("unknown.sizes")
-        column_sets = [size * base.typical_noise * columns for columns in base.unknown.values() for size in sizes]
+        column_sets = [size * base.typical_noise * f.columns for f in base.unknown.values() for size in sizes]
         predictions = predict_with(nothing.marginal.model, nothing.residual, held_out.blocks, column_sets)
         return held_out.error(max(predictions, key=lambda prediction: prediction.log_density))
 

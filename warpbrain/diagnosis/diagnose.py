@@ -36,8 +36,8 @@ from warpbrain.seconds import Seconds
 from warpbrain.threads import beside, one_thread_of_blas
 from warpbrain.worlds.body.causes import RESISTANCE
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, require_observable, screened
-from warpbrain.worlds.body.sources import without_sources
 from warpbrain.worlds.body.surfaces import with_sets_that_act
+from warpbrain.worlds.body.unknown import declarable
 from warpbrain.worlds.body.weighted_set import WeightedSet
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
@@ -200,8 +200,8 @@ class Diagnosing:
             return None
         assert best.refit is not None
         hypothesis = best.refit.state.hypothesis
-        declarable = replace(hypothesis, mechanisms=without_sources(hypothesis.mechanisms))
-        case = with_sets_that_act(search.base.states.case_of(declarable), self.case.mesh)
+        declared = replace(hypothesis, mechanisms=declarable(hypothesis.mechanisms))
+        case = with_sets_that_act(search.base.states.case_of(declared), self.case.mesh)
         return replace(case, name=f"{case.name}-explained", title=f"{case.title}, with {' and '.join(named)}")
 
     def _fit(

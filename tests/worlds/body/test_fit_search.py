@@ -11,6 +11,7 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.fitting import FitSearch, Fitter
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
+from warpbrain.worlds.body.weighted_set import Refit
 
 
 @pytest.fixture(scope="module")
@@ -132,3 +133,24 @@ def test_a_search_that_expects_to_reach_too_little_ends(sets):
     assert whole.converged
     assert not fit.converged
     assert fit.log_evidence < wanted
+
+
+def test_a_fit_takes_the_most_probable_size(sets):
+    """Of those that its cause may have, though it begins with another one: that of the linear model about the base."""
+    weighed = sets.get(("unknown",))
+    assert weighed is not None
+    [effect], [part] = weighed.effects, weighed.slices
+
+    def fit(size: float, sizes: tuple[float, ...]) -> Refit:
+        begun = replace(effect.scaled(size / effect.size), sizes=sizes)
+        columns = weighed.columns.copy()
+        columns[:, part] = begun.columns
+        return Fitter(sets.base).fit((begun,), columns, [weighed.coordinates], weighed.marginal)
+
+    alone = {size: fit(size, (size,)).log_evidence for size in effect.sizes}
+    best = max(alone, key=lambda size: alone[size])
+    assert alone[best] > alone[effect.size] + 5.0
+    for start in (effect.size, 0.4 * effect.size):
+        free = fit(start, effect.sizes)
+        assert free.effects[0].size == pytest.approx(best)
+        assert free.log_evidence == pytest.approx(alone[best], abs=0.1)

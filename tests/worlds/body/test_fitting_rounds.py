@@ -45,7 +45,7 @@ def test_a_search_that_stays_where_it_is_ends(monkeypatch: pytest.MonkeyPatch, s
         return Fit(rounds[-1])
 
     fitter: Any = SimpleNamespace(base=SimpleNamespace(state=None), mesh_errors=None, _update=update)
-    found = Fitter.fit(fitter, (), np.zeros((0, 0)), [], None)  # type: ignore[arg-type]
+    found = Fitter._fit(fitter, (), np.zeros((0, 0)), [], None)  # type: ignore[arg-type]
     assert len(rounds) == 3 and found.log_evidence == pytest.approx(410.0)
 
 

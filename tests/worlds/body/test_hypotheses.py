@@ -64,7 +64,7 @@ def test_places_are_one_in_all_and_everywhere_is_as_probable_as_somewhere(search
 
 def test_sets_say_what_they_are(search):
     for one in search.weighted_sets:
-        assert len(one.mechanisms) == len(one.effects) == len(one.coefficients)
+        assert len(one.acting) == len(one.effects) == len(one.coefficients)
         assert one.columns.shape[0] == len(one.residual) == len(search.base.residual)
         width = search.base.nuisances.columns.shape[1] + sum(effect.columns.shape[1] for effect in one.effects)
         # causes that are no mechanisms have columns between these

@@ -5,7 +5,6 @@ from drawn_rows import draws
 
 from warpbrain.inference.gross_errors import with_gross_errors
 from warpbrain.inference.noise import outliers
-from warpbrain.worlds.body.causes import scaled
 from warpbrain.worlds.body.dictionary import BETWEEN, dictionary_of, switch_effects
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.placing import _around, best_in_cell
@@ -23,9 +22,9 @@ def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_
     # so large that in the wrong place some points are far off
     residual = 20.0 * true.columns[:, 0] + draws(base.model, 1, rng)[:, 0]
     size = 20.0
-    start = scaled(effect, size)
+    start = effect.scaled(size)
     without = base.model
-    best, gain, _ = best_in_cell(base, base.effects, start, size, spacing, without, residual)
+    best, gain, _ = best_in_cell(base, base.effects, start, spacing, without, residual)
     away = np.linalg.norm(best.proposed.centre - true.proposed.centre)
     assert away < np.linalg.norm(proposed.centre - true.proposed.centre)
 
@@ -37,7 +36,7 @@ def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_
     assert better > 0.0
     # the mean of 81 places is at most as probable as the best of them, and at least its share of that
     assert -np.log(81.0) <= gain <= better
-    assert gain >= log_evidence(scaled(true, size)) - log_evidence(start) - np.log(81.0) - 1e-6
+    assert gain >= log_evidence(true.scaled(size)) - log_evidence(start) - np.log(81.0) - 1e-6
 
 
 def test_a_patch_that_lets_go_is_found_between_the_patches_of_a_scan(small_diagnosis):
@@ -59,7 +58,7 @@ def test_a_patch_that_lets_go_is_found_between_the_patches_of_a_scan(small_diagn
     assert members(proposed) < proposed.patch.held.sum()
     true = switch_effects(base.effects, [larger(proposed)])[0]
     residual = true.mean
-    best, _, _ = best_in_cell(base, base.effects, effect, 1.0, BETWEEN * base.at.sensors.radius, base.model, residual)
+    best, _, _ = best_in_cell(base, base.effects, effect, BETWEEN * base.at.sensors.radius, base.model, residual)
     assert best.proposed.is_there_or_not
 
     def log_evidence(tried):

@@ -18,7 +18,8 @@ from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.sources import Source, without_sources
+from warpbrain.worlds.body.sources import Source
+from warpbrain.worlds.body.unknown import declarable
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +113,7 @@ def test_elsewhere_it_is_in_the_same_unit(at, effects):
 
 def test_no_case_can_declare_it(small_diagnosis):
     source = Source(centre=(0.0, 0.0, 0.0), length=0.01)
-    assert without_sources([source]) == ()
+    assert declarable([source]) == ()
     from warpbrain.physics.mechanisms import mechanisms
 
     assert Source.kind not in mechanisms()

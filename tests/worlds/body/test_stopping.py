@@ -27,7 +27,7 @@ def in_a_place(candidate):
 def following(*sets, expanded=(), rivals=True):
     probabilities = calibration().probabilities([candidate.hypothesis for candidate in sets])
     ordered = [sets[k] for k in np.argsort(-probabilities)]
-    chosen = next_to_fit(ordered, np.sort(probabilities)[::-1], {frozenset(names) for names in expanded}, rivals)
+    chosen = next_to_fit(ordered, {frozenset(names) for names in expanded}, rivals)
     return chosen and sorted(chosen.names)
 
 

@@ -5,10 +5,20 @@ import pytest
 from slow_block import CAUSES, TIMES, write_slow
 
 from warpbrain.estimation.parameters import declared
+from warpbrain.mesh.refinement import refined
+from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import other_volume
 from warpbrain.worlds.body.states import Hypothesis, States
-from warpbrain.worlds.body.unknown import body_forces, fields, pressures, resistances, unit_stresses
+from warpbrain.worlds.body.unknown import (
+    FieldLoad,
+    body_forces,
+    field_proposal,
+    fields,
+    pressures,
+    resistances,
+    unit_stresses,
+)
 
 
 @pytest.fixture(scope="module")
@@ -53,13 +63,12 @@ def test_a_uniform_pressure_of_it_moves_what_it_does_on_the_surface(at):
 def test_a_pressure_of_a_great_length_is_a_uniform_one_on_what_is_free(at):
     """Its one mode moves the sensors as the nodal forces do of which those of a closed surface would have no sum."""
     model, mesh = at.system.model, at.system.model.mesh
-    corners = mesh.points + at.u
-    a, b, c = corners[mesh.boundary].transpose(1, 0, 2)
-    nodal = np.zeros(corners.shape)
+    a, b, c = mesh.points[mesh.boundary].transpose(1, 0, 2)
+    nodal = np.zeros(mesh.points.shape)
     np.add.at(nodal, mesh.boundary, np.repeat(np.cross(b - a, c - a)[:, None] / 6.0, 3, axis=1))
     assert np.linalg.norm(nodal.sum(axis=0)) < 1e-12 * np.abs(nodal).sum()
     answer = at.answers(np.where(model.constrained, 0.0, nodal)[None])[:, 0]
-    modes = pressures(at, 1e3)
+    modes = pressures(at, 1e3).columns
     assert modes.shape[1] == 1
     rows = at.sensors.is_displacement
     size = np.sqrt(np.mean(answer[rows] ** 2))
@@ -67,12 +76,41 @@ def test_a_pressure_of_a_great_length_is_a_uniform_one_on_what_is_free(at):
     np.testing.assert_allclose(same[rows], answer[rows] / size, atol=1e-6 * np.abs(same).max())
 
 
-def test_fields_are_of_one_metre(at):
+@pytest.fixture(scope="module")
+def every_field(at):
+    lengths = [0.01, 0.024]
+    return fields(at, lengths, body_forces(at, lengths))
+
+
+def test_fields_are_of_one_metre(at, every_field):
     rows = at.sensors.is_displacement
-    every = fields(at, [0.01, 0.024], body_forces(at, [0.01, 0.024]))
-    assert {name.split(",")[0] for name in every} == {"body force", "eigenstress", "pressure", "traction"}
-    for columns in every.values():
-        np.testing.assert_allclose(np.mean(np.sum(columns[rows] ** 2, axis=1)), 1.0)
+    assert {name.split(",")[0] for name in every_field} == {"body force", "eigenstress", "pressure", "traction"}
+    for field in every_field.values():
+        np.testing.assert_allclose(np.mean(np.sum(field.columns[rows] ** 2, axis=1)), 1.0)
+
+
+def test_columns_of_fields_are_those_of_the_loads_that_fits_have(at, every_field):
+    for field in every_field.values():
+        [effect] = Effects(at).of([field_proposal(field, 1e-3)])
+        columns = 1e-3 * field.columns
+        np.testing.assert_allclose(effect.columns, columns, atol=1e-9 * np.abs(columns).max())
+        assert not effect.mean.any()
+
+
+def test_a_field_is_the_same_force_on_a_finer_mesh(at, every_field):
+    """Their nodal forces do the same work on any motion that is linear in the position, as integrals of one density."""
+    mesh = at.system.model.mesh
+    finer, _ = refined(mesh)
+    random = np.random.default_rng(3)
+    for name, field in every_field.items():
+        load = FieldLoad(field=field, coefficients=random.normal(size=field.columns.shape[1]))
+        moments = []
+        for each in (mesh, finer):
+            forces = load.nodal_forces(each)
+            arms = (each.points - mesh.points[0]) / mesh.radius
+            moments.append(np.column_stack([forces.sum(axis=0), forces.T @ arms]))
+        error = np.linalg.norm(moments[1] - moments[0]) / np.linalg.norm(moments[0])
+        assert error < 0.15, name
 
 
 def test_tissue_that_is_softer_at_one_time_moves_as_equilibria_of_softer_tissue(tmp_path):

@@ -33,7 +33,7 @@ from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volum
 from warpbrain.worlds.body.sensors import Sensors, noise_of, tracked_points
 from warpbrain.worlds.body.sources import sources
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
-from warpbrain.worlds.body.unknown import body_forces, fields, resistances
+from warpbrain.worlds.body.unknown import Field, body_forces, fields, resistances
 
 #: Gauss-Newton steps at most; the last one moves tissue and field by less than this [standard deviations].
 _STEPS, _CONVERGED = 6, 0.5
@@ -54,7 +54,7 @@ class Base:
     at: Linearisation
     effects: Effects
     nuisances: Nuisances
-    unknown: dict[str, Floats]  # (n, k), columns of unknown fields, of 1 m
+    unknown: dict[str, Field]  # without a name, by what they are
     begun_sources: Callable[[], tuple[Effect, ...]]  # which waits for `sources`
     resistance: Floats  # (n, k), unknown, of tissue; see `resistances`
     #: Of the rows if no cause acts: nuisances, and noise without gross errors or what the mesh does not resolve.
@@ -159,7 +159,7 @@ class BaseFinder:
         unknown = fields(linear.at, linear.lengths, linear.body_forces)
         nuisances, noise = linear.nuisances, linear.noise_model
         if errors is not None and not self._without_nuisances:
-            smooth = unknown[next(iter(unknown))]
+            smooth = next(iter(unknown.values())).columns
             nuisances = _with_likely_fraction(nuisances, noise, linear.residual, linear.typical_noise * smooth)
         return Base(
             self.states,
@@ -171,7 +171,7 @@ class BaseFinder:
             nuisances,
             unknown,
             begun_sources,
-            resistances(linear.at, self.states.times, other_volume(self.states), next(iter(unknown.values()))),
+            resistances(linear.at, self.states.times, other_volume(self.states), next(iter(unknown.values())).columns),
             noise.of_noise(nuisances.columns),
             _noises(linear, resolved=errors is None or self._without_nuisances),
             linear.noise,
@@ -230,7 +230,7 @@ class _LinearModel:
         # first, since it makes the compliance, with which nuisances are products instead of equilibria
         self.lengths = (finder._spacing * beliefs("unknown.lengths")).tolist()
         self.body_forces = body_forces(self.at, self.lengths)
-        smooth = np.column_stack(self.body_forces)
+        smooth = np.column_stack([force.columns for force in self.body_forces])
         nuisances = nuisances_at(self.at, states, state.hypothesis.theta, finder.prior, self.effects, errors)
         self.nuisances = nuisances.weakened() if finder._without_nuisances else nuisances
         # with tissue and field at their prior mean, not as the state has them

@@ -22,6 +22,7 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.nuisances import Nuisances
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses, modes_of_rows, with_courses
+from warpbrain.worlds.body.unknown import field_proposal
 
 UNKNOWN, RESISTANCE = "unknown", "resistance"
 #: What each means, in a sentence.
@@ -53,7 +54,9 @@ class BodyCauses:
         """The effect of a mechanism, or a source, at a place with a size; None of what acts linearly."""
         cause = self.causes[member.cause]
         effect = self.effects[cause.name][member.place]
-        return None if effect.proposal is None else scaled(effect, float(cause.sizes[member.size]))
+        if effect.proposal is None:
+            return None
+        return replace(effect.scaled(float(cause.sizes[member.size])), sizes=tuple(cause.sizes.tolist()))
 
     def columns(self, member: Member) -> Floats:
         """Columns (n, k) of one standard deviation."""
@@ -87,15 +90,6 @@ def _is_visible(cause: Cause, model: GaussianModel) -> bool:
         if (np.linalg.norm(model.standardised(np.concatenate(columns, axis=1)), axis=0) > least).any():
             return True
     return False
-
-
-def scaled(effect: Effect, size: float) -> Effect:
-    """An effect whose coefficients have a prior that is so many times as wide."""
-    if size == 1.0:
-        return effect
-    return replace(
-        effect, proposal=replace(effect.proposed, sd=size * effect.proposed.sd), columns=size * effect.columns
-    )
 
 
 def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
@@ -138,28 +132,30 @@ def _shares(effects: Sequence[Effect]) -> Floats | None:
 
 
 def unknown_effects(base: Base) -> tuple[Effect, ...]:
-    """Tissue whose resistance changes in time if there are several, unknown fields of every kind, and sources."""
+    """Tissue whose resistance changes in time if there are several, unknown fields of every kind, and sources.
+
+    What acts all the time is a load, which fits follow; what sets in or changes acts linearly.
+    """
     # setting in at any recorded time, or changing from one to the next as mechanisms may
-    times, sensors = base.states.times, base.at.sensors
-    factors = [factor_of_rows(course, sensors)[:, None] for course in main_courses(times)]
+    times, sensors, noise = base.states.times, base.at.sensors, base.typical_noise
+    courses = [factor_of_rows(course, sensors)[:, None] for course in main_courses(times)]
     if len(times) > 1:
-        factors.append(modes_of_rows(times, sensors))
-    linear = [base.typical_noise * base.resistance] if base.resistance.size else []
-    linear += _fields(base, [factor for factor in factors if factor.any()])
+        courses.append(modes_of_rows(times, sensors))
     zero = np.zeros(len(sensors))
-    return (*(Effect(None, zero, columns) for columns in linear), *base.sources)
-
-
-def _fields(base: Base, factors: Sequence[Floats]) -> list[Floats]:
-    """Columns of unknown fields; `factors` (n, r): of the modes of each course on the rows."""
-    return [base.typical_noise * with_courses(columns, f) for columns in base.unknown.values() for f in factors]
+    effects = [Effect(None, zero, noise * base.resistance)] if base.resistance.size else []
+    for field in base.unknown.values():
+        for number, course in enumerate(courses):
+            if course.any():
+                proposal = field_proposal(field, noise) if number == 0 else None
+                effects.append(Effect(proposal, zero, noise * with_courses(field.columns, course)))
+    return (*effects, *base.sources)
 
 
 def _unknown_cause(base: Base, effects: Sequence[Effect]) -> Cause:
     """Of `unknown_effects`."""
     places = [Place(effect.columns) for effect in effects]
     # fields, and sources of each length, are as probable as others of their kind
-    lengths = np.array([0.0 if effect.proposal is None else effect.proposed.radius for effect in effects])
+    lengths = np.array([effect.proposed.radius if effect.is_placed else 0.0 for effect in effects])
     _, groups, counts = np.unique(lengths, return_inverse=True, return_counts=True)
     counts[0] -= bool(base.resistance.size)
     local = belief("unknown.in_one_place") if len(counts) > 1 else 0.0
@@ -173,7 +169,7 @@ def _unknown_cause(base: Base, effects: Sequence[Effect]) -> Cause:
 
 def unknown_fields(base: Base) -> Cause:
     """Unknown fields of every kind, as they would be if they acted all the time."""
-    places = tuple(map(Place, _fields(base, [np.ones((len(base.residual), 1))])))
+    places = tuple(Place(base.typical_noise * field.columns) for field in base.unknown.values())
     return Cause(UNKNOWN, places, math.log(belief("causes.unknown")), beliefs("unknown.sizes"), Kind.UNKNOWN)
 
 

@@ -80,6 +80,9 @@ class Effect:
     columns: Floats  # (n, k), of one standard deviation of each
     #: Of a course in time: from its coefficients (k,) to the columns (n, k) about them.
     columns_at: Callable[[Floats], Floats] | None = None
+    #: How many times its coefficients vary as much as is usual, and how many times they may.
+    size: float = 1.0
+    sizes: tuple[float, ...] = (1.0,)
 
     @property
     def proposed(self) -> Proposal:
@@ -106,6 +109,15 @@ class Effect:
         if self.proposal is None or self.proposal.over_time is not None or self.proposal.changes_in_time:
             return []
         return list(self.proposal.acting(self.coefficients(z)))
+
+    def scaled(self, factor: float) -> Effect:
+        """The same with coefficients whose prior is so many times as wide; none of what is no physics."""
+        proposal = replace(self.proposed, sd=factor * self.proposed.sd)
+        return replace(self, proposal=proposal, columns=factor * self.columns, size=factor * self.size)
+
+    def of_size(self, effect: Effect) -> Effect:
+        """The same, of usual size, as large as another one."""
+        return replace(self.scaled(effect.size), sizes=effect.sizes)
 
     def offset(self, z: Floats) -> Floats:
         """Coefficients less those that have no effect (k,) [standard deviations]."""

@@ -24,7 +24,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.effects import Effect, width_of
+from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about, shape_columns_about
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
@@ -57,6 +57,9 @@ _AGREES = 0.5
 _MATTERS = 0.3
 #: Change of the columns of laws that is none [standard deviations of the noise, all sensors together].
 _UNSEEN = 1e-3
+#: How often the sizes of effects are looked at anew, and by how much [nats] the linear model must say that others are
+#: better.
+_RESIZED, _BETTER = 4, 1.0
 #: How often at most a search goes on with laws, error of the mesh, gross errors and noise of its result.
 _ROUNDS = 8
 #: After how many in succession it ends, too, that reach nothing better and leave no less: some go back and forth.
@@ -528,7 +531,7 @@ class Fitter:
     ) -> Refit:
         """Fit one set; `SolveError` if there is no equilibrium near the start.
 
-        `columns` (n, q + e + k): of nuisances, of causes that act linearly (unknown fields, or no physics), and of
+        `columns` (n, q + e + k): of nuisances, of causes that act linearly (no physics, or what changes), and of
         effects, about the base or about `subset`. `starts`, each (q + e + k,): coordinates to begin at, of which the
         best are taken: the most probable ones about the base, and about the fit without any cause. Where points of a
         surface may belong to one side or the other there are several best points, and a fit with a mechanism must not
@@ -537,6 +540,33 @@ class Fitter:
         with all of them, nearer still, whose share of the mesh's error is kept. `wanted`: a log evidence; a search that
         expects to reach less ends before it has converged.
         """
+        best = self._fit(effects, columns, starts, screened, nearby, subset, wanted)
+        for _ in range(_RESIZED):
+            begun = self._resized(best)
+            if begun is None:
+                break
+            try:
+                fit = self._fit(
+                    begun.effects, begun.columns, [], begun.marginal, subset=begun, wanted=best.log_evidence
+                )
+            except CANNOT_BE_FITTED:
+                break
+            if fit.log_evidence <= best.log_evidence:
+                break
+            best = fit
+        return best
+
+    def _fit(
+        self,
+        effects: tuple[Effect, ...],
+        columns: Floats,
+        starts: Sequence[Floats],
+        screened: SetMarginal,
+        nearby: SolvedState | None = None,
+        subset: Refit | None = None,
+        wanted: float = -np.inf,
+    ) -> Refit:
+        """The same with effects of these sizes."""
         search = FitSearch(self.base, self.mesh_errors, effects, columns, screened)
         if subset is not None:
             nearby = subset.state
@@ -567,6 +597,36 @@ class Fitter:
             raise FloatingPointError("its evidence is not a number")
         return best
 
+    @staticmethod
+    def _resized(fit: Refit) -> Refit | None:
+        """A fit with an effect of the next smaller or larger size, at the same point; None if that is no better.
+
+        Which size is the most probable in the linear model about the base is no matter of the fit: there tissue is as
+        soft as the base's, and what is far from linear needs more or less of a load. The prior of many coefficients
+        would cost tens of nats.
+        """
+        begun, most = None, _BETTER
+        first = fit.columns.shape[1] - width_of(fit.effects)
+        noise = fit.marginal.noise
+        for number, part in enumerate(column_slices(fit.effects, first)):
+            effect = fit.effects[number]
+            sizes = np.sort(effect.sizes)
+            here = int(np.argmin(np.abs(sizes - effect.size)))
+            factors = np.array(sizes[max(here - 1, 0) : here + 2]) / effect.size
+            if len(factors) < 2:
+                continue
+            others = noise.of_noise(np.delete(fit.columns, np.r_[part], axis=1))
+            W = others.standardised(np.column_stack([fit.linear, fit.columns[:, part]]))
+            squares, vectors = np.linalg.eigh(W[:, 1:].T @ W[:, 1:])
+            b = vectors.T @ (W[:, 1:].T @ W[:, 0])
+            # columns times f add (f^2 b^2 / (1 + f^2 s) - ln(1 + f^2 s)) / 2 to the log density, summed over modes
+            scaled = factors[:, None] ** 2 * np.maximum(squares, 0.0)
+            logs = 0.5 * np.sum(factors[:, None] ** 2 * b**2 / (1.0 + scaled) - np.log1p(scaled), axis=1)
+            gains = logs - logs[np.argmin(np.abs(np.log(factors)))]
+            if gains.max() > most:
+                most, begun = float(gains.max()), fit.scaled(number, float(factors[np.argmax(gains)]))
+        return begun
+
     def begin(self, effects: tuple[Effect, ...], refit: Refit, about: Linearisation | None) -> Refit:
         """State, residual and Laplace evidence with other effects at the coordinates of a fit, before any iteration.
 
@@ -579,7 +639,7 @@ class Fitter:
         return search.result()
 
     def _update(self, search: FitSearch) -> Refit:
-        """Take shapes, the error of the mesh, noise and gross errors of the best point of a search, which is returned.
+        """Take shapes, the error of the mesh, noise and gross errors of the best point of a search; return that.
 
         The error of the mesh without any cause is that of all fits to come. It depends on the tissue, not only in
         proportion, and would otherwise be taken for a mechanism's share.

@@ -163,7 +163,7 @@ class HypothesisSearch:
         number = 0
         while number < (0 if alone else 2 * _MOST):
             expanded = {*self._expanded, *self._unstable}
-            chosen = next_to_fit(self.weighted_sets, self.probabilities, expanded, rivals=number < _MOST)
+            chosen = next_to_fit(self.weighted_sets, expanded, rivals=number < _MOST)
             if chosen is None:
                 return
             if chosen.may_move:
@@ -200,7 +200,7 @@ class HypothesisSearch:
     def fitted_source(self) -> WeightedSet | None:
         """The most probable set with the unknown and no mechanism, if that is a source in one place and was fitted."""
         likely = next((s for s in self.weighted_sets if UNKNOWN in s.names and not s.mechanisms), None)
-        return likely if likely is not None and likely.refit is not None and UNKNOWN in likely.acting else None
+        return likely if likely is not None and likely.refit is not None and likely.has_placed(UNKNOWN) else None
 
     def likely_unknown(self, weighted: WeightedSet) -> str:
         """Label of the most probable place of the unknown in the residuals of a weighted set; see `Place.label`."""
@@ -221,12 +221,7 @@ class HypothesisSearch:
         """Fit a set; one that cannot be fitted keeps the reason."""
         candidate = self._sets[names]
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
-        candidates = [candidate]
-        if candidate.alternative is not None:
-            alternative = replace(candidate.alternative, inherited_gain=candidate.inherited_gain)
-            candidates.append(alternative.with_evidence(candidate.hypothesis.log_evidence))
-        fits = map(self._fitted, candidates)
-        fitted, gain = max(fits, key=lambda fit: (fit[0].refit is not None, fit[0].hypothesis.log_evidence))
+        fitted, gain = self._fitted(candidate)
         self._sets[names] = fitted
         if fitted.refit is not None:
             self._pass_on(gain, names)
@@ -414,7 +409,7 @@ class HypothesisSearch:
                 log_prior=hypothesis.log_prior + fitted.hypothesis.log_prior,
                 log_evidence=fitted.hypothesis.log_evidence + gain,
             )
-            yield replace(candidate, hypothesis=joint, inherited_gain=None, alternative=None)
+            yield replace(candidate, hypothesis=joint, inherited_gain=None)
 
 
 def _weighed(

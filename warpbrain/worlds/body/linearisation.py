@@ -408,7 +408,8 @@ class Linearisation:
     def answers_of_components(self, element_forces: Floats, weights: Floats) -> Floats:
         """Response (n, c, k) to components (c, m, 4, 3) of internal forces [N] on corners times weights (m, k) each."""
         elements, count = np.arange(len(weights)), weights.shape[1]
-        components = [_gathered(self.system.tetrahedra, each, elements, self.system) for each in element_forces]
+        shape = self.system.size, len(elements)
+        components = [gathered(self.system.tetrahedra, each, elements, shape) for each in element_forces]
         if not self._are_by_compliance(len(components) * count):
             columns = [self._by_equilibria(-(component @ weights)) for component in components]
             return np.stack(columns, axis=1)
@@ -469,20 +470,20 @@ def _element_forces(system: System, u: Floats, weights: Floats, of_moduli: bool 
     for term in system.terms:
         if term.elements is not None and (term.of_moduli or not of_moduli):
             forces[term.elements] += term.forces.numpy()
-    total = _gathered(system.tetrahedra, forces, np.arange(system.elements), system)
+    shape = system.size, system.elements
+    total = gathered(system.tetrahedra, forces, np.arange(system.elements), shape)
     for averaged in (term for group in system.groups for term in group.averaged):
         elements, patches, shares = averaged.shares(weights)
         patch_forces = averaged.forces.numpy().astype(np.float64)
-        total = total + _gathered(
-            averaged.stencils[patches], shares[:, None, None] * patch_forces[patches], elements, system
-        )
+        of_patches = shares[:, None, None] * patch_forces[patches]
+        total = total + gathered(averaged.stencils[patches], of_patches, elements, shape)
     return total.tocsr()
 
 
-def _gathered(nodes: NDArray[np.integer], forces: Floats, elements: NDArray[np.integer], system: System) -> Any:
-    """Forces (k, s, 3) on nodes (k, s) of elements (k,) as SciPy CSR (3 N, m)."""
+def gathered(nodes: NDArray[np.integer], forces: Floats, elements: NDArray[np.integer], shape: tuple[int, int]) -> Any:
+    """Forces (k, s, 3) on nodes (k, s) of elements (k,) as SciPy CSR (3 N, m); `shape`: N and m."""
     from scipy.sparse import csr_matrix
 
     rows = (3 * nodes[:, :, None] + np.arange(3)).ravel()
     columns = np.repeat(elements, 3 * nodes.shape[1])
-    return csr_matrix((forces.ravel(), (rows, columns)), (3 * system.size, system.elements))
+    return csr_matrix((forces.ravel(), (rows, columns)), (3 * shape[0], shape[1]))

@@ -28,7 +28,7 @@ from warpbrain.mesh.quality import principal_axes
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.causes import BodyCauses, scaled
+from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
 from warpbrain.worlds.body.effects import Effect, Effects, width_of
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
@@ -41,7 +41,7 @@ _MOVES, _MOVE, _BETTER = 3, 0.25, 1.0
 
 
 def best_in_cell(
-    base: Base, effects: Effects, effect: Effect, size: float, spacing: float, without: GaussianModel, residual: Floats
+    base: Base, effects: Effects, effect: Effect, spacing: float, without: GaussianModel, residual: Floats
 ) -> tuple[Effect, float, float]:
     """The best effect of the cell of another one.
 
@@ -52,14 +52,13 @@ def best_in_cell(
 
     `effects`: which makes columns at the state that the linear model is about.
     `effect`: of a proposal that can be elsewhere.
-    `size`: of its coefficients, relative to what is usual.
     `spacing`: between the places of the scan [m].
     `without`: of rows with all else that acts and all points sound.
     `residual` (n,): less what is expected of all else.
     """
 
     def logs_of(places: Sequence[Proposal]) -> tuple[list[Effect], Floats]:
-        tried = [best, *(scaled(other, size) for other in _effects_of(effects, places))]
+        tried = [best, *(other.of_size(effect) for other in _effects_of(effects, places))]
         return tried, log_densities_of(without, residual, base.points, [(each.mean, each.columns) for each in tried])
 
     best = effect
@@ -174,11 +173,7 @@ class Weighing:
             replace(each.with_evidence(log_evidence), log_share=share)
             for each, share in zip(weighed, log_shares.tolist(), strict=True)
         ]
-        # the unknown is a field, linear in every fit, or a source, which acts through an equilibrium: which one fits
-        # better cannot be seen in the linear model
-        ordered = (weighed[k] for k in np.argsort(-logs).tolist())
-        alternative = next((other for other in ordered if other.acting != weighed[best].acting), None)
-        return replace(weighed[best], alternative=alternative)
+        return weighed[best]
 
     def _weigh_at(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
         """The same as if its best configuration stood for all places."""
@@ -228,15 +223,12 @@ def with_refined_places(
             continue
         others = np.delete(candidate.columns, np.r_[part], axis=1)
         without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
-        assert effect.proposed.centre is not None and effect.proposed.radius is not None
-        usual = effect.proposed.elsewhere(effect.proposed.centre, effect.proposed.radius)
-        size = float(np.max(effect.proposed.sd / usual.sd))
         residual = candidate.residual + effect.mean
         apart, about = spacing, source
         if effect.proposed.is_there_or_not:
             # a release: centres are as far apart as those of a scan's patches
             apart, about = BETWEEN * base.at.sensors.radius, source.beside(_acting_beside(candidate, number, placed))
-        best, gain, log_share = best_in_cell(base, about, effect, size, apart, without, residual)
+        best, gain, log_share = best_in_cell(base, about, effect, apart, without, residual)
         columns = candidate.columns.copy()
         columns[:, part] = best.columns
         residual = residual - best.mean
@@ -312,8 +304,5 @@ def _moved_effects(base: Base, effect: Effect, step: float) -> Iterator[Effect]:
     """An effect at places a step from where it is, in its own columns; none of what is everywhere, or there or not."""
     if not effect.is_placed:
         return
-    proposal = effect.proposed
-    assert proposal.elsewhere is not None and proposal.centre is not None and proposal.radius is not None
-    size = float(np.max(proposal.sd / proposal.elsewhere(proposal.centre, proposal.radius).sd))
-    for other in places_about(base.at.system.model, proposal, step):
-        yield replace(scaled(replace(effect, proposal=other), size), columns=effect.columns)
+    for other in places_about(base.at.system.model, effect.proposed, step):
+        yield replace(effect, proposal=replace(other, sd=effect.size * other.sd))

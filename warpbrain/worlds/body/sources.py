@@ -9,24 +9,25 @@ the source that it is.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import ClassVar
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
-from warpbrain.physics.load import Load
-from warpbrain.physics.mechanism import Mechanism
-from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Place, Proposal
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.sensors import spread_points
-from warpbrain.worlds.body.unknown import gaussians, root_mean_square, stress_patches, unit_stresses
+from warpbrain.worlds.body.unknown import (
+    UnknownLoad,
+    gaussians,
+    root_mean_square,
+    stress_patches,
+    unit_stresses,
+)
 
 #: Columns are components, as of `unit_stresses`, of five deviatoric stresses and of an isotropic one, all of unit
 #: Frobenius norm. The last moves nearly incompressible tissue so little that it has a standard deviation of its own.
@@ -40,19 +41,14 @@ _KEPT = 64
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source(Load, Mechanism):
-    """A source without a name in one place; no case can declare it."""
+class Source(UnknownLoad):
+    """A source without a name in one place."""
 
     centre: Place  # [m]
     length: float  # [m]
     force: Place = (0.0, 0.0, 0.0)  # [N]
     turn: Place = (0.0, 0.0, 0.0)  # adds the force turn x arm / length at a node, arm from the centre [N]
     stress: tuple[float, ...] = ()  # six components as of `unit_stresses` at the centre [Pa]; none if empty
-    kind: ClassVar[str] = "unknown"
-    sentence: ClassVar[str] = "Something without a name acts in one place."
-    example: ClassVar[str] = ""
-    enters: ClassVar[Enters] = Enters("load", "f_unknown")
-    several: ClassVar[bool] = True
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         assert isinstance(mesh, TetMesh), "a diagnosis has linear elements"
@@ -157,8 +153,3 @@ def _stress_columns(at: Linearisation, centres: Floats, length: float) -> Floats
     mesh = at.system.model.mesh
     columns = stress_patches(at, mesh.points, centres, length).reshape(len(at.sensors), len(_STRESSES), -1)
     return np.asarray(np.einsum("ij,nis->njs", _STRESSES, columns))
-
-
-def without_sources(mechanisms: Sequence[Mechanism]) -> tuple[Mechanism, ...]:
-    """Mechanisms that a case can declare."""
-    return tuple(mechanism for mechanism in mechanisms if not isinstance(mechanism, Source))

@@ -8,11 +8,10 @@ Where a body moves far the linear model says little of any cause: `bend_of`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis
@@ -20,20 +19,15 @@ from warpbrain.inference.decide import NAMED_AND_REST, UNKNOWN, Decision, decide
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
-#: Probability below which a set is not fitted.
-_NEGLIGIBLE = 0.005
-
 
 def next_to_fit(
     sets: Sequence[WeightedSet],
-    probabilities: Floats,
     expanded: Collection[frozenset[str]],
     rivals: bool = True,
 ) -> WeightedSet | None:
     """The set that is fitted next, or at neighbouring places, or whose supersets are weighed; None to stop.
 
     `sets`: the most probable first.
-    `probabilities` (s,).
     `expanded`: fitted sets whose supersets were weighed about their fit.
     `rivals`: whether sets that the verdict does not rest on may be chosen, too.
     """
@@ -46,7 +40,7 @@ def next_to_fit(
     elif not rivals:
         return None
     else:
-        open_sets = _open_sets(sets, probabilities)
+        open_sets = (candidate for candidate in sets if candidate.is_open)
         matters = (candidate for candidate in open_sets if _may_be_regretted(candidate, sets, decision))
         first = next(matters, None)
         if first is None:
@@ -137,13 +131,6 @@ def _unknown_not_fitted(
     parts = (s for s in sets if s.names in alone or s is single or s in of_mechanisms[:1])
     part = next((part for part in parts if part.is_open), None)
     return part or (None if single is None or single.names in expanded else single)
-
-
-def _open_sets(sets: Sequence[WeightedSet], probabilities: Floats) -> Iterator[WeightedSet]:
-    for candidate, probability in zip(sets, probabilities.tolist(), strict=True):
-        # how much a fit at another place gains is not in the probability
-        if candidate.may_move or (probability > _NEGLIGIBLE and candidate.is_open):
-            yield candidate
 
 
 def _may_be_regretted(candidate: WeightedSet, sets: Sequence[WeightedSet], decision: Decision) -> bool:

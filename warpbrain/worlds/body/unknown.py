@@ -1,27 +1,34 @@
-"""Unknown causes as columns over sensors: smooth random fields of body force, eigenstress, traction and pressure,
-or tissue whose resistance changes in time.
+"""Unknown causes: smooth random fields of body force, eigenstress, traction and pressure, or tissue whose resistance
+changes in time.
 
 Each field is a sum of Gaussian patches with independent coefficients, a Gaussian process of that length. An eigenstress
 `s` acts within the body: its nodal forces `-V s grad N` have no net force and no moment. Fluids, and what slides along
-a surface, press on it alone: three components of a traction that are independent say little for that. Columns are of
-1 m root mean square over the recorded displacements, truncated to the modes that the sensors see.
+a surface, press on it alone: three components of a traction that are independent say little for that. The sensors see a
+few modes of a field. These are dead loads, which fits follow as they follow mechanisms: with the response that a body
+has without them, or with other tissue, they would explain what they do worse than a mechanism that does not act.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from copy import copy
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import ClassVar
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats
 from warpbrain.inference.beliefs import belief
-from warpbrain.mesh import node_areas, node_vectors, nodes_of
+from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, node_vectors, nodes_of
+from warpbrain.physics.load import Load
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, modes_between
 from warpbrain.physics.words import number
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.effects import Effects
-from warpbrain.worlds.body.linearisation import Linearisation, Moment
+from warpbrain.worlds.body.linearisation import Linearisation, Moment, gathered
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.time_courses import finite_times, modes_of, modes_of_rows, with_courses
 
@@ -29,53 +36,133 @@ from warpbrain.worlds.body.time_courses import finite_times, modes_of, modes_of_
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A field without a name: what the sensors see of it in a few modes, and the nodal forces that these are.
+
+    `forces`: from amplitudes (j, k) of its patches to nodal forces (N, 3, k) [N] on a mesh.
+    """
+
+    mesh: TetMesh  # which its columns are of
+    columns: Floats  # (n, k), of each mode, all of them of 1 m root mean square over the recorded displacements
+    modes: Floats  # (j, k), amplitudes of the patches in each mode
+    forces: Callable[[TetMesh, Floats], Floats]
+
+    def nodal_forces(self, mesh: TetMesh, coefficients: Floats) -> Floats:
+        """Of modes with coefficients (k,), on any mesh of the body: (N, 3) [N]."""
+        same = np.array_equal(mesh.tetrahedra, self.mesh.tetrahedra) and np.array_equal(mesh.points, self.mesh.points)
+        # of the mesh of fits once, of a finer one, where they are needed once, for these coefficients alone
+        forces = self._patterns @ coefficients if same else self.forces(mesh, self.modes @ coefficients[:, None])
+        return np.asarray(forces.reshape(-1, 3))
+
+    @cached_property
+    def _patterns(self) -> Floats:
+        """Nodal forces (N, 3, k) of each mode."""
+        return self.forces(self.mesh, self.modes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnknownLoad(Load, Mechanism):
+    """A load without a name, which fits follow as they follow mechanisms; no case can declare it."""
+
+    kind: ClassVar[str] = "unknown"
+    sentence: ClassVar[str] = "Something without a name acts."
+    example: ClassVar[str] = ""
+    enters: ClassVar[Enters] = Enters("load", "f_unknown")
+    several: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FieldLoad(UnknownLoad):
+    """Modes of a field with coefficients (k,)."""
+
+    field: Field
+    coefficients: Floats
+
+    def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
+        assert isinstance(mesh, TetMesh), "a diagnosis has linear elements"
+        return self.field.nodal_forces(mesh, self.coefficients)
+
+
+def declarable(mechanisms: Sequence[Mechanism]) -> tuple[Mechanism, ...]:
+    """Those that a case can declare."""
+    return tuple(mechanism for mechanism in mechanisms if not isinstance(mechanism, UnknownLoad))
+
+
+def field_proposal(field: Field, size: float) -> Proposal:
+    """A load of a field whose modes have a root mean square of `size` [m] together."""
+    count = field.columns.shape[1]
+    return Proposal(lambda c: FieldLoad(field=field, coefficients=c), np.zeros(count), np.full(count, size))
+
+
 def force_patches(at: Linearisation, length: float, spacing: float | None = None) -> tuple[Floats, Floats]:
     """Sites (s, 3) [m], and answers (n, s, 3) to a force of 1 N in each direction, spread with a Gaussian."""
     mesh = at.system.model.mesh
-    return _patches(at, mesh.points, mesh.node_volumes, length, spacing)
-
-
-def _patches(
-    at: Linearisation, places: Floats, shares: Floats, length: float, spacing: float | None
-) -> tuple[Floats, Floats]:
-    sites, weights = _weights(at, places, shares, length, spacing)
-    # the share on held nodes moves nothing
-    weights /= np.maximum(weights.sum(axis=0), 1e-300)
+    sites, weights, _ = _weights(mesh.points, mesh.points, mesh.node_volumes, length, spacing)
     return sites, at.answers_of_patches(weights)
 
 
 def _weights(
-    at: Linearisation, places: Floats, shares: Floats, length: float, spacing: float | None = None
-) -> tuple[Floats, Floats]:
-    """Sites (s, 3) [m], and Gaussians (N, s) about them at the nodes, of height 1, times the shares of nodes (N,)."""
-    points = at.system.model.mesh.points
+    points: Floats, places: Floats, shares: Floats, length: float, spacing: float | None = None
+) -> tuple[Floats, Floats, Floats]:
+    """Sites (s, 3) [m], what nodes bear (N, s) of a force of 1 N about each, and amplitudes (s,) of these Gaussians.
+
+    `places`: among which the sites are. `shares` (N,): of a uniform force.
+    """
     sites = places[spread_points(places, length if spacing is None else spacing, 700)]
-    return sites, shares[:, None] * gaussians(points, sites, length)
+    weights = shares[:, None] * gaussians(points, sites, length)
+    # the share on held nodes moves nothing
+    amplitudes = 1.0 / np.maximum(weights.sum(axis=0), 1e-300)
+    return sites, weights * amplitudes, amplitudes
 
 
-def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Floats, ...]:
-    """Columns (n, k) of a body force of each length [m]."""
-    answers = [force_patches(at, length)[1] for length in lengths]
-    rows = at.sensors.is_displacement
-    return tuple(in_threads(lambda answer: _visible_modes(answer.reshape(len(answer), -1), rows), answers))
+def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Field, ...]:
+    """Body forces of each length [m]."""
+
+    def shares(mesh: TetMesh) -> Floats:
+        return np.asarray(mesh.node_volumes)
+
+    mesh = at.system.model.mesh
+    return tuple(in_threads(lambda length: _forces_on_nodes(at, mesh.points, shares(mesh), length, shares), lengths))
 
 
-def tractions(at: Linearisation, length: float) -> Floats:
-    """Columns (n, k) of a traction of a length [m] on all that is free of the surface, which is not nothing."""
+def tractions(at: Linearisation, length: float) -> Field:
+    """Tractions of a length [m] on all that is free of the surface, which is not nothing."""
+
+    def shares(mesh: TetMesh) -> Floats:
+        return node_areas(mesh.points, mesh.boundary)
+
     mesh, free = at.system.model.mesh, _free_of_surface(at)
-    shares = np.where(free, node_areas(mesh.points, mesh.boundary), 0.0)
-    _, answers = _patches(at, mesh.points[free], shares, length, None)
-    return _visible_modes(answers.reshape(len(answers), -1), at.sensors.is_displacement)
+    return _forces_on_nodes(at, mesh.points[free], np.where(free, shares(mesh), 0.0), length, shares)
 
 
-def pressures(at: Linearisation, length: float) -> Floats:
-    """Columns (n, k) of a pressure of a length [m] on what is free of the deformed surface, which is not nothing."""
-    mesh, free = at.system.model.mesh, _free_of_surface(at)
-    _, weights = _weights(at, mesh.points[free], free.astype(np.float64), length)
-    # each corner of a face bears a third of its load
-    of_unit_pressure = node_vectors(mesh.points + at.u, mesh.boundary) / 3.0
-    forces = (of_unit_pressure[:, :, None] * weights[:, None]).reshape(of_unit_pressure.size, -1)
-    return _visible_modes(at.answers_of_columns(forces), at.sensors.is_displacement)
+def _forces_on_nodes(
+    at: Linearisation, places: Floats, shares: Floats, length: float, shares_of: Callable[[TetMesh], Floats]
+) -> Field:
+    """Patches of forces in every direction; `shares` (N,): see `_weights`, and of any mesh."""
+    sites, weights, amplitudes = _weights(at.system.model.mesh.points, places, shares, length)
+
+    def forces(mesh: TetMesh, coefficients: Floats) -> Floats:
+        gaussian = shares_of(mesh)[:, None] * gaussians(mesh.points, sites, length) * amplitudes
+        return np.asarray(gaussian @ coefficients.reshape(len(sites), -1)).reshape(len(gaussian), 3, -1)
+
+    answers = at.answers_of_patches(weights)
+    return _field(at, answers.reshape(len(answers), -1), forces)
+
+
+def pressures(at: Linearisation, length: float) -> Field:
+    """Pressures of a length [m] on what is free of the surface, which is not nothing."""
+    points = at.system.model.mesh.points
+    free = points[_free_of_surface(at)]
+    sites = free[spread_points(free, length, 700)]
+
+    def forces(mesh: TetMesh, coefficients: Floats) -> Floats:
+        # each corner of a face bears a third of its load
+        of_unit_pressure = node_vectors(mesh.points, mesh.boundary) / 3.0
+        return of_unit_pressure[:, :, None] * (gaussians(mesh.points, sites, length) @ coefficients)[:, None]
+
+    of_each = forces(at.system.model.mesh, np.eye(len(sites)))
+    return _field(at, at.answers_of_columns(of_each.reshape(-1, len(sites))), forces)
 
 
 def _free_of_surface(at: Linearisation) -> Bools:
@@ -85,12 +172,22 @@ def _free_of_surface(at: Linearisation) -> Bools:
     return np.asarray(on_surface & ~model.constrained.reshape(-1, 3).all(axis=1))
 
 
-def eigenstresses(at: Linearisation, length: float) -> Floats:
-    """Columns (n, k) of an eigenstress of a length [m], all six components."""
+def eigenstresses(at: Linearisation, length: float) -> Field:
+    """Eigenstresses of a length [m], all six components."""
     mesh = at.system.model.mesh
     sites = mesh.centres[spread_points(mesh.centres, length, 700)]
-    columns = stress_patches(at, mesh.points + at.u, sites, length)
-    return _visible_modes(columns, at.sensors.is_displacement)
+
+    def forces(mesh: TetMesh, coefficients: Floats) -> Floats:
+        heights, shape = gaussians(mesh.centres, sites, length), (len(mesh.points), len(mesh.tetrahedra))
+        by_component = zip(
+            unit_stresses(mesh.points[mesh.tetrahedra]), coefficients.reshape(6, len(sites), -1), strict=True
+        )
+        total = np.zeros((3 * shape[0], coefficients.shape[1]))
+        for of_unit, of_sites in by_component:
+            total -= gathered(mesh.tetrahedra, of_unit, np.arange(shape[1]), shape) @ (heights @ of_sites)
+        return total.reshape(shape[0], 3, -1)
+
+    return _field(at, stress_patches(at, mesh.points, sites, length), forces)
 
 
 def root_mean_square(columns: Floats) -> float:
@@ -129,7 +226,8 @@ def resistances(at: Linearisation, times: Sequence[float], volume: Proposal, smo
         columns = np.column_stack([state.answers_of_elements(state.element_forces, tissues), bulk.columns / volume.sd])
         return with_courses(columns, courses)
 
-    columns = _visible_modes(at.summed_in_time(about), at.sensors.is_displacement)
+    columns = at.summed_in_time(about)
+    columns = columns @ _visible_modes(columns, at.sensors.is_displacement)
     # nothing that is known loads the body
     if not columns.any():
         return nothing
@@ -183,28 +281,37 @@ def unit_stresses(corners: Floats) -> Floats:
     return forces
 
 
-def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Floats]) -> dict[str, Floats]:
-    """Columns of every field by its name. `lengths` [m]. `forces` (n, k): `body_forces` of these lengths."""
-    made: dict[str, Callable[[], Floats]] = {}
-    for length, columns in zip(lengths, forces, strict=True):
+def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Field]) -> dict[str, Field]:
+    """Every field by its name. `lengths` [m]. `forces`: `body_forces` of these lengths."""
+    made: dict[str, Callable[[], Field]] = {}
+    for length, of_length in zip(lengths, forces, strict=True):
         # in bodies of any size
         size = f"{number(1e3 * length)} mm"
-        made[f"body force, {size}"] = partial(np.asarray, columns)
+        made[f"body force, {size}"] = partial(copy, of_length)
         made[f"eigenstress, {size}"] = partial(eigenstresses, at, length)
         if _free_of_surface(at).any():
             made[f"traction, {size}"] = partial(tractions, at, length)
             made[f"pressure, {size}"] = partial(pressures, at, length)
-    columns_by_name = zip(made, in_threads(lambda each: each(), list(made.values())), strict=True)
-    return {name: columns for name, columns in columns_by_name if columns.shape[1]}
+    by_name = zip(made, in_threads(lambda each: each(), list(made.values())), strict=True)
+    return {name: field for name, field in by_name if field.columns.shape[1]}
+
+
+def _field(at: Linearisation, answers: Floats, forces: Callable[[TetMesh, Floats], Floats]) -> Field:
+    """The field of patches to which the sensors answer (n, j); see `Field`."""
+    modes = _visible_modes(answers, at.sensors.is_displacement)
+    return Field(at.system.model.mesh, answers @ modes, modes, forces)
 
 
 def _visible_modes(columns: Floats, rows: Bools) -> Floats:
-    """The modes (n, k) of columns that displacements, in some of the rows (n,), see."""
+    """Coefficients (j, k) of columns (n, j) in the modes that displacements, in some of the rows (n,), see.
+
+    Modes are in the order of their sizes, and all together of 1 m root mean square.
+    """
     # modes of displacements alone: recorded forces have another unit, and would dominate
     rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
     squares, vectors = np.linalg.eigh(columns[rows] @ columns[rows].T)
     sizes, vectors = np.sqrt(np.maximum(squares[::-1], 0.0)), vectors[:, ::-1]
     total = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
     kept = min(int(np.searchsorted(total, 1.0 - belief("unknown.cut"))) + 1, int(belief("unknown.modes")))
-    modes = columns @ (columns[rows].T @ (vectors[:, :kept] / np.maximum(sizes[:kept], 1e-300)))
-    return np.asarray(modes / max(root_mean_square(modes[rows]), 1e-300))
+    modes = columns[rows].T @ (vectors[:, :kept] / np.maximum(sizes[:kept], 1e-300))
+    return np.asarray(modes / max(root_mean_square(columns[rows] @ modes), 1e-300))

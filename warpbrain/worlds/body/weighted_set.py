@@ -13,7 +13,7 @@ which pulls the elements in its own way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -54,6 +54,12 @@ class MeshShare:
     def extended(self, count: int) -> MeshShare:
         """The same where further mechanisms have coefficients after these, `count` in all."""
         return replace(self, gradient=np.append(self.gradient, np.zeros(count - len(self.gradient))))
+
+    def with_scaled(self, part: slice, factor: float) -> MeshShare:
+        """The same of coefficients some of which are in a unit so many times as large."""
+        gradient = self.gradient.copy()
+        gradient[part] *= factor
+        return replace(self, gradient=gradient)
 
     def with_fixed(self, part: slice, z: Floats) -> MeshShare:
         """The same without some of the coefficients, which stay where they are (j,)."""
@@ -134,6 +140,24 @@ class Refit:
         That a linear model would explain everything beyond the last state that has an equilibrium is no evidence.
         """
         return self.marginal.log_evidence - self.unreached + self.within_expected
+
+    def scaled(self, number: int, factor: float) -> Refit:
+        """The same point with an effect whose coefficients have a prior so many times as wide."""
+        part, share = column_slices(self.effects, 0)[number], self.mesh_share
+        columns, first = self.columns.copy(), len(self.nuisances)
+        columns[:, first + part.start : first + part.stop] *= factor
+
+        def changed(values: tuple[Any, ...], change: Callable[[Any], Any]) -> tuple[Any, ...]:
+            return (*values[:number], change(values[number]), *values[number + 1 :])
+
+        return replace(
+            self,
+            effects=changed(self.effects, lambda effect: effect.scaled(factor)),
+            columns=columns,
+            coefficients=changed(self.coefficients, lambda z: z / factor),
+            covariances=changed(self.covariances, lambda covariance: covariance / factor**2),
+            mesh_share=None if share is None else share.with_scaled(part, factor),
+        )
 
     def without(self, number: int, base: Base) -> Refit:
         """The same point without one of its effects, from which a set without it is fitted."""
@@ -246,11 +270,11 @@ class WeightedSet:
     """A set of causes and the linear model about its best point."""
 
     hypothesis: Hypothesis
-    #: Names of its causes that act through an equilibrium: mechanisms, and the unknown where it is a source.
+    #: Names of its causes that act through an equilibrium: mechanisms, and the unknown but where it changes in time.
     acting: tuple[str, ...]
     effects: tuple[Effect, ...]  # of these
     residual: Floats  # (n,), with all coordinates at zero
-    #: (n, q + e + k): of nuisances, of causes that act linearly (unknown fields, and what is no physics), and of
+    #: (n, q + e + k): of nuisances, of causes that act linearly (what is no physics, or changes in time), and of
     #: effects.
     columns: Floats
     marginal: SetMarginal
@@ -261,8 +285,6 @@ class WeightedSet:
     inherited_gain: float | None = 0.0
     refined: bool = False  # whether its mechanisms are at the best places within their cells
     moved: bool = False  # whether it was fitted at neighbouring places, too
-    #: The same causes with the unknown as a source if it is a field here, or the reverse; fitted beside it.
-    alternative: WeightedSet | None = None
     #: Log of the part of these places in the evidence of a set that is not fitted, which is a sum over all places.
     log_share: float = 0.0
 
@@ -285,6 +307,10 @@ class WeightedSet:
     def may_move(self) -> bool:
         """Whether it is fitted, with mechanisms whose neighbouring places were not looked at."""
         return self.refit is not None and not self.moved and any(effect.is_placed for effect in self.effects)
+
+    def has_placed(self, cause: str) -> bool:
+        """Whether a cause acts in a place, with a size of its own there."""
+        return any(name == cause and effect.is_placed for name, effect in zip(self.acting, self.effects, strict=True))
 
     @property
     def slices(self) -> tuple[slice, ...]:
@@ -324,7 +350,6 @@ class WeightedSet:
             columns=refit.columns,
             marginal=refit.marginal,
             refit=refit,
-            alternative=None,
         )
 
     def without(self, mechanism: str, base: Base) -> WeightedSet:
