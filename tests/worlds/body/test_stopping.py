@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis, Kind
 from warpbrain.worlds.body.stopping import next_to_fit
@@ -51,6 +52,16 @@ def test_what_an_unknown_rests_on_is_fitted_and_then_that_without_it():
     assert following(nothing, weighted(-5.0, "registration"), weighted(60.0, *both, fitted=True)) == ["registration"]
     fitted = weighted(-5.0, "registration", fitted=True)
     assert following(nothing, fitted, weighted(60.0, *both, fitted=True)) is None
+
+
+def test_before_a_mechanism_is_named_what_has_no_name_is_fitted():
+    nothing, named = weighted(0.0, fitted=True), weighted(60.0, "pressure", fitted=True)
+    rivals = weighted(40.0, "unknown"), weighted(45.0, "registration", "unknown")
+    assert following(nothing, named, *rivals, expanded=[("pressure",)]) == ["registration", "unknown"]
+    assert following(nothing, named, rivals[0], expanded=[("pressure",)]) == ["unknown"]
+    hopeless = weighted(60.0 - belief("fits.moved") - 1.0, "unknown")
+    assert following(nothing, named, hopeless, expanded=[("pressure",)]) is None
+    assert following(nothing, named, weighted(40.0, "unknown", fitted=True), expanded=[("pressure",)]) is None
 
 
 def test_before_something_has_no_name_the_likeliest_mechanism_is_fitted():

@@ -15,7 +15,7 @@ import numpy as np
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis
-from warpbrain.inference.decide import NAMED_AND_REST, UNKNOWN, Decision, decide
+from warpbrain.inference.decide import NAMED, NAMED_AND_REST, UNKNOWN, Decision, decide
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -35,7 +35,11 @@ def next_to_fit(
     named = [candidate for candidate in sets if frozenset(candidate.mechanisms) == frozenset(decision.causes)]
     if named and named[0].mechanisms and not _is_settled(named, expanded):
         chosen = named[0]
-    elif part := _part_not_fitted(decision, sets) or _unknown_not_fitted(decision, sets, expanded):
+    elif part := (
+        _part_not_fitted(decision, sets)
+        or _unknown_not_fitted(decision, sets, expanded)
+        or _rival_without_a_name(decision, sets)
+    ):
         chosen = part
     elif not rivals:
         return None
@@ -131,6 +135,21 @@ def _unknown_not_fitted(
     parts = (s for s in sets if s.names in alone or s is single or s in of_mechanisms[:1])
     part = next((part for part in parts if part.is_open), None)
     return part or (None if single is None or single.names in expanded else single)
+
+
+def _rival_without_a_name(decision: Decision, sets: Sequence[WeightedSet]) -> WeightedSet | None:
+    """The likeliest set without any mechanism before one is named; None if it was fitted, or is too far behind.
+
+    The name has the fit, and the places about it, that made it the likeliest. The unknown is as far from linear, and a
+    name must not be right only because that was left as the linear model about the base has it.
+    """
+    if decision.verdict not in (NAMED, NAMED_AND_REST):
+        return None
+    rival = next((s for s in sets if UNKNOWN in s.names and not s.mechanisms and not s.failure), None)
+    if rival is None or not rival.is_open:
+        return None
+    best, other = (s.hypothesis.log_evidence + s.hypothesis.log_prior for s in (sets[0], rival))
+    return rival if best - other < belief("fits.moved") else None
 
 
 def _may_be_regretted(candidate: WeightedSet, sets: Sequence[WeightedSet], decision: Decision) -> bool:
