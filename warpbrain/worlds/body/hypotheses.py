@@ -7,6 +7,7 @@ weighed in the linear model about its fit, where what acts already is as large a
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
@@ -127,30 +128,31 @@ class HypothesisSearch:
         refine = partial(with_refined_places, base, spacing=self.spacing, source=base.effects)
         for candidate in in_threads(refine, singles):
             self._sets[candidate.names] = candidate
-        for single in singles:
-            self._weigh_releases(self._sets[single.names])
+        refined = [self._sets[single.names] for single in singles]
+        for candidate in itertools.chain.from_iterable(in_threads(self._with_releases, refined)):
+            _keep_better(self._sets, candidate)
 
-    def _weigh_releases(self, single: WeightedSet) -> None:
-        """Weigh releases of held nodes beside a mechanism that is more probable than nothing.
+    def _with_releases(self, single: WeightedSet) -> list[WeightedSet]:
+        """Sets of a release of held nodes beside a mechanism that is more probable than nothing.
 
         About the base the reactions that are released are those to the declared loads. What slides or lifts off under a
         load that is not declared moves nothing there: the reactions to that are added, to first order.
         """
         if single.hypothesis.log_evidence <= self.nothing.hypothesis.log_evidence:
-            return
+            return []
         [effect], (mean, _) = single.effects, single.coefficients[0]
         beside = self.base.effects.beside(effect.constant_mechanisms(mean))
         of_all = self.candidates.effects.items()
         released = {kind: of_kind for kind, of_kind in of_all if any(each.is_release for each in of_kind)}
         if not beside.loading or not released.keys() - single.names:
-            return
+            return []
         effects = {kind: with_releases_of(beside, of_kind) for kind, of_kind in released.items()}
         marginal = single.marginal
         causes = visible(causes_of(self.base, replace(self.candidates, effects=effects)), marginal.model)
         weighing = Weighing(self.base, causes, marginal.sizes, single)
         unscaled = GaussianModel(marginal.noise.noise_factor / marginal.scale, single.columns)
-        for superset in self._supersets(single, causes, weighing, [unscaled]):
-            _keep_better(self._sets, replace(superset, inherited_gain=0.0))
+        supersets = self._supersets(single, causes, weighing, [unscaled])
+        return [replace(superset, inherited_gain=0.0) for superset in supersets]
 
     def fit(self, alone: bool = False) -> None:
         """Fit sets, and weigh supersets of those that are fitted, until no fit can be expected to change the verdict.

@@ -138,7 +138,7 @@ def nuisances_at(
         "tissue": tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors),
         "stiffness field": field_columns(at, states),
         LAW: law_columns(effects, states),
-        "known loads": _known_loads(at),
+        "known loads": load_columns(at),
         "registration": sensors.rigid * registration_of(states.case).deviations,
         SHAPES: np.zeros((len(sensors), SHAPED_EFFECTS * SHAPE_MODES)),
     }
@@ -248,8 +248,8 @@ def _with_share(share: float, of: str) -> _Share:
     return _Share(share=share, of=of)
 
 
-def _known_loads(at: Linearisation) -> Floats:
-    """All known loads larger or smaller by one factor, and all prescribed displacements."""
+def load_columns(at: Linearisation) -> Floats:
+    """All known loads larger or smaller by one factor, and all prescribed displacements: (n, k)."""
 
     def about(state: Linearisation) -> Floats:
         model = state.system.model

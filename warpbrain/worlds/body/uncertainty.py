@@ -27,6 +27,7 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about, shape_columns_about
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
+from warpbrain.worlds.body.nuisances import load_columns
 from warpbrain.worlds.body.sensors import tracked_points
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -141,12 +142,12 @@ def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
     layout = Layout.of(base.nuisances, len(z) - width_of(effects), effects)
     mesh = state.system.model.mesh
     nodes = tracked_points(mesh, mesh.points, base.states.centre)
-    nuisances, made = base.for_sensors(nodes)
-    columns = np.zeros((len(nodes), len(z)))
-    part, loads = base.nuisances.part(_LOADS), nuisances.part(_LOADS)
+    over = base.at.with_sensors(nodes)
+    columns, made = np.zeros((len(nodes), len(z))), base.effects.over(over)
+    part, loads = base.nuisances.part(_LOADS), load_columns(over)
     # those that no recording sees have no coordinate
-    if part.stop - part.start == loads.stop - loads.start:
-        columns[:, part] = nuisances.columns[:, loads]
+    if part.stop - part.start == loads.shape[1]:
+        columns[:, part] = loads
     # a switch is there: its size is not in question
     moving = [number for number, effect in enumerate(effects) if not effect.proposed.is_there_or_not]
     over_nodes = list(effects)
