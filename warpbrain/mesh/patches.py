@@ -26,9 +26,11 @@ def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius:
     """
     triangles = np.asarray(faces)
     corners = np.asarray(points, dtype=np.float64)[triangles] - np.asarray(centre, dtype=np.float64)
-    middle = corners.mean(axis=1)
-    reach = np.sqrt(((corners - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
-    near = np.flatnonzero(np.linalg.norm(middle, axis=1) < radius + reach)
+    # NumPy's reductions take several times as long along three numbers
+    middle = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
+    squares = [np.einsum("ij,ij->i", away, away) for away in (corners[:, k] - middle for k in range(3))]
+    reach = np.sqrt(np.maximum(np.maximum(squares[0], squares[1]), squares[2]))
+    near = np.flatnonzero(np.einsum("ij,ij->i", middle, middle) < (radius + reach) ** 2)
     if not len(near):
         return near
     distance = closest_on_triangles(np.zeros(3), corners[near])[1]
