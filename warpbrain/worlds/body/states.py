@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import ClassVar, cast
 
 import numpy as np
@@ -120,8 +121,8 @@ class States:
     def __init__(self, case: Case, device: str | None = None, role: str = "fit") -> None:
         self.case = case = with_free_surfaces(case)
         mesh, sd = case.remaining[0], case.heterogeneity or belief("tissue.field")
-        # in a thread, while recordings are located
-        modes = beside(lambda: stiffness_modes(mesh, sd))
+        # in a thread, while recordings are located and mechanisms proposed
+        self._modes = beside(lambda: stiffness_modes(mesh, sd))
         self.device = device
         self.parameters = Parameters.of(case)
         self.times = times_of_states(case, role)
@@ -131,11 +132,15 @@ class States:
         self._each = Moments(self.times, (case,), tuple(range(len(self.times))))
         # where the equilibrium of each time was found last
         self._near: dict[float, Floats] = {}
-        self.centre = self._observations_of(case).centre
-        self.realign(self.motion)
-        self.modes = modes()
+        self.observations = self._observations_of(case)
+        self.centre = self.observations.centre
         self.solves = 0
         self._factors: dict[tuple[str, ...], KeptFactors] = {}
+
+    @cached_property
+    def modes(self) -> Floats:
+        """Of the stiffness field: what a standard deviation of each adds to `ln mu` of elements (m, k)."""
+        return self._modes()
 
     def realign(self, motion: Floats) -> None:
         """Move recordings back by a rigid motion (6,); see `realigned`."""
