@@ -29,6 +29,7 @@ from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.predict import own_axes, p_value
 from warpbrain.mesh import nodes_of
+from warpbrain.threads import in_threads
 from warpbrain.worlds.body.causes import UNKNOWN
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -278,18 +279,21 @@ class _Resultant:
 
         sizes = beliefs("unknown.sizes").tolist()
         of_patches, of_hiding = patches @ patches.T, None if hiding is None else hiding @ hiding.T
-        best: tuple[float, float, Any] | None = None
         # metres and newtons have one size
         units = np.sqrt(np.diag(covariance))
-        for size, other in itertools.product(sizes, (0.0,) if of_hiding is None else sizes):
-            total = covariance + size**2 * of_patches + (0.0 if of_hiding is None else other**2 * of_hiding)
-            factor = cho_factor(total / np.outer(units, units))
-            log_density = -0.5 * float(residual / units @ cho_solve(factor, residual / units))
-            log_density -= float(np.log(np.diag(factor[0])).sum())
-            if best is None or log_density > best[0]:
-                best = log_density, size, factor
-        assert best is not None
-        _, size, factor = best
+
+        def factor_of(pair: tuple[float, float]) -> Any:
+            total = covariance + pair[0] ** 2 * of_patches + (0.0 if of_hiding is None else pair[1] ** 2 * of_hiding)
+            return cho_factor(total / np.outer(units, units))
+
+        def log_density(pair: tuple[float, float]) -> float:
+            factor = factor_of(pair)
+            square = float(residual / units @ cho_solve(factor, residual / units))
+            return -0.5 * square - float(np.log(np.diag(factor[0])).sum())
+
+        pairs = list(itertools.product(sizes, (0.0,) if of_hiding is None else sizes))
+        best = pairs[int(np.argmax(in_threads(log_density, pairs)))]
+        size, factor = best[0], factor_of(best)
         F = size**2 * functionals @ patches.T / units
         mean = F @ cho_solve(factor, residual / units)
         spread = size**2 * functionals @ functionals.T - F @ cho_solve(factor, F.T)
