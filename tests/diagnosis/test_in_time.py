@@ -165,7 +165,7 @@ def test_it_is_said_when_an_unknown_force_set_in(number: int, shape: str, diagno
     base = diagnosed[1].base
     [course] = [c for c in time_courses(TIMES) if (c.interval, c.shape) == (number, shape)]
     rng = np.random.default_rng(number)
-    columns = base.typical_noise * next(iter(base.unknown.values()))
+    columns = base.typical_noise * next(iter(base.unknown.values())).columns
     force = course.factor(base.at.sensors.times) * (columns @ rng.normal(size=columns.shape[1]))
     residual = 20.0 * force + base.noise * rng.normal(size=len(force))
     found = onset_of(base, None, False, base.model, residual)

@@ -223,7 +223,12 @@ class HypothesisSearch:
         """Fit a set; one that cannot be fitted keeps the reason."""
         candidate = self._sets[names]
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
-        fitted, gain = self._fitted(candidate)
+        candidates = [candidate]
+        if candidate.alternative is not None:
+            alternative = replace(candidate.alternative, inherited_gain=candidate.inherited_gain)
+            candidates.append(alternative.with_evidence(candidate.hypothesis.log_evidence))
+        fits = map(self._fitted, candidates)
+        fitted, gain = max(fits, key=lambda fit: (fit[0].refit is not None, fit[0].hypothesis.log_evidence))
         self._sets[names] = fitted
         if fitted.refit is not None:
             self._pass_on(gain, names)
@@ -411,7 +416,7 @@ class HypothesisSearch:
                 log_prior=hypothesis.log_prior + fitted.hypothesis.log_prior,
                 log_evidence=fitted.hypothesis.log_evidence + gain,
             )
-            yield replace(candidate, hypothesis=joint, inherited_gain=None)
+            yield replace(candidate, hypothesis=joint, inherited_gain=None, alternative=None)
 
 
 def _weighed(

@@ -285,6 +285,8 @@ class WeightedSet:
     inherited_gain: float | None = 0.0
     refined: bool = False  # whether its mechanisms are at the best places within their cells
     moved: bool = False  # whether it was fitted at neighbouring places, too
+    #: The same causes with the unknown in one place if it is a field here, or the reverse; fitted beside it.
+    alternative: WeightedSet | None = None
     #: Log of the part of these places in the evidence of a set that is not fitted, which is a sum over all places.
     log_share: float = 0.0
 
@@ -350,6 +352,7 @@ class WeightedSet:
             columns=refit.columns,
             marginal=refit.marginal,
             refit=refit,
+            alternative=None,
         )
 
     def without(self, mechanism: str, base: Base) -> WeightedSet:
