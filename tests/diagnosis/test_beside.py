@@ -12,12 +12,20 @@ from warpbrain.diagnosis.diagnose import Diagnosing
 from warpbrain.diagnosis.result import Diagnosis
 from warpbrain.inference.decide import NAMED, NAMED_AND_REST
 from warpbrain.physics.mechanisms.pressure import Pressure
+from warpbrain.physics.mechanisms.traction import Traction
 
 
 @pytest.fixture(scope="module")
 def pressed(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    """A block that sinks and is pressed from a side, a node set that touches what is held."""
-    return write_sinking(Path(tmp_path_factory.mktemp("pressed")) / "case", (Pressure(value=150.0, nodes="side"),))
+    """A block that sinks and is pressed from a side, a node set that touches what is held.
+
+    It is pulled at its top by a load that is declared: that tells how stiff it is, without which a smooth force of any
+    size explains all that acts on softer tissue.
+    """
+    known = Traction(value=(400.0, 0.0, 300.0), centre=(0.03, 0.03, 0.06), radius=0.025)
+    pushed = Pressure(value=150.0, nodes="side")
+    case = write_sinking(Path(tmp_path_factory.mktemp("pressed")) / "case", (pushed, known))
+    return replace(case, mechanisms=(known,))
 
 
 def test_one_is_found_with_its_size(small_diagnosis: Diagnosis) -> None:

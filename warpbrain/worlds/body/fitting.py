@@ -58,8 +58,8 @@ _MATTERS = 0.3
 #: Change of the columns of laws that is none [standard deviations of the noise, all sensors together].
 _UNSEEN = 1e-3
 #: How often the sizes of effects are looked at anew, and by how much [nats] the linear model must say that others are
-#: better.
-_RESIZED, _BETTER = 4, 1.0
+#: better: by more than a sum over a few sizes is larger than the largest of its terms.
+_RESIZED, _BETTER = 4, 2.0
 #: How often at most a search goes on with laws, error of the mesh, gross errors and noise of its result.
 _ROUNDS = 8
 #: After how many in succession it ends, too, that reach nothing better and leave no less: some go back and forth.

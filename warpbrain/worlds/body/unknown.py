@@ -122,8 +122,9 @@ def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Field, ...
     def shares(mesh: TetMesh) -> Floats:
         return np.asarray(mesh.node_volumes)
 
+    # one after the other: the first one makes the compliance
     mesh = at.system.model.mesh
-    return tuple(in_threads(lambda length: _forces_on_nodes(at, mesh.points, shares(mesh), length, shares), lengths))
+    return tuple(_forces_on_nodes(at, mesh.points, shares(mesh), length, shares) for length in lengths)
 
 
 def tractions(at: Linearisation, length: float) -> Field:
