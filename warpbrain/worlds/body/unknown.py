@@ -11,9 +11,8 @@ has without them, or with other tissue, they would explain what they do worse th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -283,18 +282,17 @@ def unit_stresses(corners: Floats) -> Floats:
 
 
 def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Field]) -> dict[str, Field]:
-    """Every field by its name. `lengths` [m]. `forces`: `body_forces` of these lengths."""
-    made: dict[str, Callable[[], Field]] = {}
-    for length, of_length in zip(lengths, forces, strict=True):
-        # in bodies of any size
-        size = f"{number(1e3 * length)} mm"
-        made[f"body force, {size}"] = partial(copy, of_length)
-        made[f"eigenstress, {size}"] = partial(eigenstresses, at, length)
-        if _free_of_surface(at).any():
-            made[f"traction, {size}"] = partial(tractions, at, length)
-            made[f"pressure, {size}"] = partial(pressures, at, length)
-    by_name = zip(made, in_threads(lambda each: each(), list(made.values())), strict=True)
-    return {name: field for name, field in by_name if field.columns.shape[1]}
+    """Every field by its name, body forces first. `lengths` [m]. `forces`: `body_forces` of these lengths."""
+    kinds: dict[str, Callable[[Linearisation, float], Field]] = {"eigenstress": eigenstresses}
+    if _free_of_surface(at).any():
+        kinds |= {"traction": tractions, "pressure": pressures}
+    # in bodies of any size
+    sizes = [f"{number(1e3 * length)} mm" for length in lengths]
+    by_name = {f"body force, {size}": force for size, force in zip(sizes, forces, strict=True)}
+    each = [(kind, size, length) for size, length in zip(sizes, lengths, strict=True) for kind in kinds]
+    made = in_threads(lambda one: kinds[one[0]](at, one[2]), each)
+    by_name |= {f"{kind}, {size}": field for (kind, size, _), field in zip(each, made, strict=True)}
+    return {name: field for name, field in by_name.items() if field.columns.shape[1]}
 
 
 def _field(at: Linearisation, answers: Floats, forces: Callable[[TetMesh, Floats], Floats]) -> Field:
