@@ -283,16 +283,15 @@ def unit_stresses(corners: Floats) -> Floats:
 
 def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Field]) -> dict[str, Field]:
     """Every field by its name, body forces first. `lengths` [m]. `forces`: `body_forces` of these lengths."""
-    kinds: dict[str, Callable[[Linearisation, float], Field]] = {"eigenstress": eigenstresses}
+    # lengths in mm, in bodies of any size
+    made: dict[str, Callable[[Linearisation, float], Field]] = {"eigenstress, {} mm": eigenstresses}
     if _free_of_surface(at).any():
-        kinds |= {"traction": tractions, "pressure": pressures}
-    # in bodies of any size
-    sizes = [f"{number(1e3 * length)} mm" for length in lengths]
-    by_name = {f"body force, {size}": force for size, force in zip(sizes, forces, strict=True)}
-    each = [(kind, size, length) for size, length in zip(sizes, lengths, strict=True) for kind in kinds]
-    made = in_threads(lambda one: kinds[one[0]](at, one[2]), each)
-    by_name |= {f"{kind}, {size}": field for (kind, size, _), field in zip(each, made, strict=True)}
-    return {name: field for name, field in by_name.items() if field.columns.shape[1]}
+        made |= {"traction, {} mm": tractions, "pressure, {} mm": pressures}
+    each = [(words, length) for length in lengths for words in made]
+    others = in_threads(lambda one: made[one[0]](at, one[1]), each)
+    named = [*zip([("body force, {} mm", length) for length in lengths], forces, strict=True)]
+    named += zip(each, others, strict=True)
+    return {words.format(number(1e3 * length)): field for (words, length), field in named if field.columns.shape[1]}
 
 
 def _field(at: Linearisation, answers: Floats, forces: Callable[[TetMesh, Floats], Floats]) -> Field:
