@@ -80,7 +80,7 @@ class Effect:
     columns: Floats  # (n, k), of one standard deviation of each
     #: Of a course in time: from its coefficients (k,) to the columns (n, k) about them.
     columns_at: Callable[[Floats], Floats] | None = None
-    #: How many times its coefficients vary as much as is usual, and how many times they may.
+    #: Standard deviation of its coefficients over the usual one, and the values that this may have.
     size: float = 1.0
     sizes: tuple[float, ...] = (1.0,)
 
@@ -111,12 +111,12 @@ class Effect:
         return list(self.proposal.acting(self.coefficients(z)))
 
     def scaled(self, factor: float) -> Effect:
-        """The same with coefficients whose prior is so many times as wide; none of what is no physics."""
+        """The same with the standard deviations of its coefficients times a factor; of what is physics."""
         proposal = replace(self.proposed, sd=factor * self.proposed.sd)
         return replace(self, proposal=proposal, columns=factor * self.columns, size=factor * self.size)
 
     def of_size(self, effect: Effect) -> Effect:
-        """The same, of usual size, as large as another one."""
+        """The same, which has the usual standard deviations, with the `size` and `sizes` of another effect."""
         return replace(self.scaled(effect.size), sizes=effect.sizes)
 
     def offset(self, z: Floats) -> Floats:

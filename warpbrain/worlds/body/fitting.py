@@ -19,7 +19,9 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.inference.beliefs import belief
+from warpbrain.inference.causes import Cause, Place
 from warpbrain.inference.gaussian import GaussianModel
+from warpbrain.inference.subsets import Blocks
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.multisecant import extrapolated
@@ -540,33 +542,6 @@ class Fitter:
         with all of them, nearer still, whose share of the mesh's error is kept. `wanted`: a log evidence; a search that
         expects to reach less ends before it has converged.
         """
-        best = self._fit(effects, columns, starts, screened, nearby, subset, wanted)
-        for _ in range(_RESIZED):
-            begun = self._resized(best)
-            if begun is None:
-                break
-            try:
-                fit = self._fit(
-                    begun.effects, begun.columns, [], begun.marginal, subset=begun, wanted=best.log_evidence
-                )
-            except CANNOT_BE_FITTED:
-                break
-            if fit.log_evidence <= best.log_evidence:
-                break
-            best = fit
-        return best
-
-    def _fit(
-        self,
-        effects: tuple[Effect, ...],
-        columns: Floats,
-        starts: Sequence[Floats],
-        screened: SetMarginal,
-        nearby: SolvedState | None = None,
-        subset: Refit | None = None,
-        wanted: float = -np.inf,
-    ) -> Refit:
-        """The same with effects of these sizes."""
         search = FitSearch(self.base, self.mesh_errors, effects, columns, screened)
         if subset is not None:
             nearby = subset.state
@@ -574,6 +549,28 @@ class Fitter:
         search.start(starts, nearby or self.base.state)
         if subset is None:
             search.backtrack_to_base()
+        best = self._converged(search, wanted)
+        for _ in range(_RESIZED):
+            begun = _resized(best)
+            if begun is None:
+                break
+            try:
+                fit = self._converged(self._begun_at(begun, begun.effects), best.log_evidence)
+            except CANNOT_BE_FITTED:
+                break
+            if fit.log_evidence <= best.log_evidence:
+                break
+            best = fit
+        return best
+
+    def _begun_at(self, refit: Refit, effects: tuple[Effect, ...], about: Linearisation | None = None) -> FitSearch:
+        """A search with effects at the coordinates of a fit; see `begin`."""
+        search = FitSearch(self.base, self.mesh_errors, effects, refit.columns, refit.marginal)
+        search.start([search.begin_at(refit, about)], refit.state)
+        return search
+
+    def _converged(self, search: FitSearch, wanted: float) -> Refit:
+        """The fit that a search comes to, with effects of the sizes that they have; `wanted`: see `fit`."""
         enough, best, least, worse = _ROUGHLY, None, np.inf, 0
         for number in range(_ROUNDS):
             search.minimise(_ENOUGH if number == _ROUNDS - 1 else enough)
@@ -597,36 +594,6 @@ class Fitter:
             raise FloatingPointError("its evidence is not a number")
         return best
 
-    @staticmethod
-    def _resized(fit: Refit) -> Refit | None:
-        """A fit with an effect of the next smaller or larger size, at the same point; None if that is no better.
-
-        Which size is the most probable in the linear model about the base is no matter of the fit: there tissue is as
-        soft as the base's, and what is far from linear needs more or less of a load. The prior of many coefficients
-        would cost tens of nats.
-        """
-        begun, most = None, _BETTER
-        first = fit.columns.shape[1] - width_of(fit.effects)
-        noise = fit.marginal.noise
-        for number, part in enumerate(column_slices(fit.effects, first)):
-            effect = fit.effects[number]
-            sizes = np.sort(effect.sizes)
-            here = int(np.argmin(np.abs(sizes - effect.size)))
-            factors = np.array(sizes[max(here - 1, 0) : here + 2]) / effect.size
-            if len(factors) < 2:
-                continue
-            others = noise.of_noise(np.delete(fit.columns, np.r_[part], axis=1))
-            W = others.standardised(np.column_stack([fit.linear, fit.columns[:, part]]))
-            squares, vectors = np.linalg.eigh(W[:, 1:].T @ W[:, 1:])
-            b = vectors.T @ (W[:, 1:].T @ W[:, 0])
-            # columns times f add (f^2 b^2 / (1 + f^2 s) - ln(1 + f^2 s)) / 2 to the log density, summed over modes
-            scaled = factors[:, None] ** 2 * np.maximum(squares, 0.0)
-            logs = 0.5 * np.sum(factors[:, None] ** 2 * b**2 / (1.0 + scaled) - np.log1p(scaled), axis=1)
-            gains = logs - logs[np.argmin(np.abs(np.log(factors)))]
-            if gains.max() > most:
-                most, begun = float(gains.max()), fit.scaled(number, float(factors[np.argmax(gains)]))
-        return begun
-
     def begin(self, effects: tuple[Effect, ...], refit: Refit, about: Linearisation | None) -> Refit:
         """State, residual and Laplace evidence with other effects at the coordinates of a fit, before any iteration.
 
@@ -634,9 +601,7 @@ class Fitter:
         of the mesh's error are kept. `about`: of its state, if it was linearised. `SolveError` if there is no
         equilibrium.
         """
-        search = FitSearch(self.base, self.mesh_errors, effects, refit.columns, refit.marginal)
-        search.start([search.begin_at(refit, about)], refit.state)
-        return search.result()
+        return self._begun_at(refit, effects, about).result()
 
     def _update(self, search: FitSearch) -> Refit:
         """Take shapes, the error of the mesh, noise and gross errors of the best point of a search; return that.
@@ -652,3 +617,28 @@ class Fitter:
         fit = search.result()
         search.update_noise(fit)
         return fit
+
+
+def _resized(fit: Refit) -> Refit | None:
+    """A fit with an effect of the next smaller or larger size, at the same point; None if that is no better.
+
+    Which size is the most probable in the linear model about the base is no matter of the fit: there tissue is as
+    soft as the base's, and what is far from linear needs more or less of a load. The prior of many coefficients
+    would cost tens of nats.
+    """
+    begun, most = None, _BETTER
+    parts = column_slices(fit.effects, fit.columns.shape[1] - width_of(fit.effects))
+    for number, (effect, part) in enumerate(zip(fit.effects, parts, strict=True)):
+        sizes = np.sort(effect.sizes)
+        here = int(np.argmin(np.abs(sizes - effect.size)))
+        least = max(here - 1, 0)
+        factors = sizes[least : here + 2] / effect.size
+        if len(factors) < 2:
+            continue
+        others = fit.marginal.noise.of_noise(np.delete(fit.columns, np.r_[part], axis=1))
+        cause = Cause("", (Place(fit.columns[:, part]),), 0.0, factors)
+        [logs] = Blocks(others, fit.linear, [cause]).log_factors()
+        gains = logs - logs[here - least]
+        if gains.max() > most:
+            most, begun = float(gains.max()), fit.scaled(number, float(factors[np.argmax(gains)]))
+    return begun

@@ -288,7 +288,7 @@ def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Field])
     if _free_of_surface(at).any():
         made |= {"traction, {} mm": tractions, "pressure, {} mm": pressures}
     each = [(words, length) for length in lengths for words in made]
-    others = in_threads(lambda one: made[one[0]](at, one[1]), each)
+    others = in_threads(lambda part: made[part[0]](at, part[1]), each)
     named = [*zip([("body force, {} mm", length) for length in lengths], forces, strict=True)]
     named += zip(each, others, strict=True)
     return {words.format(number(1e3 * length)): field for (words, length), field in named if field.columns.shape[1]}

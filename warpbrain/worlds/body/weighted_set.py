@@ -56,7 +56,7 @@ class MeshShare:
         return replace(self, gradient=np.append(self.gradient, np.zeros(count - len(self.gradient))))
 
     def with_scaled(self, part: slice, factor: float) -> MeshShare:
-        """The same of coefficients some of which are in a unit so many times as large."""
+        """The same, of coefficients of which those of a part were divided by a factor."""
         gradient = self.gradient.copy()
         gradient[part] *= factor
         return replace(self, gradient=gradient)
@@ -142,7 +142,7 @@ class Refit:
         return self.marginal.log_evidence - self.unreached + self.within_expected
 
     def scaled(self, number: int, factor: float) -> Refit:
-        """The same point with an effect whose coefficients have a prior so many times as wide."""
+        """The same point, the prior standard deviations of the coefficients of an effect times a factor."""
         part, share = column_slices(self.effects, 0)[number], self.mesh_share
         columns, first = self.columns.copy(), len(self.nuisances)
         columns[:, first + part.start : first + part.stop] *= factor
