@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recorded_reaction import with_reaction
 
 from warpbrain.diagnosis.locating import Traits, traits_of
 from warpbrain.diagnosis.result import Diagnosis, traits_in_words
@@ -82,25 +83,7 @@ def test_forces_beside_what_is_held_that_balance_are_no_force_from_outside(
 def test_a_recorded_reaction_tells_what_is_hidden(small_diagnosis: Diagnosis) -> None:
     at = small_diagnosis.base.at
     base, found = at.sensors, small_diagnosis
-    nodes = at.system.model.constrained.reshape(-1, 3).all(axis=1)
-    sums = np.zeros((3, 3 * len(nodes)))
-    for axis in range(3):
-        sums[axis, axis::3] = nodes
-    rows = np.r_[np.arange(len(base)), [0, 1, 2]]
-    of_rows = base.of_rows(rows, np.inf)
-    own = slice(len(base), None)
-    by_displacement, by_reactions = of_rows.by_displacement.tolil(), of_rows.by_reactions.tolil()
-    by_displacement[own], by_reactions[own] = 0.0, sums
-    directions, groups = of_rows.directions.copy(), of_rows.groups.copy()
-    directions[own], groups[own] = 0.0, base.groups.max() + 1
-    sensors = replace(
-        of_rows,
-        by_displacement=by_displacement.tocsr(),
-        by_reactions=by_reactions.tocsr(),
-        directions=directions,
-        groups=groups,
-    )
-    weighed = at.with_sensors(sensors)
+    weighed = with_reaction(at)
     sites, answers = force_patches(weighed, LENGTH)
     size = np.linalg.norm(answers[: len(base)], axis=(0, 2))
     near = np.flatnonzero((sites[:, 2] < NEAR[1]) & (size > 1e-3 * size.max()))

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from recorded_reaction import with_reaction
 from slow_block import CAUSES, TIMES, write_slow
 
 from warpbrain.estimation.parameters import declared
+from warpbrain.mesh import nodes_of
 from warpbrain.mesh.refinement import refined
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation
@@ -95,6 +97,28 @@ def test_columns_of_fields_are_those_of_the_loads_that_fits_have(at, every_field
         columns = 1e-3 * field.columns
         np.testing.assert_allclose(effect.columns, columns, atol=1e-9 * np.abs(columns).max())
         assert not effect.mean.any()
+
+
+def test_what_holds_a_body_bears_what_fields_do_to_it(at):
+    """The held nodes carry the resultant of the load, which is the same whether it is a column or a load of a fit."""
+    recorded, lengths = with_reaction(at), [0.024]
+    for name, field in fields(recorded, lengths, body_forces(recorded, lengths)).items():
+        reactions = field.columns[-3:]
+        for mode, reaction in zip(np.eye(field.columns.shape[1]), reactions.T, strict=True):
+            forces = field.nodal_forces(at.system.model.mesh, mode)
+            np.testing.assert_allclose(forces.sum(axis=0), -reaction, atol=1e-7 * np.abs(forces).sum(), err_msg=name)
+
+
+def test_nothing_presses_on_faces_that_are_held(at, every_field):
+    model = at.system.model
+    finer, ends = refined(model.mesh)
+    held = model.constrained.all(axis=1)
+    for mesh, fixed in ((model.mesh, held), (finer, held[ends].all(axis=1))):
+        loaded = nodes_of(mesh.boundary[~fixed[mesh.boundary].all(axis=1)], len(mesh.points))
+        assert (fixed & ~loaded).any(), "inside what is held"
+        for name in ("traction, 24 mm", "pressure, 24 mm"):
+            forces = every_field[name].nodal_forces(mesh, np.ones(every_field[name].columns.shape[1]))
+            assert not forces[~loaded].any() and forces[loaded].any(axis=1).all()
 
 
 def test_a_field_is_the_same_force_on_a_finer_mesh(at, every_field):

@@ -17,9 +17,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Int32s
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, node_vectors, nodes_of
+from warpbrain.mesh.surface import edges_of
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.potential import Enters
@@ -110,7 +111,6 @@ def _weights(
     """
     sites = places[spread_points(places, length if spacing is None else spacing, 700)]
     weights = shares[:, None] * gaussians(points, sites, length)
-    # the share on held nodes moves nothing
     amplitudes = 1.0 / np.maximum(weights.sum(axis=0), 1e-300)
     return sites, weights * amplitudes, amplitudes
 
@@ -129,11 +129,13 @@ def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Field, ...
 def tractions(at: Linearisation, length: float) -> Field:
     """Tractions of a length [m] on all that is free of the surface, which is not nothing."""
 
-    def shares(mesh: TetMesh) -> Floats:
-        return node_areas(mesh.points, mesh.boundary)
+    faces = _free_faces(at)
 
-    mesh, free = at.system.model.mesh, _free_of_surface(at)
-    return _forces_on_nodes(at, mesh.points[free], np.where(free, shares(mesh), 0.0), length, shares)
+    def shares(mesh: TetMesh) -> Floats:
+        return node_areas(mesh.points, faces(mesh))
+
+    mesh = at.system.model.mesh
+    return _forces_on_nodes(at, mesh.points[_free_of_surface(at)], shares(mesh), length, shares)
 
 
 def _forces_on_nodes(
@@ -152,13 +154,13 @@ def _forces_on_nodes(
 
 def pressures(at: Linearisation, length: float) -> Field:
     """Pressures of a length [m] on what is free of the surface, which is not nothing."""
-    points = at.system.model.mesh.points
+    points, faces = at.system.model.mesh.points, _free_faces(at)
     free = points[_free_of_surface(at)]
     sites = free[spread_points(free, length, 700)]
 
     def forces(mesh: TetMesh, coefficients: Floats) -> Floats:
         # each corner of a face bears a third of its load
-        of_unit_pressure = node_vectors(mesh.points, mesh.boundary) / 3.0
+        of_unit_pressure = node_vectors(mesh.points, faces(mesh)) / 3.0
         return of_unit_pressure[:, :, None] * (gaussians(mesh.points, sites, length) @ coefficients)[:, None]
 
     of_each = forces(at.system.model.mesh, np.eye(len(sites)))
@@ -167,9 +169,32 @@ def pressures(at: Linearisation, length: float) -> Field:
 
 def _free_of_surface(at: Linearisation) -> Bools:
     """Nodes (N,) on the surface that are not held."""
-    model = at.system.model
-    on_surface = nodes_of(model.mesh.boundary, len(model.mesh.points))
-    return np.asarray(on_surface & ~model.constrained.reshape(-1, 3).all(axis=1))
+    mesh = at.system.model.mesh
+    return np.asarray(nodes_of(mesh.boundary, len(mesh.points)) & ~_held(at))
+
+
+def _held(at: Linearisation) -> Bools:
+    """Nodes (N,) that are held."""
+    return np.asarray(at.system.model.constrained.reshape(-1, 3).all(axis=1))
+
+
+def _free_faces(at: Linearisation) -> Callable[[TetMesh], Int32s]:
+    """Faces (k, 3) of the surface of a mesh, or of it refined once, of which not all corners are held.
+
+    What presses on the others goes straight into the support, which is no load on a body, but may have been recorded.
+    """
+    from scipy.spatial import cKDTree
+
+    mesh, held = at.system.model.mesh, _held(at)
+    edges = edges_of(mesh.boundary)
+    halves = mesh.points[edges[held[edges].all(axis=1)]].mean(axis=1)
+    known = cKDTree(np.concatenate([mesh.points[held], halves]))
+
+    def faces(other: TetMesh) -> Int32s:
+        distance, _ = known.query(other.points, distance_upper_bound=1e-9 * mesh.radius)
+        return np.asarray(other.boundary[np.isinf(distance)[other.boundary].any(axis=1)])
+
+    return faces
 
 
 def eigenstresses(at: Linearisation, length: float) -> Field:
@@ -243,7 +268,7 @@ def stress_beside_held(at: Linearisation, length: float) -> Floats:
     from scipy.spatial import cKDTree
 
     model = at.system.model
-    held = model.mesh.points[model.constrained[: len(model.mesh.points)].all(axis=1)]
+    held = model.mesh.points[_held(at)]
     sites = model.mesh.centres[spread_points(model.mesh.centres, length, 700)]
     if not len(held):
         return np.zeros((len(at.sensors), 0))
