@@ -12,7 +12,7 @@ from warpbrain.diagnosis.checking import Confirming
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import NAMED, decide
-from warpbrain.worlds.body.hypotheses import HypothesisSearch, _of_all_places, screened
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 from warpbrain.worlds.body.weighted_set import evidence_of
 
 
@@ -108,11 +108,15 @@ def test_a_fit_that_has_missed_its_optimum_is_mended_by_one_with_a_cause_more(se
 
 @pytest.mark.parametrize("share", [1.0, 0.3, 0.01])
 @pytest.mark.parametrize("gain", [-4.0, 0.0, 2.0, 40.0])
-def test_a_gain_at_a_place_is_of_its_share(gain: float, share: float) -> None:
-    of_all = _of_all_places(gain, np.log(share))
-    # a sum over places of equal evidence, one of which is fitted
-    expected = np.log(share * np.exp(gain) + 1.0 - share) if gain > 0.0 else gain
-    np.testing.assert_allclose(of_all, expected, atol=1e-12)
+def test_a_gain_at_a_place_is_of_its_share(gain: float, share: float, search: HypothesisSearch) -> None:
+    known = replace(search.get(("gravity",)), log_share=np.log(share))
+    gained = known.with_gain(gain)
+    # a sum over places, of whose parts that of the fitted one grows; a loss is lost by all
+    total = share * np.exp(gain) + 1.0 - share if gain > 0.0 else np.exp(gain)
+    of_place = share * np.exp(gain) / total
+    further = gained.hypothesis.log_evidence - known.hypothesis.log_evidence
+    np.testing.assert_allclose(further, np.log(total), atol=1e-9)
+    np.testing.assert_allclose(np.exp(gained.log_share), of_place, rtol=1e-9)
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ def test_a_cell_is_as_probable_as_the_mean_of_its_places_each_with_gross_errors_
     size = 20.0
     start = effect.scaled(size)
     without = base.model
-    best, gain, _ = best_in_cell(base, base.effects, start, spacing, without, residual)
+    best, gain = best_in_cell(base, base.effects, start, spacing, without, residual)
     away = np.linalg.norm(best.proposed.centre - true.proposed.centre)
     assert away < np.linalg.norm(proposed.centre - true.proposed.centre)
 
@@ -58,7 +58,7 @@ def test_a_patch_that_lets_go_is_found_between_the_patches_of_a_scan(small_diagn
     assert members(proposed) < proposed.patch.held.sum()
     true = switch_effects(base.effects, [larger(proposed)])[0]
     residual = true.mean
-    best, _, _ = best_in_cell(base, base.effects, effect, BETWEEN * base.at.sensors.radius, base.model, residual)
+    best, _ = best_in_cell(base, base.effects, effect, BETWEEN * base.at.sensors.radius, base.model, residual)
     assert best.proposed.is_there_or_not
 
     def log_evidence(tried):

@@ -259,10 +259,9 @@ class HypothesisSearch:
             # what the fit without any cause gains is of tissue and registration, and is gained by all others; a search
             # that ended too early must not make everything else look better
             gain = max(gain, 0.0)
-        inherited = candidate.inherited_gain or 0.0
-        further = _of_all_places(gain - inherited, candidate.log_share)
-        fitted = candidate.fitted(refit).with_evidence(candidate.hypothesis.log_evidence + further)
-        return fitted, inherited + further
+        inherited, known = candidate.inherited_gain or 0.0, candidate.hypothesis.log_evidence
+        fitted = candidate.fitted(refit).with_gain(gain - inherited)
+        return fitted, inherited + fitted.hypothesis.log_evidence - known
 
     def _move(self, fitted: WeightedSet) -> None:
         """Fit a fitted set where its mechanisms are better placed."""
@@ -299,8 +298,8 @@ class HypothesisSearch:
                 continue
             gain = refitted.refit.log_evidence - known
             if gain > _BETTER:
-                better = replace(refitted, hypothesis=subset.hypothesis)
-                self._sets[subset.names] = better.with_evidence(subset.hypothesis.log_evidence + gain)
+                better = replace(refitted, hypothesis=subset.hypothesis, log_share=subset.log_share)
+                self._sets[subset.names] = better.with_gain(gain)
                 self._forget_supersets(subset.names)
 
     def _fitted_less(
@@ -416,7 +415,8 @@ class HypothesisSearch:
                 log_prior=hypothesis.log_prior + fitted.hypothesis.log_prior,
                 log_evidence=fitted.hypothesis.log_evidence + gain,
             )
-            yield replace(candidate, hypothesis=joint, inherited_gain=None, alternative=None)
+            log_share = fitted.log_share + candidate.log_share
+            yield replace(candidate, hypothesis=joint, inherited_gain=None, alternative=None, log_share=log_share)
 
 
 def _weighed(
@@ -443,18 +443,6 @@ def _keep_better(sets: dict[frozenset[str], WeightedSet], candidate: WeightedSet
     known = sets.get(candidate.names)
     if known is None or candidate.hypothesis.log_evidence > known.hypothesis.log_evidence:
         sets[candidate.names] = candidate
-
-
-def _of_all_places(gain: float, log_share: float) -> float:
-    """Gain of a sum over places of which those that were fitted, with a share, have a gain.
-
-    Of places that are not fitted it is not known. What is lost by a fit is lost by all: that the effect is not linear
-    is no matter of the place. A gain may be, and one place of many at which an effect is found to be another than in
-    the linear model must not count for all of them.
-    """
-    if gain <= 0.0 or log_share >= 0.0:
-        return gain
-    return float(np.logaddexp(log_share + gain, np.log(-np.expm1(log_share))))
 
 
 def _probabilities(sets: Iterable[WeightedSet]) -> Floats:

@@ -42,11 +42,8 @@ _MOVES, _MOVE, _BETTER = 3, 0.25, 1.0
 
 def best_in_cell(
     base: Base, effects: Effects, effect: Effect, spacing: float, without: GaussianModel, residual: Floats
-) -> tuple[Effect, float, float]:
-    """The best effect of the cell of another one.
-
-    And by how much [nats] the mean of the cell is more probable than its middle, and the log of the part of the best
-    place in that mean.
+) -> tuple[Effect, float]:
+    """The best effect of the cell of another one, and by how much [nats] the mean of the cell exceeds its middle.
 
     Each place has gross errors of its own: points that a local effect moves far are sound in the right place alone.
 
@@ -63,21 +60,13 @@ def best_in_cell(
 
     best = effect
     tried, logs = logs_of(_cell(base, effect, spacing))
-    gain, log_share = _summed_over_cell(logs)
+    # the middle comes first
+    gain = float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs[0])
     best = tried[int(np.argmax(logs))]
     if not effect.proposed.on_surface:
         tried, logs = logs_of(_around(base, best.proposed, 0.25 * spacing))
         best = tried[int(np.argmax(logs))]
-    return best, gain, log_share
-
-
-def _summed_over_cell(logs: Floats) -> tuple[float, float]:
-    """By how much [nats] the mean over the places of a cell exceeds the first, and the log of the best one's share.
-
-    `logs` (k,): log density with the cause at each place, the middle of the cell first.
-    """
-    total = float(np.logaddexp.reduce(logs))
-    return total - float(np.log(len(logs)) + logs[0]), float(logs.max()) - total
+    return best, gain
 
 
 def _effects_of(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect]:
@@ -231,7 +220,7 @@ def with_refined_places(
         if effect.proposed.is_there_or_not:
             # a release: centres are as far apart as those of a scan's patches
             apart, about = BETWEEN * base.at.sensors.radius, source.beside(_acting_beside(candidate, number, placed))
-        best, gain, log_share = best_in_cell(base, about, effect, apart, without, residual)
+        best, gain = best_in_cell(base, about, effect, apart, without, residual)
         columns = candidate.columns.copy()
         columns[:, part] = best.columns
         residual = residual - best.mean
@@ -243,7 +232,6 @@ def with_refined_places(
             residual=residual,
             columns=columns,
             marginal=refined,
-            log_share=candidate.log_share + log_share,
         ).with_evidence(candidate.hypothesis.log_evidence + gain)
     return replace(candidate, refined=True)
 
@@ -270,9 +258,7 @@ def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: fl
         moved = _moved_once(base, fitter, fitted.refit, _MOVE * spacing)
         if moved is None:
             break
-        # both places are as probable as each other before anything is recorded: their evidence is added up
-        gain = float(np.logaddexp(0.0, moved.log_evidence - fitted.refit.log_evidence))
-        fitted = fitted.fitted(moved).with_evidence(fitted.hypothesis.log_evidence + gain)
+        fitted = fitted.fitted(moved).with_gain(moved.log_evidence - fitted.refit.log_evidence)
     return fitted
 
 

@@ -287,7 +287,8 @@ class WeightedSet:
     moved: bool = False  # whether it was fitted at neighbouring places, too
     #: The same causes with the unknown in one place if it is a field here, or the reverse; fitted beside it.
     alternative: WeightedSet | None = None
-    #: Log of the part of these places in the evidence of a set that is not fitted, which is a sum over all places.
+    #: Log of the part of the cells of these places in the evidence, which is a sum over all places. What a fit, or one
+    #: at another place of a cell, gains is taken to be gained by the whole cell: its likely places move about in it.
     log_share: float = 0.0
 
     @property
@@ -354,6 +355,19 @@ class WeightedSet:
             refit=refit,
             alternative=None,
         )
+
+    def with_gain(self, gain: float) -> WeightedSet:
+        """The set whose places are more probable than was known by a log Bayes factor, and others, elsewhere, are not.
+
+        What is lost by a fit is lost by all: that the effect is not linear is no matter of the place. A gain may be,
+        and one place of many at which an effect is found to be another than in the linear model must not count for all
+        of them.
+        """
+        log_share, of_all = self.log_share, gain
+        if gain > 0.0 and log_share < 0.0:
+            of_all = float(np.logaddexp(log_share + gain, np.log(-np.expm1(log_share))))
+            log_share = min(log_share + gain - of_all, 0.0)
+        return replace(self.with_evidence(self.hypothesis.log_evidence + of_all), log_share=log_share)
 
     def without(self, mechanism: str, base: Base) -> WeightedSet:
         """The set less one of its mechanisms, linear about the same point, with an evidence to be compared with its."""
