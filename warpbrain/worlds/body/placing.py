@@ -5,14 +5,14 @@ its cell, and the best of these is where a fit begins.
 
 Where a mechanism moves a wall by as much as its own radius, another place and radius may fit better by tens of nats
 than that chosen about the base, in which it deforms nothing yet, and what is left at the wrong one looks like a further
-cause. A linear model about the fit does not show it either: there the mechanism acts where it is. So the state with it
-at another place is computed, all coordinates the same, and is linear about that.
+cause. So the model that is linear about a fit is linear in the places of its mechanisms, too, and a set is fitted again
+where these are the most probable.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -30,14 +30,14 @@ from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import UNKNOWN, BodyCauses
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
-from warpbrain.worlds.body.effects import Effect, Effects, width_of
+from warpbrain.worlds.body.effects import Effect, Effects, column_slices, width_of
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
-from warpbrain.worlds.body.shapes import RADII, middles_of_faces, places_about
+from warpbrain.worlds.body.places import RADII, PlaceCoordinates, middles_of_faces
 from warpbrain.worlds.body.weighted_set import Refit, SetMarginal, WeightedSet, evidence_of
 
-#: How often places are looked at anew, how far they are apart in spacings of a scan, and by how much [nats] the linear
-#: model must say that others are better.
-_MOVES, _MOVE, _BETTER = 3, 0.25, 1.0
+#: How often mechanisms are moved, by how much [nats] the linear model must say that another place is better, and parts
+#: of the way to it that are tried.
+_MOVES, _BETTER, _LENGTHS = 4, 1.0, (1.0, 0.5, 0.25)
 
 
 def best_in_cell(
@@ -255,43 +255,55 @@ def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: fl
     fitted = replace(fitted, moved=True)
     for _ in range(_MOVES):
         assert fitted.refit is not None
-        moved = _moved_once(base, fitter, fitted.refit, _MOVE * spacing)
+        moved = _moved_once(base, fitter, fitted.refit, spacing)
         if moved is None:
             break
         fitted = fitted.fitted(moved).with_gain(moved.log_evidence - fitted.refit.log_evidence)
     return fitted
 
 
-def _moved_once(base: Base, fitter: Fitter, refit: Refit, step: float) -> Refit | None:
-    """The fit with one mechanism a step from where it is; None if none is better."""
-    begun = refit
-    tried = [
-        (*refit.effects[:number], effect, *refit.effects[number + 1 :])
-        for number in range(len(refit.effects))
-        for effect in _moved_effects(base, refit.effects[number], step)
-    ]
+def _moved_once(base: Base, fitter: Fitter, refit: Refit, spacing: float) -> Refit | None:
+    """The fit with its mechanisms where the linear model about it says that they are; None if that is no better."""
     try:
-        # all states are near to that of the fit, whose factors lead to each
-        about = refit.state.linearised() if tried else None
+        about = refit.state.linearised()
+        placed = {
+            number: PlaceCoordinates(base.at.system.model, effect.proposed, 0.5 * spacing)
+            for number, effect in enumerate(refit.effects)
+            if effect.is_placed
+        }
+        columns = [
+            place.columns(about, refit.effects[number], refit.coefficients[number], fitter.mesh_errors)
+            for number, place in placed.items()
+        ]
     except SolveError:
-        about = None
-    for effects in tried:
+        return None
+    if not placed:
+        return None
+    model, residual = refit.marginal.model, refit.linear
+    with_places = model.with_columns(np.column_stack(columns))
+    # how probable the best place is, not all about it: fits are compared at one place each
+    before, after = (0.5 * float(np.sum(each.standardised(residual) ** 2)) for each in (model, with_places))
+    if before - after < _BETTER:
+        return None
+    best = with_places.coefficients(residual)[0]
+    steps, best = best[model.columns.shape[1] :].reshape(-1, 4), best[: refit.columns.shape[1]]
+    here = np.concatenate([refit.nuisances, *refit.coefficients])
+    for length in _LENGTHS:
+        effects = list(refit.effects)
+        for (number, place), step in zip(placed.items(), steps, strict=True):
+            effects[number] = place.effect_at(length * step, effects[number])
+        z = here + length * (best - here)
+        nuisances, *coefficients = np.split(
+            z, [part.start for part in column_slices(refit.effects, len(refit.nuisances))]
+        )
+        there = replace(refit, nuisances=nuisances, coefficients=tuple(coefficients))
         try:
-            begun = max(begun, fitter.begin(effects, refit, about), key=lambda fit: fit.marginal.log_evidence)
+            begun = fitter.begin(tuple(effects), there, about)
+            if begun.marginal.log_evidence < refit.marginal.log_evidence + _BETTER:
+                continue
+            moved = fitter.fit(begun.effects, begun.columns, [], begun.marginal, begun.state, begun)
         except CANNOT_BE_FITTED:
             continue
-    if begun.marginal.log_evidence < refit.marginal.log_evidence + _BETTER:
-        return None
-    try:
-        moved = fitter.fit(begun.effects, begun.columns, [], begun.marginal, begun.state, begun)
-    except CANNOT_BE_FITTED:
-        return None
-    return moved if moved.log_evidence > refit.log_evidence else None
-
-
-def _moved_effects(base: Base, effect: Effect, step: float) -> Iterator[Effect]:
-    """An effect at places a step from where it is, in its own columns; none of what is everywhere, or there or not."""
-    if not effect.is_placed:
-        return
-    for other in places_about(base.at.system.model, effect.proposed, step):
-        yield replace(effect, proposal=replace(other, sd=effect.size * other.sd))
+        if moved.log_evidence > refit.log_evidence:
+            return moved
+    return None

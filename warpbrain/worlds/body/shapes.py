@@ -14,45 +14,14 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
-from warpbrain.mesh.quality import principal_axes
-from warpbrain.physics.proposal import Patch, Proposal
-from warpbrain.simulation.model import Model
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.nuisances import SHAPE_MODES, SHAPED_EFFECTS
+from warpbrain.worlds.body.places import places_about
 
-#: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
-RADII = (0.8, 1.0, 1.25)
 #: How far neighbours are from the middle, in radii: where a patch has half of its height.
 _BESIDE = 0.5
-
-
-def places_about(model: Model, proposed: Proposal, step: float) -> list[Proposal]:
-    """Proposals a step [m] from another one along each principal axis, back on the surface if it is of that.
-
-    And at the same place with other radii.
-    """
-    assert proposed.elsewhere is not None and proposed.centre is not None and proposed.radius is not None
-    axes = principal_axes(model.mesh.points)
-    centres = [proposed.centre + sign * step * axis for axis in axes for sign in (-1.0, 1.0)]
-    if proposed.on_surface:
-        middles = middles_of_faces(model, proposed.patch)
-        nearest = {int(np.argmin(np.sum((middles - centre) ** 2, axis=1))) for centre in centres}
-        centres = [middles[number] for number in sorted(nearest)]
-    others = [proposed.elsewhere(proposed.centre, factor * proposed.radius) for factor in RADII if factor != 1.0]
-    return [*others, *(proposed.elsewhere(centre, proposed.radius) for centre in centres)]
-
-
-def middles_of_faces(model: Model, patch: Patch | None) -> Floats:
-    """Of faces (k, 3) [m] that are free, or that a patch is a part of."""
-    mesh = model.mesh
-    if patch is None:
-        held = np.asarray(model.constrained.reshape(-1, 3).all(axis=1))
-        faces = mesh.boundary[~held[mesh.boundary].any(axis=1)]
-    else:
-        faces = mesh.boundary[patch.held[mesh.boundary].all(axis=1)]
-    return np.asarray(mesh.points[faces].mean(axis=1))
 
 
 def columns_of_other_shapes(
