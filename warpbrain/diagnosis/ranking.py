@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from warpbrain.arrays import Floats
@@ -47,8 +49,7 @@ class Ranking:
             return Ranked(cause.name, False, gain, probability, 0.0, None, (), rejected_because=why)
         number = weighted_set.acting.index(cause.name)
         effect = weighted_set.effects[number]
-        weights = self._weights(cause, weighted_set)
-        scanned = self._search.causes.effects[cause.name]
+        scanned, weights = self._places(cause, weighted_set, number)
         values = values_of(effect, *weighted_set.coefficients[number])
         fitted = {value.name for value in values}
         # linear about another state, a size may go beyond what there can be: it says nothing
@@ -82,6 +83,18 @@ class Ranking:
             effect.proposed.region,
             why,
         )
+
+    def _places(self, cause: Cause, weighted_set: WeightedSet, number: int) -> tuple[tuple[Effect, ...], Floats]:
+        """An effect at every place where it may be (p), and the probabilities (p,) of these.
+
+        Those of a scan; of what was fitted and moved those about the fit, as far as these are all.
+        """
+        scanned, weights = tuple(self._search.causes.effects[cause.name]), self._weights(cause, weighted_set)
+        if number not in weighted_set.places:
+            return scanned, weights
+        about_fit, shares = weighted_set.places[number].spread(weighted_set.effects[number])
+        share = math.exp(weighted_set.log_share)
+        return (*about_fit, *scanned), np.concatenate([share * shares, (1.0 - share) * weights])
 
     def _weights(self, cause: Cause, weighted_set: WeightedSet) -> Floats:
         """Probabilities (p,) of the places of a scan given all other causes of a set."""

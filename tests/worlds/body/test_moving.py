@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from equilibria_elsewhere import assert_columns_are_differences
 from gel import block_of_gel, with_beads
 
 from warpbrain.physics.mechanisms.traction import Traction
@@ -12,7 +13,8 @@ from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.fitting import Fitter
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
-from warpbrain.worlds.body.placing import moved_about_fit
+from warpbrain.worlds.body.moving import moved_about_fit
+from warpbrain.worlds.body.places import PlaceCoordinates
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
 #: Edge, noise, and centre of the patch [m]; tracked points.
@@ -59,6 +61,9 @@ def test_what_was_fitted_off_its_place_is_moved_nearer_to_it(search: HypothesisS
     assert moved.hypothesis.log_evidence - off.hypothesis.log_evidence == pytest.approx(gain, abs=0.1)
     before, after = (np.linalg.norm(found.effects[0].proposed.centre - CENTRE) for found in (off, moved))
     assert after < 0.8 * before
+    effects, weights = moved.places[0].spread(moved.effects[0])
+    apart = np.array([np.linalg.norm(effect.proposed.centre - moved.effects[0].proposed.centre) for effect in effects])
+    assert after < 3.0 * np.sqrt(weights @ apart**2)
 
 
 def test_what_was_fitted_at_its_place_stays(search: HypothesisSearch) -> None:
@@ -68,3 +73,9 @@ def test_what_was_fitted_at_its_place_stays(search: HypothesisSearch) -> None:
     assert moved.refit is not None
     assert moved.refit.log_evidence - there.refit.log_evidence < 5.0
     assert np.linalg.norm(moved.effects[0].proposed.centre - CENTRE) < 0.25 * search.spacing
+
+
+def test_what_is_linear_about_a_fit_is_so_in_the_place(search: HypothesisSearch) -> None:
+    base, (effect,) = search.base, search.get(("traction",)).effects
+    place = PlaceCoordinates(base.at.system.model, effect.proposed, 0.5 * search.spacing)
+    assert_columns_are_differences(base, place, effect, np.array([0.1, 0.0, 0.8]))

@@ -40,8 +40,9 @@ from warpbrain.worlds.body.dictionary import (
 )
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
+from warpbrain.worlds.body.moving import moved_about_fit
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
-from warpbrain.worlds.body.placing import Weighing, moved_about_fit, with_refined_places
+from warpbrain.worlds.body.placing import Weighing, with_refined_places
 from warpbrain.worlds.body.states import States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighted_set import Refit, SetMarginal, WeightedSet, evidence_of
@@ -265,7 +266,7 @@ class HypothesisSearch:
 
     def _move(self, fitted: WeightedSet) -> None:
         """Fit a fitted set where its mechanisms are better placed."""
-        self._listener.stage(f"fit at neighbouring places: {' and '.join(sorted(fitted.names))}")
+        self._listener.stage(f"fit at better places: {' and '.join(sorted(fitted.names))}")
         self._sets[fitted.names] = moved = moved_about_fit(self.base, self._fitter, fitted, self.spacing)
         if moved.refit is not fitted.refit:
             self._forget_supersets(fitted.names)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,6 +64,26 @@ class PlaceCoordinates:
             return moved.columns
 
         return at.summed_in_time(about)
+
+
+@dataclass(frozen=True, eq=False)
+class LikelyPlaces:
+    """A normal distribution of the coordinates of a place."""
+
+    coordinates: PlaceCoordinates
+    mean: Floats  # (4,)
+    covariance: Floats  # (4, 4)
+
+    def spread(self, effect: Effect) -> tuple[list[Effect], Floats]:
+        """An effect at 81 places, and weights (81,) of these: Gauss and Hermite's rule of three points an axis.
+
+        About the place where it is: that a linear model has a better one, to which no fit came, is uncertainty.
+        """
+        nodes = np.array(list(itertools.product((0.0, -1.0, 1.0), repeat=4)))
+        weights = np.where(nodes == 0.0, 2.0 / 3.0, 1.0 / 6.0).prod(axis=1)
+        squares, along = np.linalg.eigh(self.covariance + np.outer(self.mean, self.mean))
+        ps = math.sqrt(3.0) * nodes @ (along * np.sqrt(np.maximum(squares, 0.0))).T
+        return [self.coordinates.effect_at(p, effect) for p in ps], weights
 
 
 def faces_for(model: Model, patch: Patch | None) -> Int32s:

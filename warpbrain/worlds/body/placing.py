@@ -1,12 +1,7 @@
-"""Sets of causes in the linear model, with gross errors of their own and places finer than a scan's; moved once fitted.
+"""Sets of causes in the linear model, with gross errors of their own and places finer than a scan's.
 
 Each place of a scan stands for a cell about it. So the evidence of the best one becomes the mean over finer places in
 its cell, and the best of these is where a fit begins.
-
-Where a mechanism moves a wall by as much as its own radius, another place and radius may fit better by tens of nats
-than that chosen about the base, in which it deforms nothing yet, and what is left at the wrong one looks like a further
-cause. So the model that is linear about a fit is linear in the places of its mechanisms, too, and a set is fitted again
-where these are the most probable.
 """
 
 from __future__ import annotations
@@ -19,7 +14,6 @@ from functools import cache
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.errors import SolveError
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.causes import Hypothesis, Member
 from warpbrain.inference.gross_errors import log_densities_of
@@ -30,14 +24,9 @@ from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import UNKNOWN, BodyCauses
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
-from warpbrain.worlds.body.effects import Effect, Effects, column_slices, width_of
-from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
-from warpbrain.worlds.body.places import RADII, PlaceCoordinates, middles_of_faces
-from warpbrain.worlds.body.weighted_set import Refit, SetMarginal, WeightedSet, evidence_of
-
-#: How often mechanisms are moved, by how much [nats] the linear model must say that another place is better, and parts
-#: of the way to it that are tried.
-_MOVES, _BETTER, _LENGTHS = 4, 1.0, (1.0, 0.5, 0.25)
+from warpbrain.worlds.body.effects import Effect, Effects, width_of
+from warpbrain.worlds.body.places import RADII, middles_of_faces
+from warpbrain.worlds.body.weighted_set import SetMarginal, WeightedSet, evidence_of
 
 
 def best_in_cell(
@@ -245,65 +234,3 @@ def _acting_beside(candidate: WeightedSet, number: int, placed: int) -> list[Mec
         if other >= placed and other != number
         for mechanism in effect.constant_mechanisms(mean)
     ]
-
-
-def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:
-    """A fitted set, fitted again where its mechanisms are better placed.
-
-    `spacing`: between the places of a scan [m].
-    """
-    fitted = replace(fitted, moved=True)
-    for _ in range(_MOVES):
-        assert fitted.refit is not None
-        moved = _moved_once(base, fitter, fitted.refit, spacing)
-        if moved is None:
-            break
-        fitted = fitted.fitted(moved).with_gain(moved.log_evidence - fitted.refit.log_evidence)
-    return fitted
-
-
-def _moved_once(base: Base, fitter: Fitter, refit: Refit, spacing: float) -> Refit | None:
-    """The fit with its mechanisms where the linear model about it says that they are; None if that is no better."""
-    try:
-        about = refit.state.linearised()
-        placed = {
-            number: PlaceCoordinates(base.at.system.model, effect.proposed, 0.5 * spacing)
-            for number, effect in enumerate(refit.effects)
-            if effect.is_placed
-        }
-        columns = [
-            place.columns(about, refit.effects[number], refit.coefficients[number], fitter.mesh_errors)
-            for number, place in placed.items()
-        ]
-    except SolveError:
-        return None
-    if not placed:
-        return None
-    model, residual = refit.marginal.model, refit.linear
-    with_places = model.with_columns(np.column_stack(columns))
-    # how probable the best place is, not all about it: fits are compared at one place each
-    before, after = (0.5 * float(np.sum(each.standardised(residual) ** 2)) for each in (model, with_places))
-    if before - after < _BETTER:
-        return None
-    best = with_places.coefficients(residual)[0]
-    steps, best = best[model.columns.shape[1] :].reshape(-1, 4), best[: refit.columns.shape[1]]
-    here = np.concatenate([refit.nuisances, *refit.coefficients])
-    for length in _LENGTHS:
-        effects = list(refit.effects)
-        for (number, place), step in zip(placed.items(), steps, strict=True):
-            effects[number] = place.effect_at(length * step, effects[number])
-        z = here + length * (best - here)
-        nuisances, *coefficients = np.split(
-            z, [part.start for part in column_slices(refit.effects, len(refit.nuisances))]
-        )
-        there = replace(refit, nuisances=nuisances, coefficients=tuple(coefficients))
-        try:
-            begun = fitter.begin(tuple(effects), there, about)
-            if begun.marginal.log_evidence < refit.marginal.log_evidence + _BETTER:
-                continue
-            moved = fitter.fit(begun.effects, begun.columns, [], begun.marginal, begun.state, begun)
-        except CANNOT_BE_FITTED:
-            continue
-        if moved.log_evidence > refit.log_evidence:
-            return moved
-    return None

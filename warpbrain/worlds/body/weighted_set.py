@@ -13,8 +13,8 @@ which pulls the elements in its own way.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -33,6 +33,7 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
 from warpbrain.worlds.body.nuisances import LAW, UNKNOWN_MESH, shared_parameter
+from warpbrain.worlds.body.places import LikelyPlaces
 from warpbrain.worlds.body.states import SolvedState
 
 #: The sum over sizes ends where a term is below this part of the largest.
@@ -284,7 +285,9 @@ class WeightedSet:
     #: it is fitted itself. None if its linear model is about a fit, whose gain it has already.
     inherited_gain: float | None = 0.0
     refined: bool = False  # whether its mechanisms are at the best places within their cells
-    moved: bool = False  # whether it was fitted at neighbouring places, too
+    moved: bool = False  # whether its mechanisms were moved to where they are better placed
+    #: Where these are, by the numbers of their effects, in the model that is linear about the fit.
+    places: Mapping[int, LikelyPlaces] = field(default_factory=dict)
     #: The same causes with the unknown in one place if it is a field here, or the reverse; fitted beside it.
     alternative: WeightedSet | None = None
     #: Log of the part of the cells of these places in the evidence, which is a sum over all places. What a fit, or one
@@ -354,6 +357,7 @@ class WeightedSet:
             marginal=refit.marginal,
             refit=refit,
             alternative=None,
+            places={},
         )
 
     def with_gain(self, gain: float) -> WeightedSet:

@@ -1,0 +1,106 @@
+"""Fitted sets whose mechanisms are moved to where they are the most probable.
+
+Where a mechanism moves a wall by as much as its own radius, another place and radius may fit better by tens of nats
+than that chosen about the base, in which it deforms nothing yet, and what is left at the wrong one looks like a further
+cause. So the model that is linear about a fit is linear in the places of its mechanisms, too, and a set is fitted again
+where these are the most probable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from warpbrain.errors import SolveError
+from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.effects import column_slices
+from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
+from warpbrain.worlds.body.places import LikelyPlaces, PlaceCoordinates
+from warpbrain.worlds.body.weighted_set import Refit, WeightedSet
+
+#: How often mechanisms are moved, by how much [nats] the linear model must say that another place is better, and parts
+#: of the way to it that are tried.
+_MOVES, _BETTER, _LENGTHS = 4, 1.0, (1.0, 0.5, 0.25)
+
+
+def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: float) -> WeightedSet:
+    """A fitted set, fitted again where its mechanisms are better placed; and how well their places are known there.
+
+    `spacing`: between the places of a scan [m].
+    """
+    fitted, places = replace(fitted, moved=True), {}
+    for _ in range(_MOVES):
+        assert fitted.refit is not None
+        try:
+            about = LinearInPlaces(base, fitter, fitted.refit, spacing)
+        except SolveError:
+            break
+        places, moved = about.likely, about.moved()
+        if moved is None:
+            break
+        fitted = fitted.fitted(moved).with_gain(moved.log_evidence - fitted.refit.log_evidence)
+    return replace(fitted, places=places)
+
+
+class LinearInPlaces:
+    """The model that is linear about a fit, in the places of its mechanisms, too.
+
+    `spacing`: between the places of a scan [m]; half of it is the standard deviation of a place beforehand.
+    `SolveError` if nothing is linear about the fit.
+    """
+
+    def __init__(self, base: Base, fitter: Fitter, refit: Refit, spacing: float) -> None:
+        self._fitter, self._refit, self._about = fitter, refit, refit.state.linearised()
+        self._placed = {
+            number: PlaceCoordinates(base.at.system.model, effect.proposed, 0.5 * spacing)
+            for number, effect in enumerate(refit.effects)
+            if effect.is_placed
+        }
+        each = [
+            place.columns(self._about, refit.effects[number], refit.coefficients[number], fitter.mesh_errors)
+            for number, place in self._placed.items()
+        ]
+        self._first = refit.marginal.model.columns.shape[1]
+        self._model = refit.marginal.model.with_columns(np.column_stack(each))
+        self._best, self._covariance = self._model.coefficients(refit.linear)
+
+    @property
+    def likely(self) -> dict[int, LikelyPlaces]:
+        """Places of effects by their numbers."""
+        likely = {}
+        for k, (number, place) in enumerate(self._placed.items()):
+            part = slice(self._first + 4 * k, self._first + 4 * (k + 1))
+            likely[number] = LikelyPlaces(place, self._best[part], self._covariance[part, part])
+        return likely
+
+    @property
+    def gain(self) -> float:
+        """By how much [nats] the best places are better: not all about them, since fits are compared at one each."""
+        rows = self._refit.linear
+        before, after = (np.sum(m.standardised(rows) ** 2) for m in (self._refit.marginal.model, self._model))
+        return 0.5 * float(before - after)
+
+    def moved(self) -> Refit | None:
+        """The fit with the mechanisms at the best places, or on the way to them; None if that is no better."""
+        if self.gain < _BETTER:
+            return None
+        refit, likely = self._refit, self.likely
+        here = np.concatenate([refit.nuisances, *refit.coefficients])
+        starts = [part.start for part in column_slices(refit.effects, len(refit.nuisances))]
+        for length in _LENGTHS:
+            effects = list(refit.effects)
+            for number, places in likely.items():
+                effects[number] = places.coordinates.effect_at(length * places.mean, effects[number])
+            nuisances, *coefficients = np.split(here + length * (self._best[: len(here)] - here), starts)
+            there = replace(refit, nuisances=nuisances, coefficients=tuple(coefficients))
+            try:
+                begun = self._fitter.begin(tuple(effects), there, self._about)
+                if begun.marginal.log_evidence < refit.marginal.log_evidence + _BETTER:
+                    continue
+                moved = self._fitter.fit(begun.effects, begun.columns, [], begun.marginal, begun.state, begun)
+            except CANNOT_BE_FITTED:
+                continue
+            if moved.log_evidence > refit.log_evidence:
+                return moved
+        return None
