@@ -29,18 +29,23 @@ def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: fl
 
     `spacing`: between the places of a scan [m].
     """
-    fitted, places = replace(fitted, moved=True), {}
+    fitted, refit = replace(fitted, moved=True), fitted.refit
+    assert refit is not None
+    try:
+        about = LinearInPlaces(base, fitter, refit, spacing)
+    except SolveError:
+        return fitted
     for _ in range(_MOVES):
-        assert fitted.refit is not None
-        try:
-            about = LinearInPlaces(base, fitter, fitted.refit, spacing)
-        except SolveError:
-            break
-        places, moved = about.likely, about.moved()
+        moved = about.moved()
         if moved is None:
             break
-        fitted = fitted.fitted(moved).with_gain(moved.log_evidence - fitted.refit.log_evidence)
-    return replace(fitted, places=places)
+        try:
+            about = LinearInPlaces(base, fitter, moved, spacing)
+        except SolveError:
+            break
+    gain = about.refit.log_evidence - refit.log_evidence
+    moved_set = fitted if about.refit is refit else fitted.fitted(about.refit).with_gain(gain)
+    return replace(moved_set, places=about.likely)
 
 
 class LinearInPlaces:
@@ -51,7 +56,7 @@ class LinearInPlaces:
     """
 
     def __init__(self, base: Base, fitter: Fitter, refit: Refit, spacing: float) -> None:
-        self._fitter, self._refit, self._about = fitter, refit, refit.state.linearised()
+        self.refit, self._fitter, self._about = refit, fitter, refit.state.linearised()
         self._placed = {
             number: PlaceCoordinates(base.at.system.model, effect.proposed, 0.5 * spacing)
             for number, effect in enumerate(refit.effects)
@@ -77,15 +82,15 @@ class LinearInPlaces:
     @property
     def gain(self) -> float:
         """By how much [nats] the best places are better: not all about them, since fits are compared at one each."""
-        rows = self._refit.linear
-        before, after = (np.sum(m.standardised(rows) ** 2) for m in (self._refit.marginal.model, self._model))
+        rows = self.refit.linear
+        before, after = (np.sum(m.standardised(rows) ** 2) for m in (self.refit.marginal.model, self._model))
         return 0.5 * float(before - after)
 
     def moved(self) -> Refit | None:
         """The fit with the mechanisms at the best places, or on the way to them; None if that is no better."""
         if self.gain < _BETTER:
             return None
-        refit, likely = self._refit, self.likely
+        refit, likely = self.refit, self.likely
         here = np.concatenate([refit.nuisances, *refit.coefficients])
         starts = [part.start for part in column_slices(refit.effects, len(refit.nuisances))]
         for length in _LENGTHS:
