@@ -268,6 +268,22 @@ def candidates_about_fit(
     return replace(candidates, effects=by_kind, source=effects)
 
 
+def with_solved_releases(candidates: Candidates, solving: Effects, likely: Mapping[str, Ints]) -> Candidates:
+    """The effects of a dictionary, those of likely releases by states that are solved; unchanged where these cannot be.
+
+    `solving`: see `Effects.solving_releases`. `likely`: of each kind, numbers of the places.
+    """
+    by_kind = dict(candidates.effects)
+    for kind, numbers in likely.items():
+        of_kind = list(by_kind[kind])
+        for k in numbers.tolist():
+            if of_kind[k].is_release:
+                [solved] = switch_effects(solving, [of_kind[k].proposed])
+                of_kind[k] = solved if isinstance(solved, Effect) else of_kind[k]
+        by_kind[kind] = tuple(of_kind)
+    return replace(candidates, effects=by_kind)
+
+
 def with_releases_of(effects: Effects, of_a_kind: Sequence[Effect]) -> tuple[Effect, ...]:
     """Effects of a kind with the columns of its releases computed by `effects`; unchanged where these cannot be."""
     released = [number for number, effect in enumerate(of_a_kind) if effect.is_release]

@@ -49,9 +49,9 @@ def sparse_columns(size: int, columns: Iterable[tuple[int, Floats]]) -> tuple[li
 
 
 class SolvedSwitches:
-    """Effects of switches, such as contact, that have no derivative: states with each are solved, and kept.
+    """Effects of what is there or not, such as contact: states with each are solved, and kept.
 
-    `state`: without the mechanisms.
+    `state`: without them.
     """
 
     def __init__(self, states: States, state: SolvedState) -> None:
@@ -59,11 +59,14 @@ class SolvedSwitches:
         # displacement and reactions with each mechanism at the time of each number
         self._solved: dict[str, list[tuple[Floats, Floats]]] = {}
 
-    def effect_of(self, mechanism: Mechanism, sensors: Sensors, instant: int) -> Floats:
+    def effect_of(self, proposal: Proposal, sensors: Sensors, instant: int) -> Floats:
         """What sensors (n,) record in the state with a mechanism, less that without it, at the time of a number."""
-        key, state = repr(mechanism), self._state
+        mechanism, state = proposal.make(proposal.mean), self._state
+        key = repr(mechanism)
         if key not in self._solved:
-            hypothesis = replace(state.hypothesis, mechanisms=(mechanism,))
+            acting, patches = state.hypothesis.mechanisms, state.hypothesis.patches
+            further = () if proposal.patch is None else (proposal.patch,)
+            hypothesis = replace(state.hypothesis, mechanisms=(*acting, mechanism), patches=(*patches, *further))
             # the loads act already: one load step, or the state is taken not to exist
             solved = self._states.solve(hypothesis, state.u, iterations=EquilibriumOptions.max_newton)
             self._solved[key] = [(each.u, each.reactions) for each in solved.instants]
@@ -80,6 +83,7 @@ class Effect:
     columns: Floats  # (n, k), of one standard deviation of each
     #: Of a course in time: from its coefficients (k,) to the columns (n, k) about them.
     columns_at: Callable[[Floats], Floats] | None = None
+    is_solved: bool = False  # of what is there or not: by a state with it, not to first order
     #: Standard deviation of its coefficients over the usual one, and the values that this may have.
     size: float = 1.0
     sizes: tuple[float, ...] = (1.0,)
@@ -142,7 +146,8 @@ class Effects:
     `mesh_errors`: of the state: less compressible tissue locks more, which is part of the effect of a law.
     `instant`: number of the time of the state.
     `loading`: mechanisms that act beside each proposal by nodal forces. A release is of the reactions to these, too, to
-    first order; what they change of other proposals is of second order and left out.
+    first order; what they change of other proposals is of second order and left out. `releases`: with which states are
+    solved for releases, too, which are to first order otherwise.
     """
 
     def __init__(
@@ -152,9 +157,10 @@ class Effects:
         mesh_errors: MeshErrors | None = None,
         instant: int = -1,
         loading: Sequence[Mechanism] = (),
+        releases: SolvedSwitches | None = None,
     ) -> None:
         self.at, self.mesh_errors, self._switches, self._instant = at, mesh_errors, switches, instant
-        self.loading = tuple(loading)
+        self.loading, self._releases = tuple(loading), releases
         self._internal: Floats | None = None
         # systems of the same state with laws of other kinds, as long as columns are made
         self._of_other_laws: list[System] = []
@@ -171,6 +177,11 @@ class Effects:
         """The same beside those mechanisms that act by nodal forces."""
         loading = [mechanism for mechanism in acting if not _faces(mechanism.__class__).isdisjoint(_PUSHING)]
         return Effects(self.at, self._switches, self.mesh_errors, self._instant, loading)
+
+    def solving_releases(self, states: States, state: SolvedState) -> Effects:
+        """The same with a state solved for each release, from the one that these effects are about."""
+        solved = SolvedSwitches(states, state)
+        return Effects(self.at, self._switches, self.mesh_errors, self._instant, self.loading, solved)
 
     @cached_property
     def _further_reactions(self) -> Floats | None:
@@ -191,7 +202,9 @@ class Effects:
         each_once, by_moment = list({id(base): base for base in bases}.values()), []
         for moment in self.at.moments:
             at = moment.at
-            here = self if at is self.at else Effects(at, self._switches, self.mesh_errors, moment.number, self.loading)
+            switches, errors, loading = self._switches, self.mesh_errors, self.loading
+            there = at is self.at
+            here = self if there else Effects(at, switches, errors, moment.number, loading, self._releases)
             by_moment.append(here._at_one_time(each_once, present, columns_alone))
         return [
             self._over_time(proposal, [effects[id(base)] for effects in by_moment])
@@ -219,7 +232,8 @@ class Effects:
             def columns_at(c: Floats) -> Floats:
                 return total(lambda e: e.columns if e.columns_at is None else e.columns_at(c))
 
-        return Effect(proposal, total(lambda e: e.mean), total(lambda e: e.columns, True), columns_at)
+        columns = total(lambda e: e.columns, True)
+        return Effect(proposal, total(lambda e: e.mean), columns, columns_at, effect.is_solved)
 
     def _at_one_time(
         self, proposals: Sequence[Proposal], present: Mechanism | None, columns_alone: bool
@@ -275,14 +289,20 @@ class Effects:
 
     def _effect(self, proposal: Proposal, answers: Floats) -> Effect:
         if proposal.is_there_or_not:
-            if proposal.is_release:
+            solved = self._releases if proposal.is_release else self._switches
+            if solved is not None:
+                answer = solved.effect_of(proposal, self.at.sensors, self._instant)
+            else:
+                assert proposal.is_release, "about a fit switches keep their columns"
                 patch = proposal.released
                 lifts = proposal.make(proposal.mean).lifts
                 answer = self.at.released(patch.members, patch.held, lifts, self._further_reactions)
-            else:
-                assert self._switches is not None, "about a fit switches keep their columns"
-                answer = self._switches.effect_of(proposal.make(proposal.mean), self.at.sensors, self._instant)
-            return Effect(proposal, proposal.mean[0] * answer, proposal.sd[0] * answer[:, None])
+            return Effect(
+                proposal,
+                proposal.mean[0] * answer,
+                proposal.sd[0] * answer[:, None],
+                is_solved=solved is not None,
+            )
         if proposal.follows == "proportional":
             return Effect(proposal, answers @ (proposal.mean / proposal.sd), answers)
         columns = answers[:, 1:]

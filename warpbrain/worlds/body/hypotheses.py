@@ -37,13 +37,14 @@ from warpbrain.worlds.body.dictionary import (
     candidates_at,
     dictionary_of,
     with_releases_of,
+    with_solved_releases,
 )
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.moving import moved_about_fit
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.placing import Weighing, with_refined_places
-from warpbrain.worlds.body.states import States, instants_of
+from warpbrain.worlds.body.states import SolvedState, States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
 from warpbrain.worlds.body.weighted_set import Refit, SetMarginal, WeightedSet, evidence_of
 
@@ -51,8 +52,8 @@ from warpbrain.worlds.body.weighted_set import Refit, SetMarginal, WeightedSet, 
 _PLACES, _SETS = 20, 12
 #: Other places at which a single cause is weighed with gross errors of its own.
 _ELSEWHERE = 2
-#: Places of each cause whose columns are made anew about a fit.
-_PLACES_ABOUT_FIT = 8
+#: Places of each cause whose columns are made anew about a fit, and of releases for which states are solved.
+_PLACES_ABOUT_FIT = _SOLVED = 8
 #: How often at most a set is fitted, or its supersets are weighed, as long as any set may be chosen; and as often again
 #: for the set that the verdict rests on, which may be another one after each fit.
 _MOST = 10
@@ -121,6 +122,9 @@ class HypothesisSearch:
         if nothing.gross.any():
             noise_factor = nothing.noise.noise_factor / nothing.scale
             models.append(GaussianModel(noise_factor, base.nuisances.columns))
+        self.candidates = self._with_solved_releases(self.candidates, base.state, models[-1], base.residual)
+        self.causes = causes_of(base, self.candidates)
+        self._visible = visible(self.causes, base.model)
         weighing = Weighing(base, self._visible, nothing.sizes)
         for _, candidate in _weighed(weighing, models, base.residual, self._visible.causes, most=2):
             _keep_better(self._sets, candidate)
@@ -132,6 +136,24 @@ class HypothesisSearch:
         refined = [self._sets[single.names] for single in singles]
         for candidate in itertools.chain.from_iterable(in_threads(self._with_releases, refined)):
             _keep_better(self._sets, candidate)
+
+    def _with_solved_releases(
+        self, candidates: Candidates, state: SolvedState, model: GaussianModel, residual: Floats
+    ) -> Candidates:
+        """The same with the likeliest releases by states that are solved from the one that the candidates are about.
+
+        How far what was held moves, and what then holds the body, is far from linear in its reactions: to first order
+        of eight likely patches of a brain the best one came last.
+
+        `model`, `residual` (n,): of the rows on which no other cause acts.
+        """
+        released = {kind for kind, of_kind in candidates.effects.items() if any(e.is_release for e in of_kind)}
+        causes = [cause for cause in causes_of(self.base, candidates).causes if cause.name in released]
+        if not causes:
+            return candidates
+        likely = likely_places(model, residual, causes, _SOLVED)
+        solving = candidates.source.solving_releases(self.base.states, state)
+        return with_solved_releases(candidates, solving, likely)
 
     def _with_releases(self, single: WeightedSet) -> list[WeightedSet]:
         """Sets of a release of held nodes beside a mechanism that is more probable than nothing.
@@ -384,6 +406,8 @@ class HypothesisSearch:
         places = {name: np.unique([each[name] for each in likely]) for name in likely[0]}
         candidates = candidates_about_fit(refit.state, fitted.effects, self.candidates, places)
         self._expanded[fitted.names] = candidates.source
+        if not any(effect.is_release for effect in fitted.effects):
+            candidates = self._with_solved_releases(candidates, refit.state, models[0], fitted.residual)
         causes = causes_of(self.base, candidates)
         causes = replace(causes, causes=tuple(cause for cause in causes.causes if cause.name not in fitted.names))
         causes = visible(causes, marginal.model)

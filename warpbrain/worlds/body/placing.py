@@ -200,7 +200,7 @@ def with_refined_places(
     effects = list(candidate.effects)
     placed = len(effects) if candidate.refined else placed
     for number, (effect, part) in enumerate(zip(candidate.effects, candidate.slices, strict=True)):
-        if number < placed or effect.proposal is None or effect.proposed.elsewhere is None:
+        if number < placed or effect.proposal is None or effect.proposed.elsewhere is None or effect.is_solved:
             continue
         others = np.delete(candidate.columns, np.r_[part], axis=1)
         without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
