@@ -222,7 +222,10 @@ def is_linear(effect: Effect, at: Linearisation) -> bool:
 
 
 def switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effect | InputError | SolveError]:
-    """Effects of switches, or why there is none; patches that let go have a dense solution each, made in threads."""
+    """Effects of switches, or why there is none.
+
+    Patches that let go have a dense solution each, made in threads, where no equilibrium is solved for them.
+    """
 
     def attempt(proposal: Proposal) -> Effect | InputError | SolveError:
         try:
@@ -230,8 +233,9 @@ def switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effe
         except (InputError, SolveError) as error:
             return error
 
-    solved = [proposal for proposal in proposals if not proposal.is_release]
-    released = [proposal for proposal in proposals if proposal.is_release]
+    to_first_order = [proposal.is_release and not effects.solves_releases for proposal in proposals]
+    released = [proposal for proposal, first_order in zip(proposals, to_first_order, strict=True) if first_order]
+    solved = [proposal for proposal, first_order in zip(proposals, to_first_order, strict=True) if not first_order]
     # the first one condenses the surface, with threads of its own
     results = [*map(attempt, released[:1]), *in_threads(attempt, released[1:]), *map(attempt, solved)]
     by_proposal = dict(zip(map(id, (*released, *solved)), results, strict=True))
@@ -268,25 +272,15 @@ def candidates_about_fit(
     return replace(candidates, effects=by_kind, source=effects)
 
 
-def with_solved_releases(candidates: Candidates, solving: Effects, likely: Mapping[str, Ints]) -> Candidates:
-    """The effects of a dictionary, those of likely releases by states that are solved; unchanged where these cannot be.
+def with_releases_of(
+    effects: Effects, of_a_kind: Sequence[Effect], numbers: Sequence[int] | None = None
+) -> tuple[Effect, ...]:
+    """Effects of a kind with the columns of its releases computed by `effects`; unchanged where these cannot be.
 
-    `solving`: see `Effects.solving_releases`. `likely`: of each kind, numbers of the places.
+    `numbers`: of the effects that are looked at; all unless given.
     """
-    by_kind = dict(candidates.effects)
-    for kind, numbers in likely.items():
-        of_kind = list(by_kind[kind])
-        for k in numbers.tolist():
-            if of_kind[k].is_release:
-                [solved] = switch_effects(solving, [of_kind[k].proposed])
-                of_kind[k] = solved if isinstance(solved, Effect) else of_kind[k]
-        by_kind[kind] = tuple(of_kind)
-    return replace(candidates, effects=by_kind)
-
-
-def with_releases_of(effects: Effects, of_a_kind: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Effects of a kind with the columns of its releases computed by `effects`; unchanged where these cannot be."""
-    released = [number for number, effect in enumerate(of_a_kind) if effect.is_release]
+    among = range(len(of_a_kind)) if numbers is None else numbers
+    released = [number for number in among if of_a_kind[number].is_release]
     result = list(of_a_kind)
     for k, effect in zip(released, switch_effects(effects, [result[k].proposed for k in released]), strict=True):
         if isinstance(effect, Effect):

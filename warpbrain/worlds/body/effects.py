@@ -49,9 +49,9 @@ def sparse_columns(size: int, columns: Iterable[tuple[int, Floats]]) -> tuple[li
 
 
 class SolvedSwitches:
-    """Effects of what is there or not, such as contact: states with each are solved, and kept.
+    """What mechanisms without a size, such as contact, change of what is recorded: by an equilibrium with each, kept.
 
-    `state`: without them.
+    `state`: the equilibrium without them.
     """
 
     def __init__(self, states: States, state: SolvedState) -> None:
@@ -178,8 +178,13 @@ class Effects:
         loading = [mechanism for mechanism in acting if not _faces(mechanism.__class__).isdisjoint(_PUSHING)]
         return Effects(self.at, self._switches, self.mesh_errors, self._instant, loading)
 
+    @property
+    def solves_releases(self) -> bool:
+        """Whether the effect of a release is that of an equilibrium with it, not to first order."""
+        return self._releases is not None
+
     def solving_releases(self, states: States, state: SolvedState) -> Effects:
-        """The same with a state solved for each release, from the one that these effects are about."""
+        """The same, with an equilibrium solved for each release, from the `state` that these effects are about."""
         solved = SolvedSwitches(states, state)
         return Effects(self.at, self._switches, self.mesh_errors, self._instant, self.loading, solved)
 

@@ -37,7 +37,6 @@ from warpbrain.worlds.body.dictionary import (
     candidates_at,
     dictionary_of,
     with_releases_of,
-    with_solved_releases,
 )
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
@@ -140,20 +139,21 @@ class HypothesisSearch:
     def _with_solved_releases(
         self, candidates: Candidates, state: SolvedState, model: GaussianModel, residual: Floats
     ) -> Candidates:
-        """The same with the likeliest releases by states that are solved from the one that the candidates are about.
+        """The candidates with the effects of the most probable releases from equilibria with each.
 
-        How far what was held moves, and what then holds the body, is far from linear in its reactions: to first order
-        of eight likely patches of a brain the best one came last.
+        A patch that is released moves until the tissue around it balances what had held it. That is far from linear in
+        the reaction, and patches that are as probable as each other to first order differ by tens of nats.
 
-        `model`, `residual` (n,): of the rows on which no other cause acts.
+        `state`: about which the candidates are. `model`, `residual` (n,): of the rows without any further cause.
         """
         released = {kind for kind, of_kind in candidates.effects.items() if any(e.is_release for e in of_kind)}
         causes = [cause for cause in causes_of(self.base, candidates).causes if cause.name in released]
         if not causes:
             return candidates
         likely = likely_places(model, residual, causes, _SOLVED)
-        solving = candidates.source.solving_releases(self.base.states, state)
-        return with_solved_releases(candidates, solving, likely)
+        solving, of_kinds = candidates.source.solving_releases(self.base.states, state), candidates.effects
+        solved = {kind: with_releases_of(solving, of_kinds[kind], numbers.tolist()) for kind, numbers in likely.items()}
+        return replace(candidates, effects={**of_kinds, **solved})
 
     def _with_releases(self, single: WeightedSet) -> list[WeightedSet]:
         """Sets of a release of held nodes beside a mechanism that is more probable than nothing.

@@ -81,7 +81,10 @@ class LinearInPlaces:
 
     @property
     def gain(self) -> float:
-        """By how much [nats] the best places are better: not all about them, since fits are compared at one each."""
+        """Increase [nats] of the log posterior density from the places of the fit to the most probable ones.
+
+        Without the volume of places about either: fits are compared at one place each.
+        """
         rows = self.refit.linear
         before, after = (np.sum(m.standardised(rows) ** 2) for m in (self.refit.marginal.model, self._model))
         return 0.5 * float(before - after)

@@ -128,7 +128,6 @@ def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Field, ...
 
 def tractions(at: Linearisation, length: float) -> Field:
     """Tractions of a length [m] on all that is free of the surface, which is not nothing."""
-
     faces = _free_faces(at)
 
     def shares(mesh: TetMesh) -> Floats:

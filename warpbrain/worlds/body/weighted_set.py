@@ -361,7 +361,7 @@ class WeightedSet:
         )
 
     def with_gain(self, gain: float) -> WeightedSet:
-        """The set whose places are more probable than was known by a log Bayes factor, and others, elsewhere, are not.
+        """The set whose log evidence at its own places is larger by a gain [nats], and in other cells is as it was.
 
         What is lost by a fit is lost by all: that the effect is not linear is no matter of the place. A gain may be,
         and one place of many at which an effect is found to be another than in the linear model must not count for all
