@@ -157,6 +157,24 @@ def test_likely_places_are_those_of_the_greatest_density():
         assert set(found[cause.name].tolist()) == set(np.argsort(density)[-2:].tolist())
 
 
+def test_a_single_cause_keeps_the_best_place_of_each_label():
+    random = np.random.default_rng(4)
+    given, [cause, *others] = model(random), some_causes(random)
+    labels = ["a" if number < len(cause.places) - 2 else "b" for number in range(len(cause.places))]
+    cause = replace(cause, places=tuple(map(lambda p, label: replace(p, label=label), cause.places, labels)))
+    residual = draws(given, 1, random)[:, 0] + 3.0 * cause.places[0].columns @ random.normal(size=3)
+    found = posterior(given, residual, [cause, *others], SCALES)
+    single = next(hypothesis for hypothesis in found if hypothesis.causes == (cause.name,))
+    assert labels[single.best.members[0].place] == "a"
+    [other] = single.elsewhere
+    of_places = [
+        next(h for h in posterior(given, residual, [replace(cause, places=(place,))], SCALES) if h.causes)
+        for place in cause.places[-2:]
+    ]
+    best = len(labels) - 2 + int(np.argmax([h.best.log_density for h in of_places]))
+    assert other.members[0].place == best
+
+
 def test_a_single_cause_keeps_its_next_best_places():
     random = np.random.default_rng(3)
     given, causes = model(random), some_causes(random)

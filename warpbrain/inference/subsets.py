@@ -234,20 +234,22 @@ class Search:
     most: int = 3  # causes of a set at most
     #: Pairs and triples are left out at scales where every single cause is below this part of the greatest density.
     negligible: float = 1e-4
-    elsewhere: int = 0  # configurations of each single cause at other places than the best that are kept
+    #: Configurations of each single cause at other places than the best that are kept, beside the best of each label.
+    elsewhere: int = 0
 
 
 class _Sums:
     """Sums of densities by sets of causes, as logarithms, and the best configuration of each."""
 
-    def __init__(self, places: int = 0) -> None:
+    def __init__(self, places: int = 0, causes: Sequence[Cause] = ()) -> None:
         self.logs: dict[frozenset[int], float] = {}
         self.best: dict[frozenset[int], Configuration] = {}
-        #: Of each single cause, the best configuration at each of so many places.
+        #: Of each single cause, the best configuration at each of so many places, and at one of each label.
         self.at_places: dict[int, dict[int, Configuration]] = {}
         #: Sums of each single cause by the numbers of its places.
         self.by_place: dict[int, dict[int, float]] = {}
         self._places = places
+        self._labels = [np.array([place.label for place in cause.places]) for cause in causes]
 
     def add(self, causes: frozenset[int], log: float, best: Configuration) -> None:
         self.logs[causes] = float(np.logaddexp(self.logs.get(causes, -np.inf), log))
@@ -275,8 +277,12 @@ class _Sums:
                 known = self.by_place.setdefault(int(blocks.cause[low]), {})
                 for place, log in zip(blocks.place[low:high].tolist(), of_places.tolist(), strict=True):
                     known[place] = float(np.logaddexp(known.get(place, -np.inf), log))
-            at_places = self.at_places.setdefault(best[-1].members[-1].cause, {})
-            for other in np.argsort(-greatest)[: 0 if members else self._places].tolist():
+            if members or not self._places:
+                continue
+            at_places, order = self.at_places.setdefault(int(blocks.cause[low]), {}), np.argsort(-greatest)
+            labels = self._labels[int(blocks.cause[low])][blocks.place[low:high]][order]
+            of_each_label = order[np.unique(labels, return_index=True)[1]]
+            for other in {*order[: self._places].tolist(), *of_each_label.tolist()}:
                 configuration = self._configuration(blocks, low + other, of_cause[other], (), scale)
                 known_there = at_places.get(configuration.members[0].place)
                 if known_there is None or configuration.log_density > known_there.log_density:
@@ -301,13 +307,18 @@ class _Sums:
         return replace(configuration, log_share=min(share, 0.0))
 
     def elsewhere(self, causes: frozenset[int]) -> tuple[Configuration, ...]:
-        """Of a single cause, the best configurations at other places than the best."""
-        if len(causes) != 1:
+        """Of a single cause, the best configurations at other places than the best, and the best of each label."""
+        if len(causes) != 1 or not self._places:
             return ()
         [cause] = causes
-        at_best = self.best[causes].members[0].place
-        others = [configuration for place, configuration in self.at_places[cause].items() if place != at_best]
-        return tuple(sorted(others, key=lambda configuration: -configuration.log_density)[: self._places - 1])
+        ordered = sorted(self.at_places[cause].items(), key=lambda other: -other[1].log_density)
+        at_best, chosen = self.best[causes].members[0].place, list[Configuration]()
+        labels = {self._labels[cause][at_best]}
+        for place, configuration in ordered:
+            if place != at_best and (len(chosen) < self._places - 1 or self._labels[cause][place] not in labels):
+                chosen.append(configuration)
+                labels.add(self._labels[cause][place])
+        return tuple(chosen)
 
 
 def posterior(
@@ -317,7 +328,7 @@ def posterior(
 
     `model`: of rows (n,) on which no cause acts. `residual` (n,).
     """
-    sums = _Sums(1 + search.elsewhere)
+    sums = _Sums(1 + search.elsewhere, causes)
     unscaled = Blocks(model, residual, causes) if causes else None
 
     def weighed_at(scale: float) -> tuple[float, Blocks | None, Floats]:

@@ -48,3 +48,19 @@ def test_the_candidate_changes_what_the_nuisance_does(base: Base) -> None:
     locked = float(other_volume(base.states).sd[0]) * expected_answer(base.at.sensors, base.mesh_errors.by_volume)
     np.testing.assert_allclose(own[:, 0] - alone.columns[:, 0], locked, rtol=1e-6, atol=1e-9)
     assert np.linalg.norm(locked) > 0.02 * np.linalg.norm(own)
+
+
+def test_where_it_is_computed_anew_it_is_what_it_was_at_both(base: Base) -> None:
+    known, theta = base.mesh_errors, base.state.hypothesis.theta
+    assert known is not None
+    softer = replace(base.state.hypothesis, theta=theta - 0.4)
+    solved = known.finer.error(softer, base.state)
+    renewed = known.with_error(solved, base.prior)
+    for tissue, error in ((softer.theta, solved), (theta, known.error)):
+        said = renewed.with_tissue(tissue, known.volume, base.prior)
+        np.testing.assert_allclose(said.u, error.u, atol=1e-12)
+    # between them it is nearer than by the derivative from one end
+    between = replace(softer, theta=theta - 0.2)
+    there = known.finer.error(between, base.state)
+    before, after = (each.of(between, base.prior).less(there).size for each in (known, renewed))
+    assert after < 0.8 * before

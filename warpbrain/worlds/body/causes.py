@@ -101,7 +101,9 @@ def causes_of(base: Base, candidates: Candidates) -> BodyCauses:
         if kind == UNKNOWN:
             causes.append(_unknown_cause(base, of_kind))
             continue
-        places = tuple(Place(effect.columns, effect.mean if effect.mean.any() else None) for effect in of_kind)
+        places = tuple(
+            Place(effect.columns, effect.mean if effect.mean.any() else None, effect.surface) for effect in of_kind
+        )
         if of_kind[0].proposal is None:
             causes.append(
                 Cause(kind, places, math.log(belief("causes.not_physics")), not_physics_sizes, Kind.NOT_PHYSICS)

@@ -100,6 +100,11 @@ class Effect:
         return self.proposal is not None and self.proposal.elsewhere is not None and not self.proposal.is_there_or_not
 
     @property
+    def surface(self) -> str:
+        """The surface on which it is placed, in words; empty if it is not placed on one."""
+        return self.proposed.region if self.is_placed and self.proposed.on_surface else ""
+
+    @property
     def is_release(self) -> bool:
         """Whether nodes that are held are released where it acts."""
         return self.proposal is not None and self.proposal.is_release

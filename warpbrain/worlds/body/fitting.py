@@ -30,7 +30,7 @@ from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about, shape_columns_about
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
-from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion
+from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion, mesh_by_tissue
 from warpbrain.worlds.body.parameters import log_within_expected
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
 from warpbrain.worlds.body.weighted_set import MeshShare, Refit, SetMarginal, evidence_of, excess_error, mesh_share_of
@@ -284,11 +284,15 @@ class FitSearch:
             error = finer.error(self.state.hypothesis, self.state)
         except SolveError:
             return known
-        change = excess_error(known, error, self.state, self._base.prior)
+        change, renewed = (
+            excess_error(known, error, self.state, self._base.prior),
+            known.with_error(error, self._base.prior),
+        )
         if float(np.linalg.norm(self._noise.whitened(change))) > _MATTERS:
-            self.mesh_errors = replace(known, error=error)
+            sensors, self.mesh_errors = self.state.sensors, renewed
+            self.columns[:, self._layout.tissue] += mesh_by_tissue(sensors, renewed) - mesh_by_tissue(sensors, known)
             self.start([self.z], self.state)
-        return replace(known, error=error)
+        return renewed
 
     def result(self) -> Refit:
         """The fit at its best point."""

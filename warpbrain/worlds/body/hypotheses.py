@@ -247,9 +247,11 @@ class HypothesisSearch:
         candidate = self._sets[names]
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
         candidates = [candidate]
-        if candidate.alternative is not None:
-            alternative = replace(candidate.alternative, inherited_gain=candidate.inherited_gain)
-            candidates.append(alternative.with_evidence(candidate.hypothesis.log_evidence))
+        if UNKNOWN in names:
+            for alternative in candidate.alternatives:
+                alternative = replace(alternative, inherited_gain=candidate.inherited_gain)
+                candidates.append(alternative.with_evidence(candidate.hypothesis.log_evidence))
+            candidates = [replace(each, alternatives=()) for each in candidates]
         fits = map(self._fitted, candidates)
         fitted, gain = max(fits, key=lambda fit: (fit[0].refit is not None, fit[0].hypothesis.log_evidence))
         self._sets[names] = fitted
@@ -289,7 +291,15 @@ class HypothesisSearch:
     def _move(self, fitted: WeightedSet) -> None:
         """Fit a fitted set where its mechanisms are better placed."""
         self._listener.stage(f"fit at better places: {' and '.join(sorted(fitted.names))}")
-        self._sets[fitted.names] = moved = moved_about_fit(self.base, self._fitter, fitted, self.spacing)
+        fits, inherited = [fitted], fitted.inherited_gain or 0.0
+        for alternative in fitted.alternatives:
+            known = alternative.with_evidence(alternative.hypothesis.log_evidence + inherited)
+            fits.append(self._fitted(replace(known, inherited_gain=inherited))[0])
+        moved_fits = (
+            moved_about_fit(self.base, self._fitter, fit, self.spacing) for fit in fits if fit.refit is not None
+        )
+        moved = max(moved_fits, key=lambda each: each.hypothesis.log_evidence)
+        self._sets[fitted.names] = moved = replace(moved, alternatives=())
         if moved.refit is not fitted.refit:
             self._forget_supersets(fitted.names)
             self._refit_subsets(fitted.names)
@@ -441,7 +451,7 @@ class HypothesisSearch:
                 log_evidence=fitted.hypothesis.log_evidence + gain,
             )
             log_share = fitted.log_share + candidate.log_share
-            yield replace(candidate, hypothesis=joint, inherited_gain=None, alternative=None, log_share=log_share)
+            yield replace(candidate, hypothesis=joint, inherited_gain=None, alternatives=(), log_share=log_share)
 
 
 def _weighed(
@@ -466,8 +476,12 @@ def _weighed(
 def _keep_better(sets: dict[frozenset[str], WeightedSet], candidate: WeightedSet) -> None:
     """Put a set among others by its names, unless the same is there with as much evidence."""
     known = sets.get(candidate.names)
-    if known is None or candidate.hypothesis.log_evidence > known.hypothesis.log_evidence:
+    if known is None:
         sets[candidate.names] = candidate
+        return
+    better, other = sorted((candidate, known), key=lambda each: -each.hypothesis.log_evidence)
+    alternatives = (*better.alternatives, other, *other.alternatives) if len(better.names) == 1 else ()
+    sets[better.names] = better.with_alternatives(alternatives)
 
 
 def _probabilities(sets: Iterable[WeightedSet]) -> Floats:

@@ -22,7 +22,7 @@ from warpbrain.mesh.quality import principal_axes
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.causes import UNKNOWN, BodyCauses
+from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
 from warpbrain.worlds.body.effects import Effect, Effects, width_of
 from warpbrain.worlds.body.places import RADII, middles_of_faces
@@ -151,10 +151,7 @@ class Weighing:
             replace(each.with_evidence(log_evidence), log_share=share)
             for each, share in zip(weighed, log_shares.tolist(), strict=True)
         ]
-        # whether the unknown is a field or in one place is not seen in the linear model where it moves the body far
-        placed = weighed[best].has_placed(UNKNOWN)
-        ordered = (weighed[k] for k in np.argsort(-logs).tolist())
-        return replace(weighed[best], alternative=next((s for s in ordered if s.has_placed(UNKNOWN) != placed), None))
+        return weighed[best].with_alternatives(weighed[k] for k in np.argsort(-logs).tolist())
 
     def _weigh_at(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
         """The same as if its best configuration stood for all places."""

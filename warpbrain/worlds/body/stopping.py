@@ -124,6 +124,7 @@ def _unknown_not_fitted(
     a finite rigid rotation does to second order looks like an unknown force. Of any the likeliest set of mechanisms
     alone, and the likeliest single one with what may act beside it: sets with the unknown are many, and what a
     mechanism does that is far from linear, such as tissue that relaxes under another one's load, looks like one.
+    Of the unknown alone all single mechanisms that may be as probable, too: `_single_far_from_linear`.
     """
     if decision.verdict != UNKNOWN and not (decision.verdict == NAMED_AND_REST and UNKNOWN in sets[0].names):
         return None
@@ -134,7 +135,22 @@ def _unknown_not_fitted(
     single = next((s for s in of_mechanisms if len(s.names) == 1), None)
     parts = (s for s in sets if s.names in alone or s is single or s in of_mechanisms[:1])
     part = next((part for part in parts if part.is_open), None)
-    return part or (None if single is None or single.names in expanded else single)
+    if part is not None or (single is not None and single.names not in expanded):
+        return part or single
+    return _single_far_from_linear(sets) if decision.verdict == UNKNOWN else None
+
+
+def _single_far_from_linear(sets: Sequence[WeightedSet]) -> WeightedSet | None:
+    """The likeliest mechanism alone that is open and may be as probable as the best set; None if there is none.
+
+    By how much the linear model about the base is off is in proportion to what is at stake, the evidence of the best
+    set over that of nothing.
+    """
+    nothing = next(candidate.hypothesis.log_evidence for candidate in sets if not candidate.names)
+    best = max(candidate.hypothesis.log_evidence for candidate in sets)
+    least = best - belief("fits.part") * (best - nothing)
+    singles = (s for s in sets if len(s.names) == 1 == len(s.mechanisms) and s.is_open)
+    return next((single for single in singles if single.hypothesis.log_evidence > least), None)
 
 
 def _rival_without_a_name(decision: Decision, sets: Sequence[WeightedSet]) -> WeightedSet | None:

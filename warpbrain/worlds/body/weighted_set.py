@@ -13,7 +13,7 @@ which pulls the elements in its own way.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
@@ -25,11 +25,12 @@ from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.parameters import Gaussian
 from warpbrain.inference import Kind
-from warpbrain.inference.beliefs import beliefs
+from warpbrain.inference.beliefs import belief, beliefs
 from warpbrain.inference.causes import Hypothesis
 from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, marginal_of, outward
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.causes import UNKNOWN
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
 from warpbrain.worlds.body.nuisances import LAW, UNKNOWN_MESH, shared_parameter
@@ -288,8 +289,8 @@ class WeightedSet:
     moved: bool = False  # whether its mechanisms were moved to where they are better placed
     #: Where these are, by the numbers of their effects, in the model that is linear about the fit.
     places: Mapping[int, LikelyPlaces] = field(default_factory=dict)
-    #: The same causes with the unknown in one place if it is a field here, or the reverse; fitted beside it.
-    alternative: WeightedSet | None = None
+    #: The same causes where no fit comes to from here: see `with_alternatives`.
+    alternatives: tuple[WeightedSet, ...] = ()
     #: Log of the part of the cells of these places in the evidence, which is a sum over all places. What a fit, or one
     #: at another place of a cell, gains is taken to be gained by the whole cell: its likely places move about in it.
     log_share: float = 0.0
@@ -311,8 +312,10 @@ class WeightedSet:
 
     @property
     def may_move(self) -> bool:
-        """Whether it is fitted, with mechanisms whose neighbouring places were not looked at."""
-        return self.refit is not None and not self.moved and any(effect.is_placed for effect in self.effects)
+        """Whether it is fitted, and other places of its mechanisms were not looked at."""
+        if self.refit is None or self.moved:
+            return False
+        return bool(self.alternatives) or any(effect.is_placed for effect in self.effects)
 
     def has_placed(self, cause: str) -> bool:
         """Whether a cause acts in a place, with a size of its own there."""
@@ -356,9 +359,27 @@ class WeightedSet:
             columns=refit.columns,
             marginal=refit.marginal,
             refit=refit,
-            alternative=None,
             places={},
         )
+
+    @property
+    def extent(self) -> tuple[bool, frozenset[str]]:
+        """Whether any effect is in one place, and the surfaces on which these are."""
+        return any(e.is_placed for e in self.effects), frozenset(e.surface for e in self.effects if e.surface)
+
+    def with_alternatives(self, others: Iterable[WeightedSet]) -> WeightedSet:
+        """The set, with the first of each other extent of the same causes elsewhere.
+
+        No fit changes a field into a source, or goes from one surface to another: each has an optimum of its own. What
+        has a name must not be farther behind in the linear model than moving is known to gain. Of what has none that
+        model knows less, which does not know its size.
+        """
+        by_extent = {self.extent: self}
+        least = self.marginal.log_evidence - belief("fits.moved")
+        for other in others:
+            if UNKNOWN in self.names or other.marginal.log_evidence > least:
+                by_extent.setdefault(other.extent, replace(other, alternatives=()))
+        return replace(self, alternatives=tuple(by_extent.values())[1:])
 
     def with_gain(self, gain: float) -> WeightedSet:
         """The set whose log evidence at its own places is larger by a gain [nats], and in other cells is as it was.

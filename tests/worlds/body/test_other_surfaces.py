@@ -1,0 +1,55 @@
+"""A traction on the wall of a cavity that is first looked for on the outer surface, from which no fit goes over."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gel import block_of_gel, with_beads
+
+from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanisms.traction import Traction
+from warpbrain.simulation.equilibrium import EquilibriumSolver
+from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.system import System
+from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
+
+#: Edge [m], noise [m], tracked points.
+SIDE, NOISE, POINTS = 0.06, 4e-4, 40
+#: Of the cavity, as far from the top as from its own other side [m].
+LOW, HIGH = np.array([0.02, 0.02, 0.03]), np.array([0.04, 0.04, 0.05])
+
+
+@pytest.fixture(scope="module")
+def search() -> HypothesisSearch:
+    case = block_of_gel((6, 6, 6), (SIDE, SIDE, SIDE), axis=2, mu=1000.0)
+    centres = case.mesh.centres
+    solid = ~((centres > LOW) & (centres < HIGH)).all(axis=1)
+    nodes, corners = np.unique(case.mesh.tetrahedra[solid], return_inverse=True)
+    points = case.mesh.points[nodes]
+    hollow = TetMesh(points, corners.reshape(-1, 4), node_sets={"foot": np.abs(points[:, 2]) < 1e-9})
+    case = replace(case, mesh=hollow)
+    pull = Traction(centre=(0.03, 0.03, HIGH[2]), value=(0.0, 0.0, 1500.0), radius=0.012)
+    model = model_of(replace(case, mechanisms=(pull,)))
+    u = EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u
+    rng = np.random.default_rng(0)
+    at = points[rng.choice(len(points), POINTS, replace=False)]
+    return screened(with_beads(case, u, at, NOISE, rng), "cpu", mesh_error=False, mechanisms=["traction"])
+
+
+def test_each_surface_has_a_fit_of_its_own(search: HypothesisSearch) -> None:
+    names = ("traction",)
+    best = search.get(names)
+    assert best is not None
+    by_surface = {each.effects[0].surface: each for each in (best, *best.alternatives)}
+    assert len(by_surface) == 2
+    [wall] = [surface for surface in by_surface if "outer" not in surface]
+    [outer] = [surface for surface in by_surface if "outer" in surface]
+    alternatives = (replace(by_surface[wall], alternatives=()),)
+    search._sets[frozenset(names)] = replace(by_surface[outer], alternatives=alternatives)
+    search.fit()
+    fitted = search.get(names)
+    assert fitted is not None
+    assert fitted.refit is not None
+    assert fitted.moved
+    assert fitted.effects[0].surface == wall
+    assert np.linalg.norm(fitted.effects[0].proposed.centre - np.array([0.03, 0.03, HIGH[2]])) < 0.01
