@@ -284,10 +284,8 @@ class FitSearch:
             error = finer.error(self.state.hypothesis, self.state)
         except SolveError:
             return known
-        change, renewed = (
-            excess_error(known, error, self.state, self._base.prior),
-            known.with_error(error, self._base.prior),
-        )
+        change = excess_error(known, error, self.state, self._base.prior)
+        renewed = known.with_error(error, self._base.prior)
         if float(np.linalg.norm(self._noise.whitened(change))) > _MATTERS:
             sensors, self.mesh_errors = self.state.sensors, renewed
             self.columns[:, self._layout.tissue] += mesh_by_tissue(sensors, renewed) - mesh_by_tissue(sensors, known)

@@ -28,6 +28,8 @@ from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
 ENOUGH = 1e-3
 #: Change of the tissue [standard deviations] whose error is compared: far more than rounding, little beside the error.
 _STEP = 0.2
+#: The same between two errors whose difference tells a derivative; of less it may be what is left out of balance.
+_APART = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,7 @@ class MeshErrors:
         """
         moved = np.linalg.solve(prior.factor, error.theta - self.error.theta)
         squared = float(moved @ moved)
-        if squared == 0.0:
+        if squared < _APART**2:
             return replace(self, error=error)
         excess = error.less(self.with_tissue(error.theta, self.volume, prior)).times(1.0 / squared)
         by_tissue = (change.plus(excess.times(z)) for z, change in zip(moved.tolist(), self.by_tissue, strict=True))
