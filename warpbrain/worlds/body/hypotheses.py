@@ -289,12 +289,10 @@ class HypothesisSearch:
         return fitted, inherited + fitted.hypothesis.log_evidence - known
 
     def _move(self, fitted: WeightedSet) -> None:
-        """Fit a fitted set where its mechanisms are better placed."""
+        """Fit a fitted set and its alternatives where their mechanisms are better placed; the best of these is kept."""
         self._listener.stage(f"fit at better places: {' and '.join(sorted(fitted.names))}")
-        fits, inherited = [fitted], fitted.inherited_gain or 0.0
-        for alternative in fitted.alternatives:
-            known = alternative.with_evidence(alternative.hypothesis.log_evidence + inherited)
-            fits.append(self._fitted(replace(known, inherited_gain=inherited))[0])
+        gain = fitted.inherited_gain or 0.0
+        fits = [fitted, *(self._fitted(alternative.inheriting(gain))[0] for alternative in fitted.alternatives)]
         moved_fits = (
             moved_about_fit(self.base, self._fitter, fit, self.spacing) for fit in fits if fit.refit is not None
         )
@@ -376,8 +374,7 @@ class HypothesisSearch:
         """Give the gain of a fit to supersets that are not fitted, in the place of that of a fit of fewer causes."""
         for other in list(self._sets.values()):
             if names < other.names and other.refit is None and other.inherited_gain is not None:
-                gained = other.with_evidence(other.hypothesis.log_evidence - other.inherited_gain + gain)
-                self._sets[other.names] = replace(gained, inherited_gain=gain)
+                self._sets[other.names] = other.inheriting(gain)
 
     def _fitted_subset(self, candidate: WeightedSet) -> WeightedSet | None:
         """The fitted set whose fit the linear model of another is about; None if that is about the base."""
@@ -474,12 +471,16 @@ def _weighed(
 
 
 def _keep_better(sets: dict[frozenset[str], WeightedSet], candidate: WeightedSet) -> None:
-    """Put a set among others by its names, unless the same is there with as much evidence."""
+    """Put a set among others by its names, unless the same is there with as much evidence.
+
+    That of less evidence is an alternative of the other where a single cause has another placement.
+    """
     known = sets.get(candidate.names)
     if known is None:
         sets[candidate.names] = candidate
         return
-    better, other = sorted((candidate, known), key=lambda each: -each.hypothesis.log_evidence)
+    is_better = candidate.hypothesis.log_evidence > known.hypothesis.log_evidence
+    better, other = (candidate, known) if is_better else (known, candidate)
     alternatives = (*better.alternatives, other, *other.alternatives) if len(better.names) == 1 else ()
     sets[better.names] = better.with_alternatives(alternatives)
 

@@ -28,7 +28,8 @@ from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
 ENOUGH = 1e-3
 #: Change of the tissue [standard deviations] whose error is compared: far more than rounding, little beside the error.
 _STEP = 0.2
-#: The same between two errors whose difference tells a derivative; of less it may be what is left out of balance.
+#: Least change of the tissue [standard deviations] by which derivatives are updated: the difference of nearer errors
+#: may be that of out-of-balance forces.
 _APART = 0.02
 
 
@@ -50,10 +51,11 @@ class MeshErrors:
         return error if volume == self.volume else error.plus(self.by_volume.times(volume - self.volume))
 
     def with_error(self, error: Difference, prior: Gaussian) -> MeshErrors:
-        """The same about other tissue, where the error was computed anew.
+        """Linear about the tissue of an error that was computed anew.
 
-        Its derivative becomes that which the difference of both is in proportion to (Broyden 1965): where a body gives
-        way the error may double by a tenth less of stiffness, and fits would go to and fro between two of them.
+        The derivatives by the tissue take Broyden's rank-one update (1965), by which both errors are met. Near the
+        collapse of a body its error may double where tissue is a tenth softer, and fits that kept the derivatives at
+        the base would alternate between two states.
         """
         moved = np.linalg.solve(prior.factor, error.theta - self.error.theta)
         squared = float(moved @ moved)

@@ -31,7 +31,7 @@ def moved_about_fit(base: Base, fitter: Fitter, fitted: WeightedSet, spacing: fl
     """
     fitted, refit = replace(fitted, moved=True), fitted.refit
     assert refit is not None
-    if not any(effect.is_placed for effect in fitted.effects):
+    if not fitted.is_placed:
         return fitted
     try:
         about = LinearInPlaces(base, fitter, refit, spacing)

@@ -8,7 +8,7 @@ Where a body moves far the linear model says little of any cause: `bend_of`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
@@ -73,13 +73,22 @@ def far_from_linear(sets: Sequence[WeightedSet], bend: float) -> WeightedSet | N
     `sets`: with that of no cause. `bend`: see `bend_of`: of what is at stake, the evidence of the best set over that of
     nothing.
     """
+    single = [s for s in sets if len(s.names) == 1 and s.acting and s.refit is None and not s.failure]
+    return _first_that_may_be_best(sorted(single, key=lambda s: -s.hypothesis.log_evidence), sets, bend)
+
+
+def _first_that_may_be_best(
+    candidates: Iterable[WeightedSet], sets: Sequence[WeightedSet], part: float
+) -> WeightedSet | None:
+    """The first candidate that is as probable as the best of all sets if its log evidence is wrong; None if none is.
+
+    The error of a linear model is in proportion to what it explains: it is taken to be the `part` of the difference
+    between the log evidence of the best set and that of no cause.
+    """
     nothing = next(candidate.hypothesis.log_evidence for candidate in sets if not candidate.names)
     best = max(candidate.hypothesis.log_evidence for candidate in sets)
-    single = [s for s in sets if len(s.names) == 1 and s.acting and s.refit is None and not s.failure]
-    likely = max(single, key=lambda candidate: candidate.hypothesis.log_evidence, default=None)
-    if likely is None or likely.hypothesis.log_evidence + bend * (best - nothing) < best:
-        return None
-    return likely
+    least = best - part * (best - nothing)
+    return next((candidate for candidate in candidates if candidate.hypothesis.log_evidence >= least), None)
 
 
 def _decide(
@@ -124,7 +133,7 @@ def _unknown_not_fitted(
     a finite rigid rotation does to second order looks like an unknown force. Of any the likeliest set of mechanisms
     alone, and the likeliest single one with what may act beside it: sets with the unknown are many, and what a
     mechanism does that is far from linear, such as tissue that relaxes under another one's load, looks like one.
-    Of the unknown alone all single mechanisms that may be as probable, too: `_single_far_from_linear`.
+    Of the unknown alone every single mechanism, too, that may be as probable once it is fitted.
     """
     if decision.verdict != UNKNOWN and not (decision.verdict == NAMED_AND_REST and UNKNOWN in sets[0].names):
         return None
@@ -135,22 +144,12 @@ def _unknown_not_fitted(
     single = next((s for s in of_mechanisms if len(s.names) == 1), None)
     parts = (s for s in sets if s.names in alone or s is single or s in of_mechanisms[:1])
     part = next((part for part in parts if part.is_open), None)
-    if part is not None or (single is not None and single.names not in expanded):
-        return part or single
-    return _single_far_from_linear(sets) if decision.verdict == UNKNOWN else None
-
-
-def _single_far_from_linear(sets: Sequence[WeightedSet]) -> WeightedSet | None:
-    """The likeliest mechanism alone that is open and may be as probable as the best set; None if there is none.
-
-    By how much the linear model about the base is off is in proportion to what is at stake, the evidence of the best
-    set over that of nothing.
-    """
-    nothing = next(candidate.hypothesis.log_evidence for candidate in sets if not candidate.names)
-    best = max(candidate.hypothesis.log_evidence for candidate in sets)
-    least = best - belief("fits.part") * (best - nothing)
-    singles = (s for s in sets if len(s.names) == 1 == len(s.mechanisms) and s.is_open)
-    return next((single for single in singles if single.hypothesis.log_evidence > least), None)
+    if part is None and single is not None and single.names not in expanded:
+        part = single
+    if part is None and decision.verdict == UNKNOWN:
+        singles = (s for s in sets if len(s.names) == 1 == len(s.mechanisms) and s.is_open)
+        part = _first_that_may_be_best(singles, sets, belief("fits.part"))
+    return part
 
 
 def _rival_without_a_name(decision: Decision, sets: Sequence[WeightedSet]) -> WeightedSet | None:

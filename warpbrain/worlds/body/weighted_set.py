@@ -289,7 +289,7 @@ class WeightedSet:
     moved: bool = False  # whether its mechanisms were moved to where they are better placed
     #: Where these are, by the numbers of their effects, in the model that is linear about the fit.
     places: Mapping[int, LikelyPlaces] = field(default_factory=dict)
-    #: The same causes where no fit comes to from here: see `with_alternatives`.
+    #: The same causes with other placements, which no fit leads to from this one; see `with_alternatives`.
     alternatives: tuple[WeightedSet, ...] = ()
     #: Log of the part of the cells of these places in the evidence, which is a sum over all places. What a fit, or one
     #: at another place of a cell, gains is taken to be gained by the whole cell: its likely places move about in it.
@@ -313,9 +313,12 @@ class WeightedSet:
     @property
     def may_move(self) -> bool:
         """Whether it is fitted, and other places of its mechanisms were not looked at."""
-        if self.refit is None or self.moved:
-            return False
-        return bool(self.alternatives) or any(effect.is_placed for effect in self.effects)
+        return self.refit is not None and not self.moved and (self.is_placed or bool(self.alternatives))
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether any of its causes acts in a place."""
+        return any(effect.is_placed for effect in self.effects)
 
     def has_placed(self, cause: str) -> bool:
         """Whether a cause acts in a place, with a size of its own there."""
@@ -346,6 +349,12 @@ class WeightedSet:
             return self.refit.residual
         return np.asarray(self.residual - self.columns @ self.coordinates)
 
+    def inheriting(self, gain: float) -> WeightedSet:
+        """The set, not fitted yet, with the gain [nats] of a fit of fewer causes in the place of an earlier one."""
+        assert self.inherited_gain is not None
+        log_evidence = self.hypothesis.log_evidence - self.inherited_gain + gain
+        return replace(self.with_evidence(log_evidence), inherited_gain=gain)
+
     def with_evidence(self, log_evidence: float) -> WeightedSet:
         """The same with another log evidence."""
         return replace(self, hypothesis=replace(self.hypothesis, log_evidence=log_evidence))
@@ -363,23 +372,23 @@ class WeightedSet:
         )
 
     @property
-    def extent(self) -> tuple[bool, frozenset[str]]:
-        """Whether any effect is in one place, and the surfaces on which these are."""
-        return any(e.is_placed for e in self.effects), frozenset(e.surface for e in self.effects if e.surface)
+    def placement(self) -> tuple[bool, frozenset[str]]:
+        """Whether any of its causes acts in a place, not throughout the body, and the surfaces of these places."""
+        return self.is_placed, frozenset(effect.surface for effect in self.effects if effect.surface)
 
     def with_alternatives(self, others: Iterable[WeightedSet]) -> WeightedSet:
-        """The set, with the first of each other extent of the same causes elsewhere.
+        """The set, with `alternatives`: of `others`, which have the same causes, the first of each other placement.
 
-        No fit changes a field into a source, or goes from one surface to another: each has an optimum of its own. What
-        has a name must not be farther behind in the linear model than moving is known to gain. Of what has none that
-        model knows less, which does not know its size.
+        A fit does not lead from a field to a source, nor from one surface to another: each has a local optimum of its
+        own. An alternative of mechanisms is left out if its log evidence in the linear model is less by more than
+        fits at better places gain (`fits.moved`). One of the unknown is not: its size is not that of the linear model.
         """
-        by_extent = {self.extent: self}
+        by_placement = {self.placement: self}
         least = self.marginal.log_evidence - belief("fits.moved")
         for other in others:
             if UNKNOWN in self.names or other.marginal.log_evidence > least:
-                by_extent.setdefault(other.extent, replace(other, alternatives=()))
-        return replace(self, alternatives=tuple(by_extent.values())[1:])
+                by_placement.setdefault(other.placement, replace(other, alternatives=()))
+        return replace(self, alternatives=tuple(by_placement.values())[1:])
 
     def with_gain(self, gain: float) -> WeightedSet:
         """The set whose log evidence at its own places is larger by a gain [nats], and in other cells is as it was.
