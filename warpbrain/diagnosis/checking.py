@@ -296,4 +296,4 @@ def _mesh_error(base: Base, known: MeshErrors, fit: Refit) -> Difference:
             return expected(known.finer.error(hypothesis, fit.state))
         except SolveError:
             pass
-    return expected(known.of(hypothesis, base.prior))
+    return expected(known.of(hypothesis.theta, base.prior))

@@ -19,11 +19,11 @@ def test_a_larger_ball_is_one_with_a_larger_radius_in_part(small_diagnosis):
     base = search.base
     ball, _ = _ball_and_weight(search)
     proposed, z = ball.proposed, np.array([0.7])
-    columns = columns_of_other_shapes(base.at, [ball], [z], base.mesh_errors)
+    columns = columns_of_other_shapes(base.at, [ball], [z])
     here, larger = base.effects.of([proposed, proposed.elsewhere(proposed.centre, 1.25 * proposed.radius)])
     expected = belief("causes.shape") / np.sqrt(SHAPE_MODES) * 0.7 * (larger.columns[:, 0] - here.columns[:, 0])
     np.testing.assert_allclose(columns[:, 1], expected, atol=1e-6 * np.abs(here.columns).max())
-    twice = columns_of_other_shapes(base.at, [ball], [2.0 * z], base.mesh_errors)
+    twice = columns_of_other_shapes(base.at, [ball], [2.0 * z])
     np.testing.assert_allclose(twice, 2.0 * columns, rtol=1e-9)
 
 
@@ -32,7 +32,7 @@ def test_what_acts_everywhere_has_no_shape(small_diagnosis):
     base = search.base
     ball, weight = _ball_and_weight(search)
     z = [np.zeros(len(weight.proposed.mean)), np.ones(1)]
-    columns = columns_of_other_shapes(base.at, [weight, ball], z, base.mesh_errors)
+    columns = columns_of_other_shapes(base.at, [weight, ball], z)
     of_weight, of_ball, of_none = np.split(columns, SHAPED_EFFECTS, axis=1)
     assert not of_weight.any() and not of_none.any()
     assert of_ball.any(axis=0).all() and of_ball.shape[1] == SHAPE_MODES

@@ -214,7 +214,7 @@ class BaseFinder:
             return None
         try:
             self._finer()
-            return FinerStates(self.states).errors(state, other_volume(self.states), self.prior)
+            return FinerStates(self.states).errors(state, self.prior)
         except (SolveError, InputError) as error:
             self._remarks.append(f"the error of the mesh is not known: {error}")
             return None
@@ -226,7 +226,7 @@ class _LinearModel:
     def __init__(self, finder: BaseFinder, state: SolvedState, errors: MeshErrors | None) -> None:
         sensors, states = state.sensors, finder.states
         self.at = state.linearised()
-        self.effects = Effects(self.at, SolvedSwitches(states, state), errors)
+        self.effects = Effects(self.at, SolvedSwitches(states, state))
         # first, since it makes the compliance, with which nuisances are products instead of equilibria
         self.lengths = (finder._spacing * beliefs("unknown.lengths")).tolist()
         self.body_forces = body_forces(self.at, self.lengths)

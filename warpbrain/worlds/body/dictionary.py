@@ -253,7 +253,7 @@ def candidates_about_fit(
 
     `candidates`: at the base. `places`: of each kind, numbers of the places whose columns are made anew.
     """
-    effects = Effects(state.linearised(), mesh_errors=candidates.source.mesh_errors)
+    effects = Effects(state.linearised())
     acting_mechanisms = [effect.proposed.make(effect.proposed.mean) for effect in acting]
     acting_kinds = {mechanism.kind for mechanism in acting_mechanisms if not mechanism.several}
     all_are_held = not any(effect.is_release for effect in acting)

@@ -20,7 +20,6 @@ from warpbrain.simulation.model import substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
-from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer, volume_of
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import SolvedState, States
 
@@ -148,7 +147,6 @@ class Effects:
     """Makes the columns of proposals at one state.
 
     `switches`: needed for proposals that are switches.
-    `mesh_errors`: of the state: less compressible tissue locks more, which is part of the effect of a law.
     `instant`: number of the time of the state.
     `loading`: mechanisms that act beside each proposal by nodal forces. A release is of the reactions to these, too, to
     first order; what they change of other proposals is of second order and left out. `releases`: with which states are
@@ -159,12 +157,11 @@ class Effects:
         self,
         at: Linearisation,
         switches: SolvedSwitches | None = None,
-        mesh_errors: MeshErrors | None = None,
         instant: int = -1,
         loading: Sequence[Mechanism] = (),
         releases: SolvedSwitches | None = None,
     ) -> None:
-        self.at, self.mesh_errors, self._switches, self._instant = at, mesh_errors, switches, instant
+        self.at, self._switches, self._instant = at, switches, instant
         self.loading, self._releases = tuple(loading), releases
         self._internal: Floats | None = None
         # systems of the same state with laws of other kinds, as long as columns are made
@@ -176,12 +173,12 @@ class Effects:
 
     def over(self, at: Linearisation) -> Effects:
         """The same over other sensors at the same state."""
-        return Effects(at, self._switches, self.mesh_errors)
+        return Effects(at, self._switches)
 
     def beside(self, acting: Sequence[Mechanism]) -> Effects:
         """The same beside those mechanisms that act by nodal forces."""
         loading = [mechanism for mechanism in acting if not _faces(mechanism.__class__).isdisjoint(_PUSHING)]
-        return Effects(self.at, self._switches, self.mesh_errors, self._instant, loading)
+        return Effects(self.at, self._switches, self._instant, loading)
 
     @property
     def solves_releases(self) -> bool:
@@ -191,7 +188,7 @@ class Effects:
     def solving_releases(self, states: States, state: SolvedState) -> Effects:
         """The same, with an equilibrium solved for each release, from the `state` that these effects are about."""
         solved = SolvedSwitches(states, state)
-        return Effects(self.at, self._switches, self.mesh_errors, self._instant, self.loading, solved)
+        return Effects(self.at, self._switches, self._instant, self.loading, solved)
 
     @cached_property
     def _further_reactions(self) -> Floats | None:
@@ -212,9 +209,8 @@ class Effects:
         each_once, by_moment = list({id(base): base for base in bases}.values()), []
         for moment in self.at.moments:
             at = moment.at
-            switches, errors, loading = self._switches, self.mesh_errors, self.loading
             there = at is self.at
-            here = self if there else Effects(at, switches, errors, moment.number, loading, self._releases)
+            here = self if there else Effects(at, self._switches, moment.number, self.loading, self._releases)
             by_moment.append(here._at_one_time(each_once, present, columns_alone))
         return [
             self._over_time(proposal, [effects[id(base)] for effects in by_moment])
@@ -367,21 +363,7 @@ class Effects:
                 weighted = (matrix @ sums[numbers]).tocsc()
                 some = np.flatnonzero(np.diff(weighted.indptr))
                 total[:, some] += answers(weighted[:, some])
-        if self.mesh_errors is not None and (volumes := self._volumes(mechanisms)).any():
-            total += expected_answer(at.sensors, self.mesh_errors.by_volume)[:, None] * (volumes @ sums)
         return total
-
-    def _volumes(self, mechanisms: Sequence[Any]) -> Floats:
-        """By how much `volume_of` the tissue is larger with each mechanism (count,)."""
-        materials = self.at.system.model.materials
-        return np.array(
-            [
-                volume_of(substituted(materials, mechanism)) - volume_of(materials)
-                if Substituting in _faces(mechanism.__class__)
-                else 0.0
-                for mechanism in mechanisms
-            ]
-        )
 
     def _forces(self, mechanism: Any, faces: frozenset[type]) -> Floats:
         """Nodal forces (N, 3) of a mechanism with these faces."""
@@ -438,7 +420,7 @@ def _expanded(columns: Floats, varying: Varying, times: Floats) -> Floats:
     return np.column_stack([columns[:, list(varying.fixed)], *each])
 
 
-def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats, mesh_errors: MeshErrors | None) -> Floats:
+def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats) -> Floats:
     """Columns (n, k) of a proposal that varies, about coefficients (k,) with which it acts."""
     varying = proposal.over_time
     assert varying is not None
@@ -446,7 +428,7 @@ def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats, mesh_err
     def about(moment: Moment) -> Floats:
         here = varying.at(c, moment.time)
         smooth = replace(varying.base, follows="smooth", start=here, sd=_sd_of(proposal, varying))
-        [effect] = Effects(moment.at, mesh_errors=mesh_errors).of([smooth], varying.base.make(here))
+        [effect] = Effects(moment.at).of([smooth], varying.base.make(here))
         return _expanded(effect.columns, varying, moment.times)
 
     return at.summed_in_time(about)

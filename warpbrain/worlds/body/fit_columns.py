@@ -86,14 +86,14 @@ def columns_about(
     tissue = relaxed * tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
     columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)
     columns[:, layout.field] = relaxed * field_columns(at, base.states)
-    made = Effects(at, mesh_errors=mesh_errors)
+    made = Effects(at)
     first = layout.coefficients.start
     for effect, part in zip(effects, layout.effects, strict=True):
         c = effect.coefficients(z[part])
         if effect.columns_at is not None:
             columns[:, part] = effect.columns_at(c)
         elif effect.proposed.over_time is not None:
-            columns[:, part] = columns_over_time(at, effect.proposed, c, mesh_errors)
+            columns[:, part] = columns_over_time(at, effect.proposed, c)
         elif not effect.proposed.is_there_or_not:
             there = {"mean": c} if effect.proposed.changes_in_time else {"follows": "smooth", "start": c}
             about = made.of([replace(effect.proposed, **there)], effect.proposed.make(c), columns_alone=True)[0]
@@ -114,7 +114,7 @@ def with_shapes_about(fit: Refit, nuisances: Nuisances, sensors: Sensors, base: 
         at = fit.state.linearised(sensors)
     except SolveError:
         return columns
-    columns[:, nuisances.shapes] = shape_columns_about(at, fit.effects, fit.coefficients, base.states, base.mesh_errors)
+    columns[:, nuisances.shapes] = shape_columns_about(at, fit.effects, fit.coefficients, base.states)
     return columns
 
 
@@ -123,7 +123,6 @@ def shape_columns_about(
     effects: Sequence[Effect],
     coefficients: Sequence[Floats],
     states: States,
-    mesh_errors: MeshErrors | None,
 ) -> Floats:
     """Columns (n, k) of the shape of laws and of mechanisms about a state with effects that have these coefficients.
 
@@ -132,9 +131,9 @@ def shape_columns_about(
     `SharedParameter` is zero.
     """
     relaxed = _relaxation_factor(effects, coefficients, at.sensors)
-    columns = relaxed * law_columns(Effects(at, mesh_errors=mesh_errors), states)
+    columns = relaxed * law_columns(Effects(at), states)
     columns[:, [each.column for each in map(shared_parameter, effects) if each is not None]] = 0.0
-    return np.hstack([columns, columns_of_other_shapes(at, effects, coefficients, mesh_errors)])
+    return np.hstack([columns, columns_of_other_shapes(at, effects, coefficients)])
 
 
 def _relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats], sensors: Sensors) -> Floats:

@@ -330,7 +330,7 @@ class FitSearch:
         part, before = self._layout.shapes, self._U[:, self._layout.shapes]
         if self._about is not None:
             at, coefficients = self._about
-            self._shapes = shape_columns_about(at, self.effects, coefficients, self._base.states, self.mesh_errors)
+            self._shapes = shape_columns_about(at, self.effects, coefficients, self._base.states)
             self._about = None
             change = self._base.model.whitened(self._shapes - before)
             # about the same point they are the same but for rounding, which undoes nothing
@@ -450,7 +450,7 @@ class FitSearch:
                 patches.append(effect.proposed.patch)
         theta = base.prior.mean + base.prior.factor @ z[layout.tissue]
         hypothesis = Hypothesis(theta, z[layout.field], tuple(mechanisms), tuple(patches))
-        error = None if mesh is None else expected(mesh.of(hypothesis, base.prior))
+        error = None if mesh is None else expected(mesh.of(theta, base.prior))
         state = self._solve(hypothesis, z[layout.nonlinear], nearby, error)
         self._course = state.course or self._course
         q = self._U.shape[1]

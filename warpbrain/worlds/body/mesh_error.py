@@ -2,15 +2,16 @@
 
 Linear tetrahedra are too stiff, and to a different degree for each mechanism: of a pressure in a cavity a coarse mesh
 loses far more than of weight. So the error is computed with the mechanism that is fitted, whose size would be wrong
-by as much otherwise. It also depends on the tissue: on stiffness as the displacement does, but not uniformly, and on
-compressibility more than the displacement does. The columns of stiffness and compressibility include these changes, or
-a tenth more stiffness would be taken for something that is missing.
+by as much otherwise. It also depends on the tissue, on stiffness as the displacement does, but not uniformly: columns
+of stiffness include these changes, or a tenth more of it would be taken for something that is missing.
+
+How it depends on compressibility is left to the share of a mechanism that says another one. Its derivative at the base
+is several times too large or too small about another state where the body is near to giving way, and what tissue that
+is less compressible than declared does there would be taken for a fluid in its pores.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +19,6 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.estimation.finer_mesh import ROUGH, Difference, Discretisation, FinerMesh
 from warpbrain.estimation.parameters import Gaussian
-from warpbrain.physics.proposal import Proposal
-from warpbrain.simulation.model import Material
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
 
@@ -38,17 +37,15 @@ class MeshErrors:
     """The error of the mesh at a state, and how it changes."""
 
     error: Difference  # at that state
-    volume: float  # `volume_of` the tissue there
-    by_volume: Difference  # its derivative by that
     by_tissue: tuple[Difference, ...]  # its derivative by each standard normal coordinate of the tissues' prior
     finer: FinerStates  # which compute it at other states
 
-    def with_tissue(self, theta: Floats, volume: float, prior: Gaussian) -> Difference:
-        """The error with other tissue (p,) of another `volume_of`, without the share of mechanisms."""
+    def of(self, theta: Floats, prior: Gaussian) -> Difference:
+        """The error of other tissue (p,), to first order, without the share of mechanisms."""
         error = self.error
         for z, change in zip(np.linalg.solve(prior.factor, theta - error.theta), self.by_tissue, strict=True):
             error = error.plus(change.times(float(z)))
-        return error if volume == self.volume else error.plus(self.by_volume.times(volume - self.volume))
+        return error
 
     def with_error(self, error: Difference, prior: Gaussian) -> MeshErrors:
         """Linear about the tissue of an error that was computed anew.
@@ -61,18 +58,9 @@ class MeshErrors:
         squared = float(moved @ moved)
         if squared < _APART**2:
             return replace(self, error=error)
-        excess = error.less(self.with_tissue(error.theta, self.volume, prior)).times(1.0 / squared)
+        excess = error.less(self.of(error.theta, prior)).times(1.0 / squared)
         by_tissue = (change.plus(excess.times(z)) for z, change in zip(moved.tolist(), self.by_tissue, strict=True))
         return replace(self, error=error, by_tissue=tuple(by_tissue))
-
-    def of(self, hypothesis: Hypothesis, prior: Gaussian) -> Difference:
-        """The error that the tissue of a hypothesis has, to first order."""
-        return self.with_tissue(hypothesis.theta, volume_of(self.finer.states.materials(hypothesis)), prior)
-
-
-def volume_of(materials: Mapping[int, Material]) -> float:
-    """`-ln(1 - 2 nu)` in the mean of tissues: nearly the logarithm of bulk over shear moduli."""
-    return -float(np.mean([math.log1p(-2.0 * material.poisson) for material in materials.values()]))
 
 
 def expected(known: Difference) -> Difference:
@@ -97,17 +85,14 @@ class FinerStates:
         """Let go of the finer mesh and of all that was computed on it; a further error makes them anew."""
         self._finer = FinerMesh(self.states.device)
 
-    def errors(self, state: SolvedState, volume: Proposal, prior: Gaussian) -> MeshErrors:
-        """The error of a state, and its derivatives by the tissue and by its `volume_of`; `SolveError` as `error`."""
+    def errors(self, state: SolvedState, prior: Gaussian) -> MeshErrors:
+        """The error of a state, and its derivatives by the tissue; `SolveError` as `error`."""
         error, hypothesis = self.error(state.hypothesis, state), state.hypothesis
-        less_compressible = volume.make(volume.mean + volume.sd)
-        other = self.error(replace(hypothesis, mechanisms=(*hypothesis.mechanisms, less_compressible)), state)
         by_tissue = []
         for axis in prior.factor.T:
             shifted = self.error(replace(hypothesis, theta=hypothesis.theta + _STEP * axis), state)
             by_tissue.append(shifted.less(error).times(1.0 / _STEP))
-        by_volume = other.less(error).times(1.0 / float(volume.sd[0]))
-        return MeshErrors(error, volume_of(self.states.materials(hypothesis)), by_volume, tuple(by_tissue), self)
+        return MeshErrors(error, tuple(by_tissue), self)
 
     def error(self, hypothesis: Hypothesis, nearby: SolvedState, tolerance: float = ROUGH) -> Difference:
         """The error of a hypothesis with a uniform stiffness within tissues, on which it hardly depends.

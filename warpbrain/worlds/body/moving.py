@@ -65,7 +65,7 @@ class LinearInPlaces:
             if effect.is_placed
         }
         each = [
-            place.columns(self._about, refit.effects[number], refit.coefficients[number], fitter.mesh_errors)
+            place.columns(self._about, refit.effects[number], refit.coefficients[number])
             for number, place in self._placed.items()
         ]
         self._first = refit.marginal.model.columns.shape[1]

@@ -15,7 +15,6 @@ from warpbrain.recordings.closest import closest_points
 from warpbrain.simulation.model import Model
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
-from warpbrain.worlds.body.mesh_error import MeshErrors
 
 #: Radii in a cell relative to that of the scan, whose radii are half as large again as each other.
 RADII = (0.8, 1.0, 1.25)
@@ -47,7 +46,7 @@ class PlaceCoordinates:
         there = self.at(p)
         return replace(effect, proposal=replace(there, sd=effect.size * there.sd))
 
-    def columns(self, at: Linearisation, effect: Effect, z: Floats, mesh_errors: MeshErrors | None) -> Floats:
+    def columns(self, at: Linearisation, effect: Effect, z: Floats) -> Floats:
         """Derivatives (n, 4) of what is recorded, about a state where the effect acts with coefficients z (k,)."""
         c, varying, none = effect.coefficients(z), effect.proposed.over_time, np.zeros(4)
 
@@ -59,7 +58,7 @@ class PlaceCoordinates:
                 return proposal if proposal.over_time is None else proposal.over_time.base
 
             moving = Proposal(lambda p: base(p).make(here), none, np.ones(4), "smooth", none)
-            made = Effects(moment.at, mesh_errors=mesh_errors)
+            made = Effects(moment.at)
             [moved] = made.of([moving], moving.make(none), columns_alone=True)
             return moved.columns
 

@@ -16,7 +16,6 @@ from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.nuisances import SHAPE_MODES, SHAPED_EFFECTS
 from warpbrain.worlds.body.places import places_about
 
@@ -24,16 +23,14 @@ from warpbrain.worlds.body.places import places_about
 _BESIDE = 0.5
 
 
-def columns_of_other_shapes(
-    at: Linearisation, effects: Sequence[Effect], coefficients: Sequence[Floats], mesh_errors: MeshErrors | None
-) -> Floats:
+def columns_of_other_shapes(at: Linearisation, effects: Sequence[Effect], coefficients: Sequence[Floats]) -> Floats:
     """Change of what is recorded (n, k) by each mode of shape of mechanisms, about a state with these coefficients.
 
     Each column moves a part of what acts to a neighbouring place or another radius, all together
     `belief("causes.shape")`. Zero of what is everywhere, is there or not, or has a course in time.
     """
     columns = np.zeros((len(at.sensors), SHAPED_EFFECTS, SHAPE_MODES))
-    made = Effects(at, mesh_errors=mesh_errors)
+    made = Effects(at)
     for number, (effect, z) in enumerate(zip(effects[:SHAPED_EFFECTS], coefficients, strict=False)):
         proposed = effect.proposed
         if not effect.is_placed or proposed.over_time is not None:

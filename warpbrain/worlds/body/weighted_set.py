@@ -75,7 +75,7 @@ class MeshShare:
 
 def excess_error(known: MeshErrors, error: Difference, state: SolvedState, prior: Gaussian) -> Floats:
     """Error of the mesh (n,) in what is recorded, beyond that which the tissue of a state alone is known to have."""
-    return expected_answer(state.sensors, error.less(known.of(state.hypothesis, prior)))
+    return expected_answer(state.sensors, error.less(known.of(state.hypothesis.theta, prior)))
 
 
 def mesh_share_of(
