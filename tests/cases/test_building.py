@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
@@ -137,17 +138,19 @@ def test_every_clinical_case_can_be_built():
 @pytest.mark.slow(90)
 @pytest.mark.xdist_group("building")
 @pytest.mark.parametrize("name", ["phantom", "0529"])
-def test_building_again_gives_the_shipped_meshes(name, tmp_path):
+def test_building_again_gives_the_shipped_meshes(name, tmp_path, monkeypatch):
+    """The first two: the phantom's finer meshes are looked for in the same way, which takes three times as long."""
     for package in ("mmgpy", "nilearn", "nibabel"):
         pytest.importorskip(package)
-    from warpbrain.cases.building.pipeline import versions
+    from warpbrain.cases.building.pipeline import RECIPES, versions
 
     shipped = files("warpbrain") / "cases" / "data" / name
     record = json.loads((shipped / "meshes.json").read_text(encoding="utf-8"))
     if record["versions"] != versions():
         pytest.skip(f"shipped meshes were made with {record['versions']}, here are {versions()}")
+    monkeypatch.setitem(RECIPES, name, replace(RECIPES[name], meshes=RECIPES[name].meshes[:2]))
     folder = build(name, tmp_path)
-    for file in record["meshes"]:
+    for file in json.loads((folder / "meshes.json").read_text(encoding="utf-8"))["meshes"]:
         made, kept = (read_mesh(str(place / f"{file}.vtu"), unit="mm") for place in (folder, shipped))
         np.testing.assert_array_equal(made.tetrahedra, kept.tetrahedra)
         np.testing.assert_allclose(made.points, kept.points, rtol=0, atol=1e-9)
