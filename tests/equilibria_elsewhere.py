@@ -21,7 +21,7 @@ def assert_columns_are_differences(base: Base, place: PlaceCoordinates, effect: 
         acting = place.at(p).acting(effect.coefficients(z))
         return base.states.solve(replace(base.state.hypothesis, mechanisms=tuple(acting)), base.state.u)
 
-    columns = place.columns(state_at(np.zeros(4)).linearised(), effect, z, None)
+    columns = place.columns(state_at(np.zeros(4)).linearised(), effect, z)
     for axis, column in zip(np.eye(4), columns.T, strict=True):
         up, down = (state_at(sign * STEP * axis).sensors.computed for sign in (1.0, -1.0))
         difference = (up - down) / (2.0 * STEP)
