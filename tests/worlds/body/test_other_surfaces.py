@@ -12,6 +12,7 @@ from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
+from warpbrain.worlds.body.placing import with_refined_places
 
 #: Edge [m], noise [m], tracked points.
 SIDE, NOISE, POINTS = 0.06, 4e-4, 40
@@ -34,6 +35,19 @@ def search() -> HypothesisSearch:
     rng = np.random.default_rng(0)
     at = points[rng.choice(len(points), POINTS, replace=False)]
     return screened(with_beads(case, u, at, NOISE, rng), "cpu", mesh_error=False, mechanisms=["traction"])
+
+
+def test_what_an_unlikely_place_gains_is_no_gain_of_all(search: HypothesisSearch) -> None:
+    best = search.get(("traction",))
+    assert best is not None
+    [other] = best.alternatives
+    known, gains = other.hypothesis.log_evidence, []
+    for log_share in (0.0, -30.0):
+        here = replace(other, refined=False, log_share=log_share)
+        refined = with_refined_places(search.base, here, search.spacing, search.base.effects)
+        gains.append(refined.hypothesis.log_evidence - known)
+    assert abs(gains[0]) > 0.1
+    assert abs(gains[1]) < 1e-9
 
 
 def test_each_surface_has_a_fit_of_its_own(search: HypothesisSearch) -> None:

@@ -55,7 +55,7 @@ _ELSEWHERE = 2
 _PLACES_ABOUT_FIT = _SOLVED = 8
 #: How often at most a set is fitted, or its supersets are weighed, as long as any set may be chosen; and as often again
 #: for the set that the verdict rests on, which may be another one after each fit.
-_MOST = 10
+_MOST = 16
 #: By how much [nats] another optimum is better that is worth a fit.
 _BETTER = 1.0
 

@@ -218,7 +218,7 @@ def with_refined_places(
             residual=residual,
             columns=columns,
             marginal=refined,
-        ).with_evidence(candidate.hypothesis.log_evidence + gain)
+        ).with_gain_of_cell(gain)
     return replace(candidate, refined=True)
 
 

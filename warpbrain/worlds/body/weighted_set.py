@@ -397,8 +397,12 @@ class WeightedSet:
         and one place of many at which an effect is found to be another than in the linear model must not count for all
         of them.
         """
+        return self.with_gain_of_cell(gain) if gain > 0.0 else self.with_evidence(self.hypothesis.log_evidence + gain)
+
+    def with_gain_of_cell(self, gain: float) -> WeightedSet:
+        """The same where a loss is of its own places alone, too."""
         log_share, of_all = self.log_share, gain
-        if gain > 0.0 and log_share < 0.0:
+        if log_share < 0.0:
             of_all = float(np.logaddexp(log_share + gain, np.log(-np.expm1(log_share))))
             log_share = min(log_share + gain - of_all, 0.0)
         return replace(self.with_evidence(self.hypothesis.log_evidence + of_all), log_share=log_share)
