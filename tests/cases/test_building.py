@@ -139,7 +139,7 @@ def test_every_clinical_case_can_be_built():
 @pytest.mark.xdist_group("building")
 @pytest.mark.parametrize("name", ["phantom", "0529"])
 def test_building_again_gives_the_shipped_meshes(name, tmp_path, monkeypatch):
-    """The first two: the phantom's finer meshes are looked for in the same way, which takes three times as long."""
+    """The first two: the phantom's finer meshes are looked for in the same way."""
     for package in ("mmgpy", "nilearn", "nibabel"):
         pytest.importorskip(package)
     from warpbrain.cases.building.pipeline import RECIPES, versions
