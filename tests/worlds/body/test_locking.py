@@ -7,6 +7,7 @@ import pytest
 from sinking_block import write_sinking
 
 from warpbrain.estimation.options import Listener
+from warpbrain.physics.mechanisms.compressibility import Compressibility
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.worlds.body.base import Base, BaseFinder
 from warpbrain.worlds.body.nuisances import LAW, other_volume
@@ -20,6 +21,14 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> Base:
     weight = Gravity(direction=(0.0, 0.0, -1.0), density=1000.0, csf_level=0.03)
     states = States(replace(case, mechanisms=(weight,)), "cpu")
     return BaseFinder(states, 0.01, True, False, Listener()).find()
+
+
+def test_how_the_error_depends_on_compressibility_is_left_to_the_share_of_mechanisms(base: Base) -> None:
+    known, here = base.mesh_errors, base.state.hypothesis
+    assert known is not None
+    stiffer = replace(here, mechanisms=(Compressibility(poisson=0.46),))
+    share = known.finer.error(stiffer, base.state).less(known.of(stiffer.theta, base.prior))
+    assert share.size > 0.02 * known.error.size
 
 
 def test_the_candidate_changes_what_the_nuisance_does(base: Base) -> None:

@@ -58,8 +58,7 @@ class PlaceCoordinates:
                 return proposal if proposal.over_time is None else proposal.over_time.base
 
             moving = Proposal(lambda p: base(p).make(here), none, np.ones(4), "smooth", none)
-            made = Effects(moment.at)
-            [moved] = made.of([moving], moving.make(none), columns_alone=True)
+            [moved] = Effects(moment.at).of([moving], moving.make(none), columns_alone=True)
             return moved.columns
 
         return at.summed_in_time(about)

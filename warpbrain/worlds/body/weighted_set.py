@@ -400,7 +400,7 @@ class WeightedSet:
         return self.with_gain_of_cell(gain) if gain > 0.0 else self.with_evidence(self.hypothesis.log_evidence + gain)
 
     def with_gain_of_cell(self, gain: float) -> WeightedSet:
-        """The same where a loss is of its own places alone, too."""
+        """The set whose log evidence in the cells of its places alone is larger by a gain, or less by a loss [nats]."""
         log_share, of_all = self.log_share, gain
         if log_share < 0.0:
             of_all = float(np.logaddexp(log_share + gain, np.log(-np.expm1(log_share))))
