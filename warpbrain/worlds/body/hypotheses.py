@@ -54,8 +54,8 @@ _ELSEWHERE = 2
 #: Places of each cause whose columns are made anew about a fit, and of releases for which states are solved.
 _PLACES_ABOUT_FIT = _SOLVED = 8
 #: How often at most a set is fitted, or its supersets are weighed, as long as any set may be chosen; and as often again
-#: for the set that the verdict rests on, which may be another one after each fit. A limit of time: 32 of 183 concealed
-#: cases (runs 33 and 34) came to the end of 10, with sets left that a fit might have made the likeliest.
+#: for the set that the verdict rests on, which may be another one after each fit. A limit of time: 32 of the
+#: referee's 183 cases (runs 33 and 34) came to the end of 10, with sets left that a fit might have made the likeliest.
 _MOST = 16
 #: By how much [nats] another optimum is better that is worth a fit.
 _BETTER = 1.0
