@@ -76,7 +76,7 @@ def test_no_set_that_is_not_fitted_would_change_the_verdict(search):
     for one in search.weighted_sets:
         if one.refit is not None or one.failure:
             continue
-        for change in (-belief("fits.change"), belief("fits.change")):
+        for change in (-one.linear_error, one.linear_error):
             others = [
                 other.with_evidence(other.hypothesis.log_evidence + change * (other is one)).hypothesis
                 for other in search.weighted_sets

@@ -5,20 +5,34 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis, Kind
 from warpbrain.worlds.body.stopping import next_to_fit
-from warpbrain.worlds.body.weighted_set import WeightedSet
+from warpbrain.worlds.body.weighted_set import SetMarginal, WeightedSet
 
 KINDS = {"registration": Kind.NOT_PHYSICS, "unknown": Kind.UNKNOWN}
 
 
-def weighted(log_evidence, *names, fitted=False, failure=""):
+def weighted(log_evidence, *names, fitted=False, failure="", moves=100.0):
+    """A set of which one row is recorded; `moves`: what its causes move of it, in standard deviations of the noise."""
     kinds = tuple(KINDS.get(name, Kind.PHYSICS) for name in names)
     hypothesis = Hypothesis(names, kinds, log_evidence, -3.0 * len(names), None)
-    nothing, acting = np.zeros(0), hypothesis.of_kind(Kind.PHYSICS)
-    return WeightedSet(hypothesis, acting, (), nothing, np.zeros((0, 0)), None, object() if fitted else None, failure)
+    columns, residual = np.array([[moves]]), np.array([moves])
+    model = GaussianModel(np.ones((1, 1)), columns)
+    marginal = SetMarginal(log_evidence, 1.0, np.ones(1), model, 1, (0, 0))
+    return WeightedSet(
+        hypothesis,
+        hypothesis.of_kind(Kind.PHYSICS),
+        (),
+        residual,
+        columns,
+        marginal,
+        object() if fitted else None,
+        failure,
+        further=np.arange(1),
+    )
 
 
 def in_a_place(candidate):
@@ -107,6 +121,24 @@ def test_after_many_fits_only_what_the_verdict_rests_on_is_fitted():
 
 def test_nothing_is_fitted_where_no_fit_can_change_the_verdict():
     assert following(weighted(0.0, fitted=True), weighted(-8.0, "pressure")) is None
+
+
+def test_a_linear_model_is_wrong_by_a_part_of_what_causes_move():
+    errors = [weighted(0.0, "traction", moves=moves).linear_error for moves in (1e-3, 0.1, 2.0, 10.0, 1000.0)]
+    assert errors == sorted(errors)
+    assert errors[0] < 1e-3 and errors[-1] == belief("fits.change")
+    # a standard deviation of what is left, and half of its square
+    error = belief("fits.not_linear") * np.hypot(4.0 * 4.0 * 4.0 / 17.0, 4.0 / np.sqrt(17.0))
+    np.testing.assert_allclose(weighted(0.0, "traction", moves=4.0).linear_error, error + 0.5 * error**2)
+    beside_a_fit = replace(weighted(0.0, "traction", moves=1000.0), further=np.zeros(0, dtype=np.int64))
+    assert beside_a_fit.linear_error == 0.0
+
+
+def test_a_cause_that_hardly_moves_anything_is_not_fitted():
+    nothing, named = weighted(0.0, fitted=True), weighted(30.0, "pressure", fitted=True)
+    rival, hardly = (weighted(32.0, "pressure", "contact", moves=moves) for moves in (100.0, 0.1))
+    assert following(nothing, named, rival, expanded=[("pressure",)]) == ["contact", "pressure"]
+    assert following(nothing, named, hardly, expanded=[("pressure",)]) is None
 
 
 def test_what_a_verdict_rests_on_is_looked_at_in_other_places():

@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Ints
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.causes import Hypothesis, Member
 from warpbrain.inference.gross_errors import log_densities_of
@@ -157,16 +157,17 @@ class Weighing:
         """The same as if its best configuration stood for all places."""
         acting, effects, residual, columns, further, result = self._at(hypothesis.best.members, hypothesis.best.scale)
         values, log_prior = scales()
-        log_screened = screened.with_columns(further).log_marginal(residual, values, log_prior)
+        log_screened = screened.with_columns(columns[:, further]).log_marginal(residual, values, log_prior)
         log_evidence = hypothesis.log_evidence + result.log_evidence - log_screened
-        return WeightedSet(replace(hypothesis, log_evidence=log_evidence), acting, effects, residual, columns, result)
+        hypothesis = replace(hypothesis, log_evidence=log_evidence)
+        return WeightedSet(hypothesis, acting, effects, residual, columns, result, further=further)
 
     def _acting_with(
         self, members: tuple[Member, ...], scale: float
-    ) -> tuple[tuple[str, ...], tuple[Effect, ...], Floats, Floats, Floats, SetMarginal]:
+    ) -> tuple[tuple[str, ...], tuple[Effect, ...], Floats, Floats, Ints, SetMarginal]:
         """Names of what acts, effects, residual (n,) and columns (n, q + k) with members of a hypothesis.
 
-        And columns (n, k) of these alone, and the evidence, whose sum begins at a scale of the noise.
+        And numbers (k,) of the columns of these, and the evidence, whose sum begins at a scale of the noise.
         """
         causes, effects = self._causes, [self._causes.effect(member) for member in members]
         linear = [causes.columns(member) for member, effect in zip(members, effects, strict=True) if effect is None]
@@ -175,13 +176,13 @@ class Weighing:
         residual = self._residual - sum(
             (causes.mean(member) for member in members), start=np.zeros(len(self._residual))
         )
-        blocks = [*linear, *(effect.columns for effect in added)]
-        further = np.column_stack(blocks) if members else np.zeros((len(residual), 0))
         # nuisances, linear causes, effects: those that act already come first
         split = self._columns.shape[1] - width_of(self._acting)
         before, after = np.hsplit(self._columns, [split])
         columns = np.column_stack([before, *linear, after, *(effect.columns for effect in added)])
         columns, result = evidence_of(self._base, columns, residual, scale, self._sizes)
+        width, of_linear = columns.shape[1], sum(of_cause.shape[1] for of_cause in linear)
+        further = np.r_[split : split + of_linear, width - width_of(added) : width].astype(np.int64)
         return (*self._names, *names), (*self._acting, *added), residual, columns, further, result
 
 

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.parameters import Gaussian
@@ -289,6 +289,8 @@ class WeightedSet:
     moved: bool = False  # whether its mechanisms were moved to where they are better placed
     #: Where these are, by the numbers of their effects, in the model that is linear about the fit.
     places: Mapping[int, LikelyPlaces] = field(default_factory=dict)
+    #: Numbers of the columns of causes beside the fit that its linear model is about; of all causes about the base.
+    further: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     #: The same causes with other placements, which no fit leads to from this one; see `with_alternatives`.
     alternatives: tuple[WeightedSet, ...] = ()
     #: Log of the part of the cells of these places in the evidence, which is a sum over all places. What a fit, or one
@@ -348,6 +350,21 @@ class WeightedSet:
         if self.refit is not None:
             return self.refit.residual
         return np.asarray(self.residual - self.columns @ self.coordinates)
+
+    @cached_property
+    def linear_error(self) -> float:
+        """By how much its log evidence may be another one once it is fitted [nats].
+
+        What its causes move, beside those of the fit that its model is linear about, differs from what that model says
+        by a part of it (`fits.not_linear`). Where that is `e` standard deviations of the noise, the log density of rows
+        that are left as the noise is differs by `e z - e^2/2` with a standard normal `z`. Of what moves much no more is
+        known than of all fits (`fits.change`).
+        """
+        mean, covariance = self.marginal.model.coefficients(self.residual)
+        white, among = self.marginal.noise.whitened(self.columns[:, self.further]), np.ix_(self.further, self.further)
+        square = np.sum((white @ mean[self.further]) ** 2) + np.sum((white @ covariance[among]) * white)
+        error = belief("fits.not_linear") * float(np.sqrt(square))
+        return min(error + 0.5 * error**2, belief("fits.change"))
 
     def inheriting(self, gain: float) -> WeightedSet:
         """The set, not fitted yet, with the gain [nats] of a fit of fewer causes in the place of an earlier one."""

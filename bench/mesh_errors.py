@@ -1,0 +1,118 @@
+"""How wrong meshes of a brain are beside what elements of half the size show: the beliefs `mesh.*` of a diagnosis.
+
+    python bench/mesh_errors.py 0529 0603 --meshes FOLDER   # writes results/mesh_errors.csv; some minutes a case
+
+Each case as declared, and under a weight that nothing carries, on its own mesh. The limit of a mesh is where one and
+two refinements of it lead. Of points that move by a fifth of the farthest or more: the error relative to the
+displacement of each point; by how many times the change that a refinement makes it is explained best (`amount`), with a
+field that varies linearly over the body's radius (`shape`); and what is left, root mean square of a component. Beside
+it the limit of *another* mesh of the same anatomy, that of the concealed truths (15,000 nodes or more; made if FOLDER
+lacks it, which needs `pip install 'warpbrain[build]'`): its surface lies elsewhere, too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from warpbrain.arrays import Floats
+from warpbrain.atomic import whole_file
+from warpbrain.cases.case import Case
+from warpbrain.cases.shipped import find_case
+from warpbrain.inference.beliefs import belief
+from warpbrain.mesh import TetMesh
+from warpbrain.mesh.refinement import refined
+from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.physics.mechanisms.resection import Resection
+from warpbrain.recordings.location import locate
+from warpbrain.simulation.equilibrium import EquilibriumSolver
+from warpbrain.simulation.of_case import model_of
+from warpbrain.simulation.system import System
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from concealed.truth_mesh import truth_mesh
+
+RESULTS = Path(__file__).resolve().parent / "results"
+COLUMNS = ("case", "load", "beside", "raw", "amount", "shape_x", "shape_y", "shape_z", "left", "left_95_percent")
+#: Points that move by less than this part of the farthest are left out: of nothing there is no relative error.
+FAR = 0.2
+
+
+def equilibrium(case: Case) -> tuple[TetMesh, Floats]:
+    """The mesh that is simulated, and its displacement (n, 3) [m]."""
+    model = model_of(case)
+    return model.node_mesh, np.asarray(EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u)
+
+
+def refinement(case: Case, times: int) -> tuple[TetMesh, list[Floats]]:
+    """The mesh of a case, and displacements (n, 3) [m] of its nodes by it and after each of several refinements."""
+    mesh, u = equilibrium(case)
+    levels = [u]
+    for _ in range(times):
+        case = replace(case, mesh=refined(case.mesh)[0])
+        finer, u = equilibrium(case)
+        distance, nearest = cKDTree(finer.points).query(mesh.points)
+        assert distance.max() < 1e-9
+        levels.append(u[nearest])
+    return mesh, levels
+
+
+def explained(mesh: TetMesh, levels: list[Floats], limit: Floats) -> tuple[float, ...]:
+    """Relative error of a mesh, amount, shape along each axis, what is left, and 95 % of that."""
+    length = np.linalg.norm(limit, axis=1)
+    far = length > FAR * length.max()
+    places = (mesh.points - mesh.points.mean(axis=0)) / mesh.radius
+    error, change = (limit - levels[0])[far] / length[far, None], (levels[1] - levels[0])[far] / length[far, None]
+    columns = change[:, :, None] * np.column_stack([np.ones(len(places)), places])[far][:, None, :]
+    fitted = np.linalg.lstsq(columns.reshape(-1, 4), error.ravel(), rcond=None)[0]
+    left = error - columns @ fitted
+    return (*(float(v) for v in (rms(error), *fitted, rms(left), np.percentile(np.abs(left), 95.0))),)
+
+
+def rms(values: Floats) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def measured(name: str, meshes: Path) -> list[dict[str, str]]:
+    """Of a case, a row for each load and each limit."""
+    whole = replace(find_case(name), recordings=())
+    resection = tuple(mechanism for mechanism in whole.mechanisms if isinstance(mechanism, Resection))
+    weight = (*resection, Gravity(direction=(0.0, -1.0, 0.0), density=300.0))
+    amount, rows = belief("mesh.amount"), []
+    for load, mechanisms in (("as declared", whole.mechanisms), ("a weight", weight)):
+        case = replace(whole, mechanisms=mechanisms)
+        mesh, levels = refinement(case, 2)
+        other, of_other = refinement(replace(case, mesh=truth_mesh(name, meshes)), 1)
+        there = locate(other.points, other.tetrahedra, mesh.points)
+        limits = {
+            "its limit": levels[1] + amount * (levels[2] - levels[1]),
+            "the limit of another mesh": there.interpolate(of_other[0] + amount * (of_other[1] - of_other[0])),
+        }
+        for beside, limit in limits.items():
+            figures = [f"{value:.4f}" for value in explained(mesh, levels, limit)]
+            rows.append(dict(zip(COLUMNS, (name, load, beside, *figures), strict=True)))
+            print(rows[-1], flush=True)
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("cases", nargs="+")
+    parser.add_argument("--meshes", type=Path, required=True, help="folder of the other meshes")
+    arguments = parser.parse_args()
+    rows = [row for name in arguments.cases for row in measured(name, arguments.meshes)]
+    with whole_file(RESULTS / "mesh_errors.csv") as file, file.open("w", encoding="utf-8") as text:
+        writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()
