@@ -249,10 +249,7 @@ class HypothesisSearch:
         self._listener.stage(f"fit without linearising: {' and '.join(sorted(names)) or 'nothing more'}")
         candidates = [candidate]
         if UNKNOWN in names:
-            for alternative in candidate.alternatives:
-                alternative = replace(alternative, inherited_gain=candidate.inherited_gain)
-                candidates.append(alternative.with_evidence(candidate.hypothesis.log_evidence))
-            candidates = [replace(each, alternatives=()) for each in candidates]
+            candidates = [replace(candidate, alternatives=()), *candidate.inheriting_alternatives]
         fits = map(self._fitted, candidates)
         fitted, gain = max(fits, key=lambda fit: (fit[0].refit is not None, fit[0].hypothesis.log_evidence))
         self._sets[names] = fitted
@@ -292,8 +289,7 @@ class HypothesisSearch:
     def _move(self, fitted: WeightedSet) -> None:
         """Fit a fitted set and its alternatives where their mechanisms are better placed; the best of these is kept."""
         self._listener.stage(f"fit at better places: {' and '.join(sorted(fitted.names))}")
-        gain = fitted.inherited_gain or 0.0
-        fits = [fitted, *(self._fitted(alternative.inheriting(gain))[0] for alternative in fitted.alternatives)]
+        fits = [fitted, *(self._fitted(alternative)[0] for alternative in fitted.inheriting_alternatives)]
         moved_fits = (
             moved_about_fit(self.base, self._fitter, fit, self.spacing) for fit in fits if fit.refit is not None
         )

@@ -372,6 +372,11 @@ class WeightedSet:
         log_evidence = self.hypothesis.log_evidence - self.inherited_gain + gain
         return replace(self.with_evidence(log_evidence), inherited_gain=gain)
 
+    @property
+    def inheriting_alternatives(self) -> tuple[WeightedSet, ...]:
+        """`alternatives`, with the gain of a fit of fewer causes that the set itself has."""
+        return tuple(alternative.inheriting(self.inherited_gain or 0.0) for alternative in self.alternatives)
+
     def with_evidence(self, log_evidence: float) -> WeightedSet:
         """The same with another log evidence."""
         return replace(self, hypothesis=replace(self.hypothesis, log_evidence=log_evidence))
