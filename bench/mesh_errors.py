@@ -19,7 +19,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from warpbrain.arrays import Floats
 from warpbrain.atomic import whole_file
@@ -27,11 +26,12 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.refinement import refined
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.resection import Resection
+from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.recordings.location import locate
 from warpbrain.simulation.equilibrium import EquilibriumSolver
+from warpbrain.simulation.mesh_error import FinerCase
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
 
@@ -44,27 +44,27 @@ COLUMNS = ("case", "load", "beside", "raw", "amount", "shape_x", "shape_y", "sha
 FAR = 0.2
 
 
-def equilibrium(case: Case) -> tuple[TetMesh, Floats]:
-    """The mesh that is simulated, and its displacement (n, 3) [m]."""
+def displacement(case: Case) -> Floats:
+    """Of the nodes (n, 3) [m] that are simulated."""
     model = model_of(case)
-    return model.node_mesh, np.asarray(EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u)
+    return np.asarray(EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u)
 
 
 def refinement(case: Case, times: int) -> tuple[TetMesh, list[Floats]]:
-    """The mesh of a case, and displacements (n, 3) [m] of its nodes by it and after each of several refinements."""
-    mesh, u = equilibrium(case)
-    levels = [u]
+    """The mesh that is simulated, and displacements (n, 3) [m] of its nodes by it and after each refinement."""
+    mesh, _ = case.remaining
+    levels = [displacement(case)]
     for _ in range(times):
-        case = replace(case, mesh=refined(case.mesh)[0])
-        finer, u = equilibrium(case)
-        distance, nearest = cKDTree(finer.points).query(mesh.points)
-        assert distance.max() < 1e-9
-        levels.append(u[nearest])
+        case = FinerCase(case).case
+        levels.append(displacement(case)[: len(mesh.points)])
     return mesh, levels
 
 
 def explained(mesh: TetMesh, levels: list[Floats], limit: Floats) -> tuple[float, ...]:
-    """Relative error of a mesh, amount, shape along each axis, what is left, and 95 % of that."""
+    """Figures of `COLUMNS` from `raw` on, relative to the displacement of each point.
+
+    `levels`: displacements (n, 3) [m] by the mesh, and after one refinement. `limit` (n, 3) [m].
+    """
     length = np.linalg.norm(limit, axis=1)
     far = length > FAR * length.max()
     places = (mesh.points - mesh.points.mean(axis=0)) / mesh.radius
@@ -72,24 +72,20 @@ def explained(mesh: TetMesh, levels: list[Floats], limit: Floats) -> tuple[float
     columns = change[:, :, None] * np.column_stack([np.ones(len(places)), places])[far][:, None, :]
     fitted = np.linalg.lstsq(columns.reshape(-1, 4), error.ravel(), rcond=None)[0]
     left = error - columns @ fitted
-    return (*(float(v) for v in (rms(error), *fitted, rms(left), np.percentile(np.abs(left), 95.0))),)
-
-
-def rms(values: Floats) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
+    farthest = float(np.percentile(np.abs(left), 95.0))
+    return root_mean_square(error.ravel()), *fitted.tolist(), root_mean_square(left.ravel()), farthest
 
 
 def measured(name: str, meshes: Path) -> list[dict[str, str]]:
-    """Of a case, a row for each load and each limit."""
+    """Rows of the table by `COLUMNS`: of a case under each load, beside each limit."""
     whole = replace(find_case(name), recordings=())
     resection = tuple(mechanism for mechanism in whole.mechanisms if isinstance(mechanism, Resection))
     weight = (*resection, Gravity(direction=(0.0, -1.0, 0.0), density=300.0))
-    amount, rows = belief("mesh.amount"), []
+    another, amount, rows = truth_mesh(name, meshes), belief("mesh.amount"), []
     for load, mechanisms in (("as declared", whole.mechanisms), ("a weight", weight)):
         case = replace(whole, mechanisms=mechanisms)
         mesh, levels = refinement(case, 2)
-        other, of_other = refinement(replace(case, mesh=truth_mesh(name, meshes)), 1)
+        other, of_other = refinement(replace(case, mesh=another), 1)
         there = locate(other.points, other.tetrahedra, mesh.points)
         limits = {
             "its limit": levels[1] + amount * (levels[2] - levels[1]),

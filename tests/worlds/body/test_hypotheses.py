@@ -85,6 +85,34 @@ def test_no_set_that_is_not_fitted_would_change_the_verdict(search):
             assert losses[verdict] - losses[best] <= belief("fits.regret")
 
 
+def test_fits_that_were_not_worth_their_time_would_not_have_changed_the_verdict(search):
+    """Of all sets that would change it if their evidence were as far off as it ever is."""
+    further = copy.copy(search)
+    further._sets, further._expanded = dict(search._sets), dict(search._expanded)
+    verdict, _ = decide([one.hypothesis for one in search.weighted_sets], search.probabilities, calibration().losses)
+    might_matter = []
+    for one in search.weighted_sets:
+        if one.refit is not None or one.failure:
+            continue
+        for change in (-belief("fits.change"), belief("fits.change")):
+            others = [
+                other.with_evidence(other.hypothesis.log_evidence + change * (other is one)).hypothesis
+                for other in search.weighted_sets
+            ]
+            best, losses = decide(others, calibration().probabilities(others), calibration().losses)
+            if losses[verdict] - losses[best] > belief("fits.regret"):
+                might_matter.append(one)
+    assert might_matter
+    for one in might_matter:
+        further._fit(one.names)
+        fitted = further.get(one.names)
+        assert fitted.refit is not None
+        assert abs(fitted.hypothesis.log_evidence - one.hypothesis.log_evidence) <= one.linear_error
+    hypotheses = [one.hypothesis for one in further.weighted_sets]
+    best, losses = decide(hypotheses, further.probabilities, calibration().losses)
+    assert losses[verdict] - losses[best] <= belief("fits.regret")
+
+
 def test_a_fit_that_has_missed_its_optimum_is_mended_by_one_with_a_cause_more(search):
     """As where points are taken for gross errors: another cause, which does nothing, must not get the gain."""
     mended = copy.copy(search)

@@ -181,8 +181,8 @@ class Weighing:
         before, after = np.hsplit(self._columns, [split])
         columns = np.column_stack([before, *linear, after, *(effect.columns for effect in added)])
         columns, result = evidence_of(self._base, columns, residual, scale, self._sizes)
-        width, of_linear = columns.shape[1], sum(of_cause.shape[1] for of_cause in linear)
-        further = np.r_[split : split + of_linear, width - width_of(added) : width].astype(np.int64)
+        count, linear_count = columns.shape[1], sum(of_cause.shape[1] for of_cause in linear)
+        further = np.r_[split : split + linear_count, count - width_of(added) : count].astype(np.int64)
         return (*self._names, *names), (*self._acting, *added), residual, columns, further, result
 
 

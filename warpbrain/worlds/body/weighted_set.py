@@ -289,7 +289,8 @@ class WeightedSet:
     moved: bool = False  # whether its mechanisms were moved to where they are better placed
     #: Where these are, by the numbers of their effects, in the model that is linear about the fit.
     places: Mapping[int, LikelyPlaces] = field(default_factory=dict)
-    #: Numbers of the columns of causes beside the fit that its linear model is about; of all causes about the base.
+    #: Before it is fitted, numbers of the columns of its causes: of those beside the fit that its linear model is about,
+    #: or of all if that is about the base.
     further: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     #: The same causes with other placements, which no fit leads to from this one; see `with_alternatives`.
     alternatives: tuple[WeightedSet, ...] = ()
@@ -353,12 +354,12 @@ class WeightedSet:
 
     @cached_property
     def linear_error(self) -> float:
-        """By how much its log evidence may be another one once it is fitted [nats].
+        """Expected size of the change of its log evidence by a fit [nats]; of a set that is not fitted.
 
-        What its causes move, beside those of the fit that its model is linear about, differs from what that model says
-        by a part of it (`fits.not_linear`). Where that is `e` standard deviations of the noise, the log density of rows
-        that are left as the noise is differs by `e z - e^2/2` with a standard normal `z`. Of what moves much no more is
-        known than of all fits (`fits.change`).
+        The displacement by its causes (beside those of the fit that the linear model is about) is taken to be wrong by
+        a fraction `fits.not_linear` of its length. Let the error have the length `e` in standard deviations of the
+        noise. Residuals that are noise differ in log density with it and without by `e z` and `e^2 / 2`, `z` standard
+        normal: `e + e^2 / 2` at one standard deviation. At most `fits.change`.
         """
         mean, covariance = self.marginal.model.coefficients(self.residual)
         white, among = self.marginal.noise.whitened(self.columns[:, self.further]), np.ix_(self.further, self.further)
@@ -374,7 +375,7 @@ class WeightedSet:
 
     @property
     def inheriting_alternatives(self) -> tuple[WeightedSet, ...]:
-        """`alternatives`, with the gain of a fit of fewer causes that the set itself has."""
+        """`alternatives`, each with the gain [nats] that this set has inherited from the fit of fewer causes."""
         return tuple(alternative.inheriting(self.inherited_gain or 0.0) for alternative in self.alternatives)
 
     def with_evidence(self, log_evidence: float) -> WeightedSet:
