@@ -289,8 +289,8 @@ class WeightedSet:
     moved: bool = False  # whether its mechanisms were moved to where they are better placed
     #: Where these are, by the numbers of their effects, in the model that is linear about the fit.
     places: Mapping[int, LikelyPlaces] = field(default_factory=dict)
-    #: Before it is fitted, numbers of the columns of its causes: of those beside the fit that its linear model is about,
-    #: or of all if that is about the base.
+    #: Numbers of the columns of its causes before it is fitted: of those beside the fit that its linear model is
+    #: about, or of all if that is about the base.
     further: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     #: The same causes with other placements, which no fit leads to from this one; see `with_alternatives`.
     alternatives: tuple[WeightedSet, ...] = ()
