@@ -313,8 +313,9 @@ class OneLaunchGradient(ConjugateGradient):
 
 
 #: Aggregates of the coarse space, and rows of a matrix from which on it pays: the inverse of its matrix takes as long
-#: as some iterations, of which it saves more than half.
-_AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 2000
+#: as some iterations, of which it saves more than half. Times of cubes with it and without are as 1.1 at 200 rows, 0.8
+#: at 500 and 0.6 at 1,700, of slender bodies as 0.4 at 500 (`bench/coarse_space.py`, one core, 2026-11-28).
+_AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 300
 
 
 def compact_order(points: Floats) -> NDArray[np.intp]:
