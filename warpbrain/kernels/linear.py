@@ -206,7 +206,7 @@ class ConjugateGradient(abc.ABC):
 
     `nodes` are where the rows are [m], (n, 3), 1 for free components, 0 for constrained ones, (n,) of vec3, and what
     gives their `compact_order`, which matrices of one mesh share: on the CPU block-Jacobi has a coarse space then, if
-    the matrix is large, and `solve` cannot be captured in a graph.
+    the matrix is not small, and `solve` cannot be captured in a graph.
     """
 
     def __init__(
@@ -313,8 +313,9 @@ class OneLaunchGradient(ConjugateGradient):
 
 
 #: Aggregates of the coarse space, and rows of a matrix from which on it pays: the inverse of its matrix takes as long
-#: as some iterations, of which it saves more than half. Times of cubes with it and without are as 1.1 at 200 rows, 0.8
-#: at 500 and 0.6 at 1,700, of slender bodies as 0.4 at 500 (`bench/coarse_space.py`, one core, 2026-11-28).
+#: as some iterations, of which it saves more than half. Relative to the time without, an equilibrium of a cube
+#: takes 1.1 to 1.2 at 216 rows, 0.8 to 0.9 at 512 and 0.6 at 1,728, of a slender bar 0.4 to 0.5 at 512
+#: (`bench/coarse_space.py` twice, one core, 2026-11-28).
 _AGGREGATES, _WORTH_A_COARSE_SPACE = 20, 300
 
 

@@ -71,37 +71,40 @@ def test_sets_say_what_they_are(search):
         assert one.columns.shape[1] == width or len(one.mechanisms) < len(one.names)
 
 
-def test_no_set_that_is_not_fitted_would_change_the_verdict(search):
+def largest_regret(search, changed, size):
+    """By how much the verdict of a search costs more than the best one, if the evidence of a set changes by +- `size`.
+
+    The larger of the two expected losses, in units of `calibration().losses`.
+    """
     verdict, _ = decide([one.hypothesis for one in search.weighted_sets], search.probabilities, calibration().losses)
-    for one in search.weighted_sets:
-        if one.refit is not None or one.failure:
-            continue
-        for change in (-one.linear_error, one.linear_error):
-            others = [
-                other.with_evidence(other.hypothesis.log_evidence + change * (other is one)).hypothesis
-                for other in search.weighted_sets
-            ]
-            best, losses = decide(others, calibration().probabilities(others), calibration().losses)
-            assert losses[verdict] - losses[best] <= belief("fits.regret")
+    regrets = []
+    for change in (-size, size):
+        hypotheses = [
+            one.with_evidence(one.hypothesis.log_evidence + change * (one is changed)).hypothesis
+            for one in search.weighted_sets
+        ]
+        best, losses = decide(hypotheses, calibration().probabilities(hypotheses), calibration().losses)
+        regrets.append(losses[verdict] - losses[best])
+    return max(regrets)
+
+
+def not_fitted(search):
+    """Sets of a search that are linear about the base or about a fit of fewer causes."""
+    return [one for one in search.weighted_sets if one.refit is None and not one.failure]
+
+
+def test_no_set_that_is_not_fitted_would_change_the_verdict(search):
+    for one in not_fitted(search):
+        assert largest_regret(search, one, one.linear_error) <= belief("fits.regret")
 
 
 def test_fits_that_were_not_worth_their_time_would_not_have_changed_the_verdict(search):
-    """Of all sets that would change it if their evidence were as far off as it ever is."""
+    """Sets that would change it if fits changed their evidence by `fits.change`, the most that is believed."""
     further = copy.copy(search)
     further._sets, further._expanded = dict(search._sets), dict(search._expanded)
     verdict, _ = decide([one.hypothesis for one in search.weighted_sets], search.probabilities, calibration().losses)
-    might_matter = []
-    for one in search.weighted_sets:
-        if one.refit is not None or one.failure:
-            continue
-        for change in (-belief("fits.change"), belief("fits.change")):
-            others = [
-                other.with_evidence(other.hypothesis.log_evidence + change * (other is one)).hypothesis
-                for other in search.weighted_sets
-            ]
-            best, losses = decide(others, calibration().probabilities(others), calibration().losses)
-            if losses[verdict] - losses[best] > belief("fits.regret"):
-                might_matter.append(one)
+    change = belief("fits.change")
+    might_matter = [one for one in not_fitted(search) if largest_regret(search, one, change) > belief("fits.regret")]
     assert might_matter
     for one in might_matter:
         further._fit(one.names)

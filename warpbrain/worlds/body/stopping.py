@@ -169,8 +169,8 @@ def _rival_without_a_name(decision: Decision, sets: Sequence[WeightedSet]) -> We
 
 def _may_be_regretted(candidate: WeightedSet, sets: Sequence[WeightedSet], decision: Decision) -> bool:
     """Whether another verdict would be better by more than a fit is worth, if the fit changed the set's evidence."""
-    error = None if candidate.may_move else candidate.linear_error
-    for change in (belief("fits.moved"),) if error is None else (-error, error):
+    error = candidate.linear_error
+    for change in (belief("fits.moved"),) if candidate.may_move else (-error, error):
         best, losses = _decide(sets, candidate, change)
         if losses.get(decision, np.inf) - losses[best] > belief("fits.regret"):
             return True
