@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drawn_for_commit import one_for_this_commit
 
 from warpbrain.cases.shipped import BEAM, find_case
 from warpbrain.diagnosis.diagnose import diagnose
@@ -45,7 +46,7 @@ def test_what_is_declared(name):
 
 
 @pytest.mark.slow(90)
-@pytest.mark.parametrize("gravity", [True, False])
+@pytest.mark.parametrize("gravity", one_for_this_commit([True, False]))
 def test_the_weight_that_was_withheld_is_named_or_in_a_group_to_10_percent(gravity):
     """Where its set of nodes is declared, and gravity is, too, or is withheld."""
     whole = find_case(BEAM[1])

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import pytest
 from command import warpbrain
+from drawn_for_commit import drawn_for_this_commit
 from reliability.kinds import KINDS
 
-from subsets.tries import case_of, drawn_for_this_commit, every_subset, one_try, subsets
+from subsets.tries import case_of, every_subset, one_try, subsets
 from warpbrain.cases.shipped import RESECT
 from warpbrain.cases.writing import write_case
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import json
 import os
@@ -12,12 +11,9 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import date
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-
-import numpy as np
 
 from warpbrain.cases.shipped import SHIPPED, find_case
 from warpbrain.cases.writing import write_case
@@ -75,17 +71,6 @@ def every_subset() -> list[tuple[str, str, tuple[Recording, ...]]]:
         for some in subsets(case_of(name, tissue).recordings)
     ]
     return sorted(found, key=lambda entry: -len(entry[2]))
-
-
-def drawn_for_this_commit(of: int, count: int) -> list[int]:
-    """So many of the numbers below `of`: others with every commit, or with every day where there is no repository."""
-    command = ["git", "rev-parse", "HEAD"]
-    try:
-        version = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, check=True).stdout
-    except (OSError, subprocess.CalledProcessError):
-        version = str(date.today()).encode()
-    seed = int.from_bytes(hashlib.sha256(version.strip()).digest()[:8], "big")
-    return sorted(np.random.default_rng(seed).choice(of, count, replace=False).tolist())
 
 
 def one_try(name: str, tissue: str, recordings: tuple[Recording, ...], options: Sequence[str] = ()) -> Ended:

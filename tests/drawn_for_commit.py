@@ -1,0 +1,29 @@
+"""Slow tests of which others run with every commit."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+from datetime import date
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+T = TypeVar("T")
+
+
+def drawn_for_this_commit(of: int, count: int) -> list[int]:
+    """So many of the numbers below `of`: others with every commit, or with every day where there is no repository."""
+    command = ["git", "rev-parse", "HEAD"]
+    try:
+        version = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):
+        version = str(date.today()).encode()
+    seed = int.from_bytes(hashlib.sha256(version.strip()).digest()[:8], "big")
+    return sorted(np.random.default_rng(seed).choice(of, count, replace=False).tolist())
+
+
+def one_for_this_commit(of: list[T]) -> list[T]:
+    """One of some parameters of a test that takes minutes with each, in a list."""
+    return [of[number] for number in drawn_for_this_commit(len(of), 1)]
