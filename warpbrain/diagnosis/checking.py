@@ -31,7 +31,7 @@ from warpbrain.worlds.body.effects import width_of
 from warpbrain.worlds.body.fit_columns import with_shapes_about
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected
-from warpbrain.worlds.body.nuisances import RigidMotion
+from warpbrain.worlds.body.nuisances import FIELD, RigidMotion
 from warpbrain.worlds.body.sensors import Sensors, spread_points
 from warpbrain.worlds.body.states import SolvedState, States
 from warpbrain.worlds.body.time_courses import finite_times
@@ -256,9 +256,9 @@ def _error(checks: States, base: Base, fit: Refit) -> float:
     nuisances, _ = base.for_sensors(at_times)
     columns = with_shapes_about(fit, nuisances, at_times, base)
     rigid = RigidMotion(checks, nuisances)
-    # less tissue and field, which the state has
-    linear = fit.nuisances[: nuisances.columns.shape[1]] - nuisances.coordinates(base.prior, fit.state.hypothesis)
-    linear[rigid.part] = 0.0
+    linear = fit.nuisances[: nuisances.columns.shape[1]].copy()
+    # which the state has
+    linear[nuisances.part("tissue")] = linear[nuisances.part(FIELD)] = linear[rigid.part] = 0.0
     residual = sensors.residual - columns @ linear
     return distance(sensors, residual + rigid.change(sensors, fit.nuisances))
 

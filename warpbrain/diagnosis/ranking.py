@@ -111,13 +111,13 @@ def about_base(search: HypothesisSearch, weighted_set: WeightedSet, name: str) -
 
     There the columns of all places of the mechanism are known; about a fit they differ.
     """
-    base, model = search.base, weighted_set.marginal.model
+    base = search.base
     others = [effect for kind, effect in zip(weighted_set.acting, weighted_set.effects, strict=True) if kind != name]
-    columns = np.column_stack(
-        [base.nuisances.columns, *(effect.columns for effect in others), weighted_set.marginal.excess]
-    )
+    nuisances, marginal = base.nuisances, weighted_set.marginal
+    of_nuisances = nuisances.with_field(nuisances.columns, nuisances.field_sizes.relative[marginal.sizes.field])
+    columns = np.column_stack([of_nuisances, *(effect.columns for effect in others), marginal.excess])
     residual = base.residual - sum((effect.mean for effect in others), start=np.zeros(len(base.residual)))
-    return GaussianModel(model.noise_factor, columns, model.scale), residual
+    return GaussianModel(marginal.model.noise_factor, columns, marginal.scale), residual
 
 
 def _place(effect: Effect, scanned: tuple[Effect, ...], weights: Floats) -> tuple[Floats | None, float | None]:

@@ -91,9 +91,15 @@ def log_scale_density(scales: Floats) -> Floats:
 
 def scales() -> tuple[Floats, Floats]:
     """Factors on the noise that are summed over, and the log of the prior probability of each, (k,) and (k,)."""
+    values = beliefs("noise.scales")
+    return values, log_shares(values, log_scale_density(values))
+
+
+def log_shares(values: Floats, log_density: Floats) -> Floats:
+    """Log of the prior probability (k,) of each of increasing values (k,), by the log density (k,) of their logarithm.
+
+    Each stands for the interval of the logarithm that is nearest to it.
+    """
     from scipy.special import log_softmax
 
-    values = beliefs("noise.scales")
-    # each value stands for the interval of the logarithm that is nearest to it
-    widths = np.gradient(np.log(values))
-    return values, np.asarray(log_softmax(log_scale_density(values) + np.log(widths)))
+    return np.asarray(log_softmax(log_density + np.log(np.gradient(np.log(values)))))

@@ -14,7 +14,7 @@ def test_nodes_move_as_the_rows_of_a_fit_do(small_diagnosis):
     base, best = small_diagnosis.base, small_diagnosis.best
     refit = best.refit
     assert refit is not None and refit.effects
-    layout = Layout.of(base.nuisances, len(refit.nuisances), refit.effects)
+    layout = Layout.of(base.nuisances, refit.marginal.sizes, len(refit.nuisances), refit.effects)
     columns = displacement_columns(best, base)
     of_rows = refit.state.sensors.by_displacement @ columns
     for part in (layout.tissue, layout.field, layout.shapes, base.nuisances.part("known loads"), layout.coefficients):
@@ -27,7 +27,7 @@ def test_nodes_move_as_the_rows_of_a_fit_do(small_diagnosis):
 def test_a_larger_cause_moves_nodes_by_its_column(small_diagnosis, verify):
     base, best = small_diagnosis.base, small_diagnosis.best
     refit = best.refit
-    layout = Layout.of(base.nuisances, len(refit.nuisances), refit.effects)
+    layout = Layout.of(base.nuisances, refit.marginal.sizes, len(refit.nuisances), refit.effects)
     step, moved = 0.05, []
     for sign in (-1.0, 1.0):
         z = refit.coefficients[0].copy()

@@ -10,7 +10,7 @@ from sinking_block import OPTIONS, write_sinking
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.fitting import FitSearch, Fitter
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
-from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
+from warpbrain.worlds.body.nuisances import FIELD, UNKNOWN_MESH
 from warpbrain.worlds.body.weighted_set import Refit
 
 
@@ -154,3 +154,47 @@ def test_a_fit_takes_the_most_probable_size(sets):
         free = fit(start, effect.sizes)
         assert free.effects[0].size == pytest.approx(best)
         assert free.log_evidence == pytest.approx(alone[best], abs=0.1)
+
+
+def sized(fit: Refit, number: int) -> Refit:
+    """A result whose stiffness field has another size."""
+    return replace(fit, marginal=replace(fit.marginal, sizes=fit.marginal.sizes._replace(field=number)))
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_another_size_of_the_stiffness_field_is_the_same_field(base, search, number):
+    """In other coordinates: the same state, residual and linear model."""
+    search.minimise()
+    field, before, fit = search._layout.field, search.z.copy(), search.result()
+    state, residual, columns = search.state, search.residual.copy(), search.columns.copy()
+    moved, here = search._moved(), search._layout.field_size
+    search._take_field_size(sized(fit, number).marginal.sizes)
+    relative = base.nuisances.field_sizes.relative[number]
+    assert search._layout.field_size == relative and search.state is state
+    np.testing.assert_allclose(search.residual, residual, atol=0.05 * base.noise.max())
+    np.testing.assert_allclose(search.columns[:, field] * here, columns[:, field] * relative)
+    np.testing.assert_allclose(search.z[field] * relative, before[field] * here)
+    np.testing.assert_allclose(search.z[field] * relative, state.hypothesis.field)
+    assert np.isfinite(moved) == np.isfinite(search._moved())
+    # an equilibrium at these coordinates is that of the state
+    again, _ = search._evaluate(search.z, state)
+    np.testing.assert_allclose(again.u, state.u, atol=1e-7 * np.abs(state.u).max())
+
+
+@pytest.mark.parametrize("number", [0, 5])
+def test_a_fit_begins_at_the_field_of_a_subset_of_another_size(sets, base, search, number):
+    search.minimise()
+    fit, relative = search.result(), base.nuisances.field_sizes.relative
+    weighed, factor = sets.get(("gravity",)), relative[number] / relative[fit.marginal.sizes.field]
+    marginal = sized(fit, number).marginal
+    again = FitSearch(base, None, weighed.effects, base.nuisances.with_field(fit.columns, factor), marginal)
+    z = again.begin_at(fit)
+    np.testing.assert_allclose(relative[number] * z[again._layout.field], fit.state.hypothesis.field, atol=1e-12)
+
+
+def test_the_field_of_a_result_is_that_of_its_state(base, search):
+    search.minimise()
+    fit = search.result()
+    relative = base.nuisances.field_sizes.relative[fit.marginal.sizes.field]
+    field = fit.nuisances[base.nuisances.part(FIELD)]
+    np.testing.assert_allclose(relative * field, fit.state.hypothesis.field, atol=1e-12)

@@ -12,8 +12,8 @@ from warpbrain.diagnosis.checking import Confirming
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.decide import NAMED, decide
+from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
-from warpbrain.worlds.body.weighted_set import evidence_of
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_a_fit_leaves_noise(search):
 
 def test_evidence_of_a_fit_is_that_of_its_linear_model(search):
     fitted = search.get(("gravity",))
-    _, again = evidence_of(search.base, fitted.columns, fitted.residual, fitted.marginal.scale)
+    _, again = evidence_of(search.base, fitted.columns, fitted.residual, fitted.marginal.sizes, fitted.marginal.scale)
     np.testing.assert_allclose(again.log_evidence, fitted.refit.log_evidence, atol=1e-6)
 
 

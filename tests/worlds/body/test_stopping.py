@@ -9,8 +9,9 @@ from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis, Kind
+from warpbrain.worlds.body.evidence import SetMarginal, Sizes
 from warpbrain.worlds.body.stopping import next_to_fit
-from warpbrain.worlds.body.weighted_set import SetMarginal, WeightedSet
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 KINDS = {"registration": Kind.NOT_PHYSICS, "unknown": Kind.UNKNOWN}
 
@@ -21,7 +22,7 @@ def weighted(log_evidence, *names, fitted=False, failure="", moves=100.0):
     hypothesis = Hypothesis(names, kinds, log_evidence, -3.0 * len(names), None)
     columns, residual = np.array([[moves]]), np.array([moves])
     model = GaussianModel(np.ones((1, 1)), columns)
-    marginal = SetMarginal(log_evidence, 1.0, np.ones(1), model, 1, (0, 0))
+    marginal = SetMarginal(log_evidence, 1.0, np.ones(1), model, 1, Sizes(0, 0, 0))
     return WeightedSet(
         hypothesis,
         hypothesis.of_kind(Kind.PHYSICS),

@@ -29,7 +29,7 @@ from warpbrain.threads import beside
 from warpbrain.worlds.body.effects import Effect, Effects, SolvedSwitches
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
-from warpbrain.worlds.body.nuisances import Nuisances, nuisances_at, other_volume
+from warpbrain.worlds.body.nuisances import FIELD, Nuisances, nuisances_at, other_volume
 from warpbrain.worlds.body.sensors import Sensors, noise_of, tracked_points
 from warpbrain.worlds.body.sources import sources
 from warpbrain.worlds.body.states import Hypothesis, SolvedState, States
@@ -198,7 +198,7 @@ class BaseFinder:
         self.states.realign((xi[registration] + factor * xi[count - 6 : count]) * deviations)
         farthest = belief("tissue.farthest_base")
         tissue = np.clip(xi[nuisances.part("tissue")], -farthest, farthest)
-        field = np.clip(xi[nuisances.part("stiffness field")], -farthest, farthest)
+        field = np.clip(xi[nuisances.part(FIELD)], -farthest, farthest)
         return Hypothesis(self.prior.mean + self.prior.factor @ tissue, field)
 
     def _declared(self) -> Hypothesis:

@@ -12,9 +12,11 @@ from warpbrain.errors import SolveError
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import is_linear
 from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, parts_of, width_of
+from warpbrain.worlds.body.evidence import Sizes
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.nuisances import (
+    FIELD,
     LAW,
     Nuisances,
     field_columns,
@@ -37,6 +39,7 @@ class Layout:
     tissue: slice
     field: slice
     coefficients: slice
+    field_size: float  # of a coordinate of the field, relative to `States.modes`
     shapes: Ints  # of laws, and of mechanisms
     effects: tuple[slice, ...]  # coefficients of each effect
     linear: Bools  # (q + e,), which of the first act linearly: all but tissue and field
@@ -45,17 +48,25 @@ class Layout:
     #: `SharedParameter.ratio`.
     shared: tuple[tuple[int, int, float], ...]
 
+    @property
+    def field_of_nonlinear(self) -> Bools:
+        """Which of the nonlinear coordinates are those of the stiffness field."""
+        of_field = np.zeros(len(self.nonlinear), dtype=bool)
+        of_field[self.field] = True
+        return of_field[self.nonlinear]
+
     @classmethod
-    def of(cls, nuisances: Nuisances, count: int, effects: Sequence[Effect]) -> Layout:
-        """With `count` coordinates before those of the effects."""
-        tissue, field = nuisances.part("tissue"), nuisances.part("stiffness field")
+    def of(cls, nuisances: Nuisances, sizes: Sizes, count: int, effects: Sequence[Effect]) -> Layout:
+        """With `count` coordinates before those of the effects, and a stiffness field of the size in `sizes`."""
+        tissue, field = nuisances.part("tissue"), nuisances.part(FIELD)
         linear = np.ones(count, dtype=bool)
         linear[tissue] = linear[field] = False
         nonlinear = np.concatenate([~linear, np.ones(width_of(effects), dtype=bool)])
         law, parts = nuisances.part(LAW), column_slices(effects, count)
         parameters = ((shared_parameter(effect), part.start) for effect, part in zip(effects, parts, strict=True))
         shared = tuple((law.start + each.column, at, each.ratio) for each, at in parameters if each is not None)
-        return cls(tissue, field, slice(count, None), nuisances.shapes, parts, linear, nonlinear, shared)
+        size, coefficients = float(nuisances.field_sizes.relative[sizes.field]), slice(count, None)
+        return cls(tissue, field, coefficients, size, nuisances.shapes, parts, linear, nonlinear, shared)
 
     def without_shared(self, z: Floats) -> Floats:
         """The same tissue as coordinates (q + e + k,) with shared parameters in the coefficients of effects alone."""
@@ -85,7 +96,7 @@ def columns_about(
     relaxed = _relaxation_factor(effects, [z[part] for part in layout.effects], state.sensors)
     tissue = relaxed * tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
     columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)
-    columns[:, layout.field] = relaxed * field_columns(at, base.states)
+    columns[:, layout.field] = layout.field_size * relaxed * field_columns(at, base.states)
     made = Effects(at)
     first = layout.coefficients.start
     for effect, part in zip(effects, layout.effects, strict=True):
@@ -108,8 +119,11 @@ def columns_about(
 
 
 def with_shapes_about(fit: Refit, nuisances: Nuisances, sensors: Sensors, base: Base) -> Floats:
-    """Columns (n, q) of nuisances over other sensors (n), those of the shape of laws and of mechanisms about a fit."""
-    columns = nuisances.columns
+    """Columns (n, q) of nuisances over other sensors (n), those of the shape of laws and of mechanisms about a fit.
+
+    With a stiffness field of the size that the fit has.
+    """
+    columns = nuisances.with_field(nuisances.columns, nuisances.field_sizes.relative[fit.marginal.sizes.field])
     try:
         at = fit.state.linearised(sensors)
     except SolveError:

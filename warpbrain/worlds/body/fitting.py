@@ -10,7 +10,7 @@ searches are rough.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,13 +27,14 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.multisecant import extrapolated
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
+from warpbrain.worlds.body.evidence import SetMarginal, Sizes, evidence_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about, shape_columns_about
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import FinerStates, MeshErrors, expected
 from warpbrain.worlds.body.nuisances import MESH_SHARE, UNKNOWN_MESH, RigidMotion, mesh_by_tissue
 from warpbrain.worlds.body.parameters import log_within_expected
 from warpbrain.worlds.body.states import Hypothesis, SolvedState
-from warpbrain.worlds.body.weighted_set import MeshShare, Refit, SetMarginal, evidence_of, excess_error, mesh_share_of
+from warpbrain.worlds.body.weighted_set import MeshShare, Refit, excess_error, mesh_share_of
 
 _ITERATIONS = 20
 #: Trials along a step; along one from columns that were made elsewhere, which may point uphill.
@@ -94,7 +95,7 @@ class FitSearch:
         self._marginal, self._noise = screened, screened.noise
         nuisances = base.nuisances
         count = columns.shape[1] - width_of(effects)
-        self._layout = Layout.of(nuisances, count, effects)
+        self._layout = Layout.of(nuisances, screened.sizes, count, effects)
         columns = columns.copy()
         columns[:, [law for law, _, _ in self._layout.shared]] = 0.0
         self._U = columns[:, :count]
@@ -146,10 +147,11 @@ class FitSearch:
         `about`: of its state, if it was linearised. Returns (q + e + k,): coordinates of that fit.
         """
         first, coefficients = self._U.shape[1], np.concatenate(subset.coefficients)
-        z = np.zeros(len(self.z))
-        z[: len(subset.nuisances)] = subset.nuisances
+        z, nuisances = np.zeros(len(self.z)), self._base.nuisances
+        of_field = nuisances.field_sizes.relative[subset.marginal.sizes.field] / self._layout.field_size
+        z[: len(subset.nuisances)] = nuisances.with_field(subset.nuisances[None], of_field)[0]
         # about as large as there
-        part = self._base.nuisances.part(UNKNOWN_MESH)
+        part = nuisances.part(UNKNOWN_MESH)
         sizes = [float(np.linalg.norm(columns[:, part])) for columns in (subset.columns, self.columns)]
         z[part] *= sizes[0] / sizes[1] if sizes[1] else 1.0
         z[first : first + len(coefficients)] = coefficients
@@ -178,8 +180,8 @@ class FitSearch:
         """Move tissue and field toward the base while that is better: far from it the linear model may fail."""
         base = self.z.copy()
         coordinates = self._base.nuisances.coordinates(self._base.prior, self._base.state.hypothesis)
-        for part in (self._layout.tissue, self._layout.field):
-            base[part] = coordinates[part]
+        base[self._layout.tissue] = coordinates[self._layout.tissue]
+        base[self._layout.field] = coordinates[self._layout.field] / self._layout.field_size
         far = self.z
         for share in (0.5, 0.0):
             between = base + share * (far - base)
@@ -232,8 +234,9 @@ class FitSearch:
         return self._gauss_newton_step(False)[1]
 
     def update_noise(self, fit: Refit) -> None:
-        """Take noise, gross errors and the mesh's unknown error of a result."""
+        """Take noise, gross errors, the mesh's unknown error and the size of the stiffness field of a result."""
         marginal, nuisances = fit.marginal, self._base.nuisances
+        self._take_field_size(marginal.sizes)
         same = marginal.scale == self._marginal.scale and np.array_equal(marginal.gross, self._marginal.gross)
         same &= marginal.model.noise_factor is self._marginal.model.noise_factor
         self._marginal, self._noise = marginal, marginal.noise
@@ -248,6 +251,19 @@ class FitSearch:
             self.columns = nuisances.with_family(UNKNOWN_MESH, self.columns, unknown)
         if not same:
             self._renew(self.residual)
+
+    def _take_field_size(self, sizes: Sizes) -> None:
+        """Take the size of the stiffness field in `sizes`: the best point has other coordinates of the same field."""
+        size = float(self._base.nuisances.field_sizes.relative[sizes.field])
+        if size == self._layout.field_size:
+            return
+        factor = size / self._layout.field_size
+        self._layout, scaled = replace(self._layout, field_size=size), self._base.nuisances.with_field
+        self.z, self._linearised_at = (scaled(at[None], 1.0 / factor)[0] for at in (self.z, self._linearised_at))
+        self._U, self.columns = scaled(self._U, factor), scaled(self.columns, factor)
+        field = self._layout.field_of_nonlinear
+        self._solved = [(np.where(field, at / factor, at), u) for at, u in self._solved]
+        self._renew(self.residual)
 
     def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> None:
         """Compute the mechanisms' share of the mesh's error at the best point, where a finer mesh tells it.
@@ -296,8 +312,10 @@ class FitSearch:
         """The fit at its best point."""
         q = self._U.shape[1]
         linear = self.residual + self.columns @ self.z
-        columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.scale, self._marginal.sizes)
-        part, z = self._base.nuisances.part(UNKNOWN_MESH), self.z.copy()
+        columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.sizes, self._marginal.scale)
+        nuisances = self._base.nuisances
+        of_field = self._layout.field_size / nuisances.field_sizes.relative[evidence.sizes.field]
+        part, z = nuisances.part(UNKNOWN_MESH), nuisances.with_field(self.z[None], of_field)[0]
         z[part] = evidence.coordinates(linear)[part]
         W = self._noise.whitened(columns)
         covariance = np.asarray(np.linalg.inv(np.eye(W.shape[1]) + W.T @ W), dtype=np.float64)
@@ -449,7 +467,7 @@ class FitSearch:
             if effect.proposed.patch is not None:
                 patches.append(effect.proposed.patch)
         theta = base.prior.mean + base.prior.factor @ z[layout.tissue]
-        hypothesis = Hypothesis(theta, z[layout.field], tuple(mechanisms), tuple(patches))
+        hypothesis = Hypothesis(theta, layout.field_size * z[layout.field], tuple(mechanisms), tuple(patches))
         error = None if mesh is None else expected(mesh.of(theta, base.prior))
         state = self._solve(hypothesis, z[layout.nonlinear], nearby, error)
         self._course = state.course or self._course
@@ -553,17 +571,19 @@ class Fitter:
             search.backtrack_to_base()
         best = self._converged(search, wanted)
         for _ in range(_RESIZED):
-            begun = _resized(best)
-            if begun is None:
+            fits = (self._continued(begun, best.log_evidence) for begun in _resized(best))
+            better = next((fit for fit in fits if fit is not None and fit.log_evidence > best.log_evidence), None)
+            if better is None:
                 break
-            try:
-                fit = self._converged(self._begun_at(begun, begun.effects), best.log_evidence)
-            except CANNOT_BE_FITTED:
-                break
-            if fit.log_evidence <= best.log_evidence:
-                break
-            best = fit
+            best = better
         return best
+
+    def _continued(self, begun: Refit, wanted: float) -> Refit | None:
+        """The fit that a search from a point comes to; None if it fails. `wanted`: see `fit`."""
+        try:
+            return self._converged(self._begun_at(begun, begun.effects), wanted)
+        except CANNOT_BE_FITTED:
+            return None
 
     def _begun_at(self, refit: Refit, effects: tuple[Effect, ...], about: Linearisation | None = None) -> FitSearch:
         """A search with effects at the coordinates of a fit; see `begin`."""
@@ -621,26 +641,22 @@ class Fitter:
         return fit
 
 
-def _resized(fit: Refit) -> Refit | None:
-    """A fit with an effect of the next smaller or larger size, at the same point; None if that is no better.
+def _resized(fit: Refit) -> Iterator[Refit]:
+    """A fit with an effect of another of its sizes that seems better, at the same point; sizes nearby come first.
 
     Which size is the most probable in the linear model about the base is no matter of the fit: there tissue is as
     soft as the base's, and what is far from linear needs more or less of a load. The prior of many coefficients
     would cost tens of nats.
     """
-    begun, most = None, _BETTER
+    tried: list[tuple[float, int, float]] = []
     parts = column_slices(fit.effects, fit.columns.shape[1] - width_of(fit.effects))
     for number, (effect, part) in enumerate(zip(fit.effects, parts, strict=True)):
-        sizes = np.sort(effect.sizes)
-        here = int(np.argmin(np.abs(sizes - effect.size)))
-        least = max(here - 1, 0)
-        factors = sizes[least : here + 2] / effect.size
+        factors = np.asarray(effect.sizes) / effect.size
         if len(factors) < 2:
             continue
         others = fit.marginal.noise.of_noise(np.delete(fit.columns, np.r_[part], axis=1))
         cause = Cause("", (Place(fit.columns[:, part]),), 0.0, factors)
         [logs] = Blocks(others, fit.linear, [cause]).log_factors()
-        gains = logs - logs[here - least]
-        if gains.max() > most:
-            most, begun = float(gains.max()), fit.scaled(number, float(factors[np.argmax(gains)]))
-    return begun
+        better = factors[logs > logs[np.argmin(np.abs(factors - 1.0))] + _BETTER]
+        tried += [(abs(np.log(factor)), number, factor) for factor in better.tolist()]
+    return (fit.scaled(number, factor) for _, number, factor in sorted(tried))

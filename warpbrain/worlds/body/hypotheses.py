@@ -39,13 +39,14 @@ from warpbrain.worlds.body.dictionary import (
     with_releases_of,
 )
 from warpbrain.worlds.body.effects import Effects
+from warpbrain.worlds.body.evidence import SetMarginal, evidence_of, sizes_of
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.moving import moved_about_fit
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.placing import Weighing, with_refined_places
 from warpbrain.worlds.body.states import SolvedState, States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
-from warpbrain.worlds.body.weighted_set import Refit, SetMarginal, WeightedSet, evidence_of
+from warpbrain.worlds.body.weighted_set import Refit, WeightedSet
 
 #: Places of each cause of which pairs are made, and sets that are weighed with gross errors of their own.
 _PLACES, _SETS = 20, 12
@@ -117,7 +118,7 @@ class HypothesisSearch:
         """Weigh sets about the base: with all points sound, and with those louder that are gross errors of no cause."""
         self._listener.stage("screening")
         base = self.base
-        nothing = evidence_of(base, base.model.columns, base.residual)[1]
+        nothing = evidence_of(base, base.model.columns, base.residual, sizes_of(base))[1]
         models = [base.model]
         if nothing.gross.any():
             noise_factor = nothing.noise.noise_factor / nothing.scale
@@ -391,10 +392,13 @@ class HypothesisSearch:
         nuisances, base = self.base.nuisances, self.base
         columns = np.column_stack([nothing.columns, candidate.columns[:, len(nothing.nuisances) :]])
         residual = nothing.linear + candidate.residual - base.residual
-        _, marginal = evidence_of(base, columns, residual, nothing.marginal.scale, nothing.marginal.sizes)
-        if marginal.log_evidence < candidate.marginal.log_evidence:
-            marginal = candidate.marginal
+        sizes, known = nothing.marginal.sizes, candidate.marginal
+        _, marginal = evidence_of(base, columns, residual, sizes, nothing.marginal.scale)
+        # the fit has the sizes of the columns that it begins with
+        marginal = known if marginal.log_evidence < known.log_evidence else replace(marginal, sizes=known.sizes)
         columns = nuisances.with_family(UNKNOWN_MESH, columns, candidate.columns[:, nuisances.part(UNKNOWN_MESH)])
+        of_field = nuisances.field_sizes.relative
+        columns = nuisances.with_field(columns, of_field[known.sizes.field] / of_field[sizes.field])
         return GaussianModel(marginal.noise.noise_factor, columns).coefficients(residual)[0], marginal
 
     def _weigh_supersets(self, fitted: WeightedSet, refit: Refit) -> None:

@@ -28,12 +28,14 @@ from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
-from warpbrain.worlds.body.states import Hypothesis, States
+from warpbrain.worlds.body.states import FieldSizes, Hypothesis, States
 
 #: The family of what is not known of the shape of tissues' laws.
 LAW = "shape of the law"
 #: Beliefs of its first columns, each of which is a mechanism that every tissue has to a degree.
 _ALWAYS = ("tissue.volume", "tissue.exponent")
+#: The family of stiffness that varies from place to place.
+FIELD = "stiffness field"
 #: The family of what is not known of the mesh's error, and that of mechanisms' shares of it, which only fits have.
 UNKNOWN_MESH, MESH_SHARE = "mesh, unknown", "mesh, of mechanisms"
 #: The family of what is not known of the shape of mechanisms in one place, which only fits have; the number of
@@ -55,6 +57,7 @@ class Nuisances:
     fraction: float  # that part, relative to the displacement
     displacement: Floats  # (n,), of the state at each row [m]; zero of forces
     relative: Floats  # (n, k), columns of that part if it were as large as a displacement of 1 m
+    field_sizes: FieldSizes  # of which the typical one is that of the stiffness field's family
 
     @property
     def columns(self) -> Floats:
@@ -77,6 +80,10 @@ class Nuisances:
         changed[:, self.part(name)] = of_family
         return changed
 
+    def with_field(self, columns: Floats, factor: float) -> Floats:
+        """Columns (n, q + k), or coordinates (1, q + k), those of the stiffness field times a factor."""
+        return self.with_family(FIELD, columns, factor * columns[:, self.part(FIELD)])
+
     @property
     def shapes(self) -> Ints:
         """Where the columns of the shapes of laws and of mechanisms are."""
@@ -95,7 +102,7 @@ class Nuisances:
         """Coordinates (q,) of the tissue, by its prior, and of the field of a hypothesis; the others are zero."""
         z = np.zeros(self.columns.shape[1])
         z[self.part("tissue")] = np.linalg.solve(prior.factor, hypothesis.theta - prior.mean)
-        z[self.part("stiffness field")] = hypothesis.field
+        z[self.part(FIELD)] = hypothesis.field
         return z
 
     def part(self, name: str) -> slice:
@@ -136,7 +143,7 @@ def nuisances_at(
         anchors = places[spread_points(places, belief("mesh.alike") * sensors.radius, 60)]
     families = {
         "tissue": tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors),
-        "stiffness field": field_columns(at, states),
+        FIELD: field_columns(at, states),
         LAW: law_columns(effects, states),
         "known loads": load_columns(at),
         "registration": sensors.rigid * registration_of(states.case).deviations,
@@ -149,7 +156,7 @@ def nuisances_at(
         families[MESH_SHARE] = np.zeros((len(sensors), 1))
     displacement, relative = _displacement(at), _alike(sensors, anchors)
     families[UNKNOWN_MESH] = fraction * displacement[:, None] * relative
-    return Nuisances(families, anchors, fraction, displacement, relative)
+    return Nuisances(families, anchors, fraction, displacement, relative, states.field_sizes)
 
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:

@@ -25,8 +25,9 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
 from warpbrain.worlds.body.effects import Effect, Effects, width_of
+from warpbrain.worlds.body.evidence import SetMarginal, Sizes, evidence_of
 from warpbrain.worlds.body.places import RADII, middles_of_faces
-from warpbrain.worlds.body.weighted_set import SetMarginal, WeightedSet, evidence_of
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 
 def best_in_cell(
@@ -119,14 +120,13 @@ class Weighing:
     of each hypothesis; the base, where no cause acts, unless given.
     """
 
-    def __init__(
-        self, base: Base, causes: BodyCauses, sizes: tuple[int, int], about: WeightedSet | None = None
-    ) -> None:
+    def __init__(self, base: Base, causes: BodyCauses, sizes: Sizes, about: WeightedSet | None = None) -> None:
         self._base, self._causes, self._sizes = base, causes, sizes
         self._names: tuple[str, ...] = () if about is None else about.acting
         self._acting: tuple[Effect, ...] = () if about is None else about.effects
         self._residual = base.residual if about is None else about.residual
-        self._columns = base.model.columns if about is None else about.columns
+        of_field = base.nuisances.field_sizes.relative[sizes.field]
+        self._columns = base.nuisances.with_field(base.model.columns, of_field) if about is None else about.columns
         # the same ones are often found with several noises
         self._at = cache(self._acting_with)
 
@@ -180,7 +180,7 @@ class Weighing:
         split = self._columns.shape[1] - width_of(self._acting)
         before, after = np.hsplit(self._columns, [split])
         columns = np.column_stack([before, *linear, after, *(effect.columns for effect in added)])
-        columns, result = evidence_of(self._base, columns, residual, scale, self._sizes)
+        columns, result = evidence_of(self._base, columns, residual, self._sizes, scale)
         count, linear_count = columns.shape[1], sum(of_cause.shape[1] for of_cause in linear)
         further = np.r_[split : split + linear_count, count - width_of(added) : count].astype(np.int64)
         return (*self._names, *names), (*self._acting, *added), residual, columns, further, result
@@ -211,7 +211,7 @@ def with_refined_places(
         columns = candidate.columns.copy()
         columns[:, part] = best.columns
         residual = residual - best.mean
-        columns, refined = evidence_of(base, columns, residual, candidate.marginal.scale, candidate.marginal.sizes)
+        columns, refined = evidence_of(base, columns, residual, candidate.marginal.sizes, candidate.marginal.scale)
         effects[number] = best
         candidate = replace(
             candidate,

@@ -24,7 +24,8 @@ from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.registration import realigned, registration_of
-from warpbrain.inference.beliefs import belief
+from warpbrain.inference.beliefs import belief, beliefs
+from warpbrain.inference.noise import log_shares
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.quality import extent
 from warpbrain.physics.composition import CompositionError
@@ -61,6 +62,41 @@ class Hypothesis:
     field: Floats  # (k,), of the modes of the stiffness field, in standard deviations
     mechanisms: tuple[Mechanism, ...] = ()  # beside those of the case
     patches: tuple[Patch, ...] = ()  # nodes that the case's boundaries no longer hold
+
+
+@dataclass(frozen=True, eq=False)
+class FieldSizes:
+    """How uneven stiffness may be: sizes of the stiffness field that are summed over."""
+
+    deviations: Floats  # (s,), of `ln mu` at each place, increasing
+    log_prior: Floats  # (s,)
+
+    @classmethod
+    def of(cls, declared: float | None) -> FieldSizes:
+        """What is believed of a tissue, or the one size that a case declares."""
+        from scipy.stats import t
+
+        if declared:
+            return cls(np.array([declared]), np.zeros(1))
+        sizes = beliefs("tissue.field_sizes")
+        off = np.log(sizes / belief("tissue.field")) / belief("tissue.field_width")
+        return cls(sizes, log_shares(sizes, t.logpdf(off, belief("noise.scale_tail"))))
+
+    @property
+    def typical(self) -> int:
+        """Number of the one nearest to the mean."""
+        mean = np.exp(self.log_prior) @ self.deviations
+        return int(np.argmin(np.abs(np.log(self.deviations / mean))))
+
+    @property
+    def of_modes(self) -> float:
+        """Standard deviation that `States.modes` have: the typical one."""
+        return float(self.deviations[self.typical])
+
+    @property
+    def relative(self) -> Floats:
+        """Of each to that (s,)."""
+        return self.deviations / self.of_modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +156,8 @@ class States:
 
     def __init__(self, case: Case, device: str | None = None, role: str = "fit") -> None:
         self.case = case = with_free_surfaces(case)
-        mesh, sd = case.remaining[0], case.heterogeneity or belief("tissue.field")
+        self.field_sizes = FieldSizes.of(case.heterogeneity)
+        mesh, sd = case.remaining[0], self.field_sizes.of_modes
         # in a thread, while recordings are located and mechanisms proposed
         self._modes = beside(lambda: stiffness_modes(mesh, sd))
         self.device = device

@@ -139,7 +139,7 @@ def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
     else:
         state, effects = refit.state, refit.effects
         z = np.concatenate([refit.nuisances, *refit.coefficients])
-    layout = Layout.of(base.nuisances, len(z) - width_of(effects), effects)
+    layout = Layout.of(base.nuisances, weighted_set.marginal.sizes, len(z) - width_of(effects), effects)
     mesh = state.system.model.mesh
     nodes = tracked_points(mesh, mesh.points, base.states.centre)
     over = base.at.with_sensors(nodes)

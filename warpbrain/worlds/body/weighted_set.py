@@ -1,21 +1,15 @@
 """A set of causes of a body with its evidence, the linear model about its most probable point, and its fit.
 
-The evidence is summed over the sizes of what is not known of the mesh's error. One part of that is correlated in space,
-as what a local cause moves is; another is what the mesh does not resolve (`warpbrain.estimation.within_element`). The
-first is relative to the displacement under the set, which is that of its causes where these move more than all else. A
-set that explains the recordings leaves small ones; under a wrong set they take up what is left. With one size for all
-sets they would hide causes.
-
-Of what is known of that error a part is the causes', in proportion to their sizes. A finer mesh shows the error of the
-state that is fitted. What of it is beyond the error that tissue alone is known to have is the mechanisms', each of
-which pulls the elements in its own way.
+Of what is known of the error of the mesh a part is the causes', in proportion to their sizes. A finer mesh shows the
+error of the state that is fitted. What of it is beyond the error that tissue alone is known to have is the mechanisms',
+each of which pulls the elements in its own way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,20 +19,16 @@ from warpbrain.errors import SolveError
 from warpbrain.estimation.finer_mesh import Difference
 from warpbrain.estimation.parameters import Gaussian
 from warpbrain.inference import Kind
-from warpbrain.inference.beliefs import belief, beliefs
+from warpbrain.inference.beliefs import belief
 from warpbrain.inference.causes import Hypothesis
-from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, marginal_of, outward
-from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import UNKNOWN
 from warpbrain.worlds.body.effects import Effect, column_slices, width_of
+from warpbrain.worlds.body.evidence import SetMarginal, evidence_of
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
-from warpbrain.worlds.body.nuisances import LAW, UNKNOWN_MESH, shared_parameter
+from warpbrain.worlds.body.nuisances import LAW, shared_parameter
 from warpbrain.worlds.body.places import LikelyPlaces
 from warpbrain.worlds.body.states import SolvedState
-
-#: The sum over sizes ends where a term is below this part of the largest.
-_NEGLIGIBLE = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,90 +171,6 @@ class Refit:
             covariances=others(self.covariances),
             mesh_share=None if share is None else share.with_fixed(part, self.coefficients[number]),
         )
-
-
-@dataclass(frozen=True, eq=False)
-class SetMarginal(Marginal):
-    """The evidence of a set, and which sizes of what is not known of the mesh's error are the most probable."""
-
-    #: Numbers of the size of the smooth part, and of that which the mesh does not resolve.
-    sizes: tuple[int, int]
-
-
-def evidence_of(
-    base: Base, columns: Floats, residual: Floats, scale: float = 1.0, sizes: tuple[int, int] | None = None
-) -> tuple[Floats, SetMarginal]:
-    """Evidence of residuals, and the columns with the most probable size of the smooth part.
-
-    `columns` (n, q): of nuisances and causes. `residual` (n,): less what is expected of the causes. `scale`: a factor
-    on the noise near the most probable one. `sizes`: numbers of sizes near the most probable ones, where sums begin;
-    those of `base` unless given. Returns the columns (n, q), and the marginal with these columns and the most probable
-    noise; its log evidence is the mean over all sizes.
-    """
-    nuisances, fractions = base.nuisances, beliefs("mesh.unknown")
-    part = nuisances.part(UNKNOWN_MESH)
-    # of nothing that moves, or where no displacement was recorded, there is one size
-    moving = nuisances.families[UNKNOWN_MESH].any()
-    fractions = fractions if moving else np.ones(1)
-    others = np.delete(columns, np.r_[part], axis=1) if moving else columns
-    models, relative = [noise.of_noise(others) for noise in base.noises], None
-    inflation: Floats | None = None
-    if moving:
-        as_given = RowsAtScales(models[0], residual, base.points, columns[:, part]).with_gross_errors(scale)
-        inflation = as_given.inflation
-        moved = _displacement(base, residual - others @ (others.T @ as_given.weighted))
-        relative = moved[:, None] * nuisances.relative
-
-    @cache
-    def rows(noise: int) -> RowsAtScales:
-        return RowsAtScales(models[noise], residual, base.points, relative)
-
-    summed: dict[tuple[int, int], Summed] = {}
-
-    def log_evidence(fraction: int, noise: int) -> float:
-        if (fraction, noise) not in summed:
-            # gross errors are nearly the same whatever the smooth part; what is not resolved may look like some
-            known = next((result for (_, other), result in list(summed.items()) if other == noise), None)
-            near = (scale, None if noise else inflation) if known is None else (known.scale, known.inflation)
-            summed[fraction, noise] = rows(noise).summed(float(fractions[fraction]), *near)
-        return summed[fraction, noise].log_evidence
-
-    if sizes is None:
-        sizes = int(np.argmin(np.abs(np.log(fractions / nuisances.fraction)))), 0
-    best, noise = sizes if moving else (0, sizes[1])
-
-    def evaluate(*pairs: tuple[int, int]) -> None:
-        """Log evidences that are asked for in any case, in threads."""
-        there = [(f, k) for f, k in pairs if 0 <= f < len(fractions) and 0 <= k < len(models)]
-        in_threads(lambda pair: log_evidence(*pair), there)
-
-    log_evidence(best, noise)
-    evaluate((best - 1, noise), (best + 1, noise))
-    by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
-    best, first = int(np.argmax(by_fraction)), noise
-    evaluate((best, noise - 1), (best, noise + 1))
-    by_noise = outward(lambda number: log_evidence(best, number), first, len(base.noises), _NEGLIGIBLE)
-    noise = int(np.argmax(by_noise))
-    if noise != first:
-        by_fraction = outward(lambda number: log_evidence(number, noise), best, len(fractions), _NEGLIGIBLE)
-        best = int(np.argmax(by_fraction))
-    # as if the evidence were a product of what depends on one size, and on the other
-    if relative is not None:
-        columns = nuisances.with_family(UNKNOWN_MESH, columns, fractions[best] * relative)
-    marginal = marginal_of(base.noises[noise].of_noise(columns), base.points, summed[best, noise])
-    means = [float(np.logaddexp.reduce(logs) - np.log(len(logs)) - logs.max()) for logs in (by_fraction, by_noise)]
-    log_evidence_of_all = marginal.log_evidence + sum(means)
-    return columns, SetMarginal(
-        log_evidence_of_all, marginal.scale, marginal.inflation, marginal.model, marginal.count, (best, noise)
-    )
-
-
-def _displacement(base: Base, left: Floats) -> Floats:
-    """Of the rows (n,) [m], all that was recorded of a point, where some is left (n,): no less than at the base."""
-    sensors = base.at.sensors
-    explained = sensors.residual + sensors.computed - left
-    moved = np.sqrt(np.bincount(sensors.groups, explained**2))[sensors.groups]
-    return np.where(sensors.is_displacement, np.maximum(moved, base.nuisances.displacement), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -440,7 +346,7 @@ class WeightedSet:
             # as a nuisance, which it is again
             of_effect = self.columns[:, self.slices[number].start]
             columns[:, base.nuisances.part(LAW).start + shared.column] = shared.ratio * of_effect
-        columns, reduced = evidence_of(base, columns, residual, self.marginal.scale, self.marginal.sizes)
+        columns, reduced = evidence_of(base, columns, residual, self.marginal.sizes, self.marginal.scale)
         at = self.hypothesis.causes.index(mechanism)
         hypothesis = replace(
             self.hypothesis,
