@@ -470,6 +470,15 @@ def parts_of(proposal: Proposal, c: Floats, sensors: Sensors) -> Floats:
     return np.array(parts)[rows]
 
 
+def relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats], sensors: Sensors) -> Floats:
+    """How many times its effect in the end (n, 1) tissue has when a number was recorded, where stress still relaxes."""
+    stiffness = np.ones(len(sensors))
+    for effect, z in zip(effects, coefficients, strict=True):
+        if effect.proposed.history is not None:
+            stiffness += np.maximum(parts_of(effect.proposed, effect.coefficients(z), sensors), 0.0)
+    return np.where(sensors.is_displacement, 1.0 / stiffness, stiffness)[:, None]
+
+
 def _effect_of_course(proposal: Proposal, course: Course) -> Effect:
     pace = proposal.pace
     assert pace is not None

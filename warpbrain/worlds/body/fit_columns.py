@@ -11,12 +11,13 @@ from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import SolveError
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import is_linear
-from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, parts_of, width_of
+from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, relaxation_factor, width_of
 from warpbrain.worlds.body.evidence import Sizes
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.nuisances import (
     FIELD,
+    ISOCHORIC,
     LAW,
     Nuisances,
     field_columns,
@@ -93,7 +94,7 @@ def columns_about(
     Returns columns (n, q), and the linear model. `SolveError` if the state is unstable or a mechanism not linear there.
     """
     at, columns = state.linearised(), columns.copy()
-    relaxed = _relaxation_factor(effects, [z[part] for part in layout.effects], state.sensors)
+    relaxed = relaxation_factor(effects, [z[part] for part in layout.effects], state.sensors)
     tissue = relaxed * tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
     columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)
     columns[:, layout.field] = layout.field_size * relaxed * field_columns(at, base.states)
@@ -144,16 +145,8 @@ def shape_columns_about(
     deforms. It is not where a mechanism strains tissue by half, and would be taken for a cause. The column of a
     `SharedParameter` is zero.
     """
-    relaxed = _relaxation_factor(effects, coefficients, at.sensors)
-    columns = relaxed * law_columns(Effects(at), states)
+    relaxed, columns = relaxation_factor(effects, coefficients, at.sensors), law_columns(Effects(at), states)
+    # branches are isochoric: what another bulk modulus does is the same at all times, as far as tissue hardly gives way
+    columns[:, ISOCHORIC] *= relaxed
     columns[:, [each.column for each in map(shared_parameter, effects) if each is not None]] = 0.0
     return np.hstack([columns, columns_of_other_shapes(at, effects, coefficients)])
-
-
-def _relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats], sensors: Sensors) -> Floats:
-    """How many times its effect in the end (n, 1) tissue has when a number was recorded, where stress still relaxes."""
-    stiffness = np.ones(len(sensors))
-    for effect, z in zip(effects, coefficients, strict=True):
-        if effect.proposed.history is not None:
-            stiffness += np.maximum(parts_of(effect.proposed, effect.coefficients(z), sensors), 0.0)
-    return np.where(sensors.is_displacement, 1.0 / stiffness, stiffness)[:, None]

@@ -34,6 +34,8 @@ from warpbrain.worlds.body.states import FieldSizes, Hypothesis, States
 LAW = "shape of the law"
 #: Beliefs of its first columns, each of which is a mechanism that every tissue has to a degree.
 _ALWAYS = ("tissue.volume", "tissue.exponent")
+#: Those of its columns that change the isochoric part of the law alone: all but the volume.
+ISOCHORIC = slice(1, None)
 #: The family of stiffness that varies from place to place.
 FIELD = "stiffness field"
 #: The family of what is not known of the mesh's error, and that of mechanisms' shares of it, which only fits have.

@@ -23,7 +23,7 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.causes import Hypothesis
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import UNKNOWN
-from warpbrain.worlds.body.effects import Effect, column_slices, width_of
+from warpbrain.worlds.body.effects import Effect, column_slices, relaxation_factor, width_of
 from warpbrain.worlds.body.evidence import SetMarginal, evidence_of
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
 from warpbrain.worlds.body.nuisances import LAW, shared_parameter
@@ -78,7 +78,8 @@ def mesh_share_of(
 ) -> MeshShare | None:
     """The share of mechanisms at a state; None if a finer mesh does not tell.
 
-    A switch has no size: alone it has a constant share, beside others none.
+    A switch has no size: alone it has a constant share, beside others none. While stress relaxes a body that moves less
+    has less of the error of the state in the end.
 
     `coefficients` (k,): of each effect, in standard deviations about its mean.
     `state`: with these mechanisms.
@@ -87,20 +88,31 @@ def mesh_share_of(
     """
     sized = [not effect.proposed.is_there_or_not for effect in effects]
     parts = list(zip(sized, effects, coefficients, strict=True))
-    scaled = np.concatenate([has_size * effect.offset(z) for has_size, effect, z in parts])
-    mean = np.concatenate([has_size * effect.offset(np.zeros(len(z))) for has_size, effect, z in parts])
+    scaled = np.concatenate([has_size * _size(effect, z) for has_size, effect, z in parts])
+    mean = np.concatenate([has_size * _size(effect, np.zeros(len(z))) for has_size, effect, z in parts])
     square = float(scaled @ scaled)
     # the finer mesh is solved in the end state alone
-    changing = any(effect.proposed.changes_in_time for effect in effects)
-    if (square < 1e-6 and any(sized)) or changing:
+    if (square < 1e-6 and any(sized)) or any(effect.proposed.follows == "course" for effect in effects):
         return None
+    of_tissue, hypothesis = known.of(state.hypothesis.theta, prior), state.hypothesis
+    # in the end, where nothing fades any more
+    left = replace(hypothesis, mechanisms=tuple(m for m in hypothesis.mechanisms if not m.changes_by_itself))
+    fading = all(effect.proposed.history is not None for effect in effects)
     try:
-        error = finer.error(state.hypothesis, state, ENOUGH)
+        error = of_tissue if fading else finer.error(left, state, ENOUGH)
     except SolveError:
         return None
     gradient = scaled / square if any(sized) else np.zeros(len(scaled))
     constant = float(gradient @ mean) if any(sized) else 1.0
-    return MeshShare(excess_error(known, error, state, prior), gradient, constant)
+    sensors = state.sensors
+    whole = relaxation_factor(effects, coefficients, sensors)[:, 0] * expected_answer(sensors, error)
+    return MeshShare(whole - expected_answer(sensors, of_tissue), gradient, constant)
+
+
+def _size(effect: Effect, z: Floats) -> Floats:
+    """Coefficients (k,) less those that have no effect; of what fades the first alone, in proportion to which it is."""
+    offset = effect.offset(z)
+    return offset if effect.proposed.history is None else np.eye(1, len(offset))[0] * offset
 
 
 @dataclass(frozen=True, eq=False)
