@@ -92,11 +92,12 @@ def test_between_two_loaded_states_a_cause_is_what_changed(between: Diagnosis, v
     before, after = between.when.sizes.values
     # what moves is the weight over the stiffness, which is known to a factor
     modulus = float(np.exp(between.search.fitted_with(frozenset(["gravity"])).refit.state.hypothesis.theta[0]))
+    deviation = np.hypot(*between.when.sizes.deviations) / (before - after)
     verify(
-        "fall of a fluid's level between two loaded states over the stiffness of the tissue",
+        "fall of a fluid's level between two loaded states over the stiffness of the tissue, over its standard deviation",
         "levels and stiffness with which the recordings were made",
-        abs((before - after) / modulus / (30.0 / 1000.0) - 1.0),
-        0.1,
+        abs((before - after) / modulus / (30.0 / 1000.0) - 1.0) / deviation,
+        1.0,
     )
 
 
