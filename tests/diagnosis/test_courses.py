@@ -94,7 +94,7 @@ def test_between_two_loaded_states_a_cause_is_what_changed(between: Diagnosis, v
     modulus = float(np.exp(between.search.fitted_with(frozenset(["gravity"])).refit.state.hypothesis.theta[0]))
     deviation = np.hypot(*between.when.sizes.deviations) / (before - after)
     verify(
-        "fall of a fluid's level between two loaded states over the stiffness of the tissue, over its standard deviation",
+        "fall of a fluid's level between two loaded states over the stiffness, over its standard deviation",
         "levels and stiffness with which the recordings were made",
         abs((before - after) / modulus / (30.0 / 1000.0) - 1.0) / deviation,
         1.0,
