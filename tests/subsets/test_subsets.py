@@ -54,11 +54,11 @@ def test_every_case_without_recordings_is_a_sentence(tmp_path):
         assert not (tmp_path / "out").exists()
 
 
-#: Subsets that are not empty, and how many of them are diagnosed with each commit: a try takes up to two minutes.
+#: Subsets that are not empty, and how many of them are diagnosed with each commit: a try takes up to seven minutes.
 _WITH_RECORDINGS, _WITH_EACH_COMMIT = 86, 1
 
 
-@pytest.mark.slow(120)
+@pytest.mark.slow(400)
 @pytest.mark.parametrize("number", drawn_for_this_commit(_WITH_RECORDINGS, _WITH_EACH_COMMIT))
 def test_some_with_recordings_with_each_commit(number):
     """`python -m reliability subsets --seed NUMBER --tries 1` does the same with the error of the mesh."""
