@@ -113,8 +113,8 @@ def about_base(search: HypothesisSearch, weighted_set: WeightedSet, name: str) -
     """
     base = search.base
     others = [effect for kind, effect in zip(weighted_set.acting, weighted_set.effects, strict=True) if kind != name]
-    nuisances, marginal = base.nuisances, weighted_set.marginal
-    of_nuisances = nuisances.with_field(nuisances.columns, nuisances.field_sizes.relative[marginal.sizes.field])
+    marginal = weighted_set.marginal
+    of_nuisances = base.nuisances.columns_with_field(marginal.sizes.field)
     columns = np.column_stack([of_nuisances, *(effect.columns for effect in others), marginal.excess])
     residual = base.residual - sum((effect.mean for effect in others), start=np.zeros(len(base.residual)))
     return GaussianModel(marginal.model.noise_factor, columns, marginal.scale), residual

@@ -29,7 +29,7 @@ _PASSES = 3
 
 
 class Sizes(NamedTuple):
-    """Numbers of the most probable sizes."""
+    """Indices of sizes, the most probable ones unless said otherwise."""
 
     mesh: int  # of the part of its error that is correlated in space, of `mesh.unknown`
     unresolved: int  # of what it does not resolve, of `Base.noises`

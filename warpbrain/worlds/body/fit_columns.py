@@ -124,7 +124,7 @@ def with_shapes_about(fit: Refit, nuisances: Nuisances, sensors: Sensors, base: 
 
     With a stiffness field of the size that the fit has.
     """
-    columns = nuisances.with_field(nuisances.columns, nuisances.field_sizes.relative[fit.marginal.sizes.field])
+    columns = nuisances.columns_with_field(fit.marginal.sizes.field)
     try:
         at = fit.state.linearised(sensors)
     except SolveError:

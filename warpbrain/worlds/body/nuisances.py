@@ -86,6 +86,10 @@ class Nuisances:
         """Columns (n, q + k), or coordinates (1, q + k), those of the stiffness field times a factor."""
         return self.with_family(FIELD, columns, factor * columns[:, self.part(FIELD)])
 
+    def columns_with_field(self, number: int) -> Floats:
+        """Columns (n, q) of all, with the stiffness field of one of its sizes, by its index in `field_sizes`."""
+        return self.with_field(self.columns, self.field_sizes.relative[number])
+
     @property
     def shapes(self) -> Ints:
         """Where the columns of the shapes of laws and of mechanisms are."""

@@ -125,8 +125,7 @@ class Weighing:
         self._names: tuple[str, ...] = () if about is None else about.acting
         self._acting: tuple[Effect, ...] = () if about is None else about.effects
         self._residual = base.residual if about is None else about.residual
-        of_field = base.nuisances.field_sizes.relative[sizes.field]
-        self._columns = base.nuisances.with_field(base.model.columns, of_field) if about is None else about.columns
+        self._columns = base.nuisances.columns_with_field(sizes.field) if about is None else about.columns
         # the same ones are often found with several noises
         self._at = cache(self._acting_with)
 

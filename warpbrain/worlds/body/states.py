@@ -84,7 +84,7 @@ class FieldSizes:
 
     @property
     def typical(self) -> int:
-        """Number of the one nearest to the mean."""
+        """Index of the size nearest to the prior mean."""
         mean = np.exp(self.log_prior) @ self.deviations
         return int(np.argmin(np.abs(np.log(self.deviations / mean))))
 
