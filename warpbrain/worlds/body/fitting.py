@@ -10,7 +10,7 @@ searches are rough.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -146,7 +146,7 @@ class FitSearch:
 
         `about`: of its state, if it was linearised. Returns (q + e + k,): coordinates of that fit.
         """
-        first, coefficients = self._U.shape[1], np.concatenate(subset.coefficients)
+        first, coefficients = self._U.shape[1], np.concatenate([np.zeros(0), *subset.coefficients])
         z, nuisances = np.zeros(len(self.z)), self._base.nuisances
         of_field = nuisances.field_sizes.relative[subset.marginal.sizes.field] / self._layout.field_size
         z[: len(subset.nuisances)] = nuisances.with_field(subset.nuisances[None], of_field)[0]
@@ -571,12 +571,24 @@ class Fitter:
             search.backtrack_to_base()
         best = self._converged(search, wanted)
         for _ in range(_RESIZED):
-            fits = (self._continued(begun, best.log_evidence) for begun in _resized(best))
-            better = next((fit for fit in fits if fit is not None and fit.log_evidence > best.log_evidence), None)
-            if better is None:
+            resized = self._resized(best)
+            if resized is None:
                 break
-            best = better
+            best = resized
         return best
+
+    def _resized(self, fit: Refit) -> Refit | None:
+        """A better fit with an effect of another of its sizes; None if there is none."""
+        disproved: dict[int, float] = {}
+        for number, factor, gain in _better_sizes(fit):
+            # what was not gained with one size is not with another of which no more is expected
+            if gain < disproved.get(number, -np.inf) + _BETTER:
+                continue
+            resized = self._continued(fit.scaled(number, factor), fit.log_evidence)
+            if resized is not None and resized.log_evidence > fit.log_evidence:
+                return resized
+            disproved[number] = gain
+        return None
 
     def _continued(self, begun: Refit, wanted: float) -> Refit | None:
         """The fit that a search from a point comes to; None if it fails. `wanted`: see `fit`."""
@@ -641,14 +653,14 @@ class Fitter:
         return fit
 
 
-def _resized(fit: Refit) -> Iterator[Refit]:
-    """A fit with an effect of another of its sizes that seems better, at the same point; sizes nearby come first.
+def _better_sizes(fit: Refit) -> list[tuple[int, float, float]]:
+    """Number of an effect, factor on its size, and gain [nats] where another size seems better; sizes nearby first.
 
     Which size is the most probable in the linear model about the base is no matter of the fit: there tissue is as
     soft as the base's, and what is far from linear needs more or less of a load. The prior of many coefficients
     would cost tens of nats.
     """
-    tried: list[tuple[float, int, float]] = []
+    better: list[tuple[int, float, float]] = []
     parts = column_slices(fit.effects, fit.columns.shape[1] - width_of(fit.effects))
     for number, (effect, part) in enumerate(zip(fit.effects, parts, strict=True)):
         factors = np.asarray(effect.sizes) / effect.size
@@ -657,6 +669,6 @@ def _resized(fit: Refit) -> Iterator[Refit]:
         others = fit.marginal.noise.of_noise(np.delete(fit.columns, np.r_[part], axis=1))
         cause = Cause("", (Place(fit.columns[:, part]),), 0.0, factors)
         [logs] = Blocks(others, fit.linear, [cause]).log_factors()
-        better = factors[logs > logs[np.argmin(np.abs(factors - 1.0))] + _BETTER]
-        tried += [(abs(np.log(factor)), number, factor) for factor in better.tolist()]
-    return (fit.scaled(number, factor) for _, number, factor in sorted(tried))
+        gains = logs - logs[np.argmin(np.abs(factors - 1.0))]
+        better += [(number, *each) for each in zip(factors.tolist(), gains.tolist(), strict=True) if each[1] > _BETTER]
+    return sorted(better, key=lambda each: abs(np.log(each[1])))

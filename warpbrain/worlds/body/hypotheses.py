@@ -309,7 +309,7 @@ class HypothesisSearch:
         """
         superset = self._sets[names]
         assert superset.refit is not None
-        for cause in superset.acting if len(superset.acting) > 1 else ():
+        for cause in superset.acting if len(names) > 1 else ():
             subset = self._sets.get(names - {cause})
             if subset is None:
                 continue
