@@ -544,8 +544,6 @@ class Fitter:
         self.base = base
         self.mesh_errors = base.mesh_errors
         self.finer = FinerStates(base.states) if base.mesh_errors is None else base.mesh_errors.finer
-        # sizes of effects of which the linear model about a fit has said more than came of them
-        self._disproved: set[tuple[tuple[str, float], ...]] = set()
 
     def fit(
         self,
@@ -575,7 +573,33 @@ class Fitter:
         search.start(starts, nearby or self.base.state)
         if subset is None:
             search.backtrack_to_base()
-        return self._converged(search, wanted)
+        best = self._converged(search, wanted)
+        for _ in range(_RESIZED):
+            resized = self._resized(best)
+            if resized is None:
+                break
+            best = resized
+        return best
+
+    def _resized(self, fit: Refit) -> Refit | None:
+        """A better fit with an effect of another of its sizes; None if there is none."""
+        disproved: dict[int, float] = {}
+        for number, factor, gain in _better_sizes(fit):
+            # what was not gained with one size is not with another of which no more is expected
+            if gain < disproved.get(number, -np.inf) + _BETTER:
+                continue
+            resized = self._continued(fit.scaled(number, factor), fit.log_evidence)
+            if resized is not None and resized.log_evidence > fit.log_evidence:
+                return resized
+            disproved[number] = gain
+        return None
+
+    def _continued(self, begun: Refit, wanted: float) -> Refit | None:
+        """The fit that a search from a point comes to; None if it fails. `wanted`: see `fit`."""
+        try:
+            return self._converged(self._begun_at(begun, begun.effects), wanted)
+        except CANNOT_BE_FITTED:
+            return None
 
     def _begun_at(self, refit: Refit, effects: tuple[Effect, ...], about: Linearisation | None = None) -> FitSearch:
         """A search with effects at the coordinates of a fit; see `begin`."""
@@ -584,46 +608,7 @@ class Fitter:
         return search
 
     def _converged(self, search: FitSearch, wanted: float) -> Refit:
-        """The fit that a search comes to; `wanted`: see `fit`.
-
-        Which size of an effect is the most probable in the linear model about the base is no matter of the fit: there
-        tissue is as soft as the base's, and what is far from linear needs more or less of a load. The prior of many
-        coefficients would cost tens of nats. So the search goes on with another size where the linear model about a
-        point that is nearly the best says so, unless no more comes of it.
-        """
-        fit, ended = self._with_sizes(search, wanted)
-        for _ in range(_RESIZED):
-            resized = self._resized(fit, wanted)
-            if resized is None:
-                break
-            search, fit, ended = resized
-        return fit if ended else self._with_sizes(search, wanted, resizing=False)[0]
-
-    def _resized(self, fit: Refit, wanted: float) -> tuple[FitSearch, Refit, bool] | None:
-        """A better fit with an effect of another of its sizes, as `_with_sizes`, and its search; None if there is none.
-
-        What was not gained with one size is not with another of which no more is expected.
-        """
-        not_gained: dict[int, float] = {}
-        for number, gain, begun in self._better_sizes(fit):
-            if gain < not_gained.get(number, -np.inf) + _BETTER:
-                continue
-            try:
-                search = self._begun_at(begun, begun.effects)
-                resized, ended = self._with_sizes(search, max(wanted, fit.log_evidence))
-            except CANNOT_BE_FITTED:
-                continue
-            if resized.log_evidence > fit.log_evidence:
-                return search, resized, ended
-            not_gained[number] = gain
-            self._disproved.add(_sizes_of(begun))
-        return None
-
-    def _with_sizes(self, search: FitSearch, wanted: float, resizing: bool = True) -> tuple[Refit, bool]:
-        """The best point of a search with effects of the sizes that they have, and whether it has ended there.
-
-        `wanted`: see `fit`. `resizing`: stop near to the best point where another size seems better.
-        """
+        """The fit that a search comes to, with effects of the sizes that they have; `wanted`: see `fit`."""
         enough, best, least, worse = _ROUGHLY, None, np.inf, 0
         for number in range(_ROUNDS):
             search.minimise(_ENOUGH if number == _ROUNDS - 1 else enough)
@@ -631,14 +616,10 @@ class Fitter:
             expected = search.expected_gain()
             # of all that is left of a renewal that is taken in part
             gain = expected / search.taken**2
-            converged = enough == _ENOUGH and gain < _ENOUGH
-            if not converged:
-                fit = replace(fit, unreached=gain, converged=False)
-            if resizing and not converged and gain < _BETTER and self._better_sizes(fit):
-                return fit, False
-            if converged:
+            if enough == _ENOUGH and gain < _ENOUGH:
                 best = fit
                 break
+            fit = replace(fit, unreached=gain, converged=False)
             # a search that ends where it began has the same evidence but for rounding, which must not tell how to go on
             better = best is None or fit.log_evidence > best.log_evidence + _ENOUGH
             worse = 0 if better or gain < least - _ENOUGH else worse + 1
@@ -649,27 +630,7 @@ class Fitter:
         assert best is not None
         if not np.isfinite(best.log_evidence):
             raise FloatingPointError("its evidence is not a number")
-        return best, True
-
-    def _better_sizes(self, fit: Refit) -> list[tuple[int, float, Refit]]:
-        """Number of an effect, gain [nats], and the same point where another size seems better; sizes nearby first.
-
-        Without those of which no more came where the same causes were fitted before.
-        """
-        better = []
-        parts = column_slices(fit.effects, fit.columns.shape[1] - width_of(fit.effects))
-        for number, (effect, part) in enumerate(zip(fit.effects, parts, strict=True)):
-            factors = np.asarray(effect.sizes) / effect.size
-            if len(factors) < 2:
-                continue
-            others = fit.marginal.noise.of_noise(np.delete(fit.columns, np.r_[part], axis=1))
-            cause = Cause("", (Place(fit.columns[:, part]),), 0.0, factors)
-            [logs] = Blocks(others, fit.linear, [cause]).log_factors()
-            gains = logs - logs[np.argmin(np.abs(factors - 1.0))]
-            for factor, gain in zip(factors.tolist(), gains.tolist(), strict=True):
-                if gain > _BETTER and _sizes_of(resized := fit.scaled(number, factor)) not in self._disproved:
-                    better.append((abs(np.log(factor)), number, gain, resized))
-        return [(number, gain, resized) for _, number, gain, resized in sorted(better, key=lambda each: each[0])]
+        return best
 
     def begin(self, effects: tuple[Effect, ...], refit: Refit, about: Linearisation | None) -> Refit:
         """State, residual and Laplace evidence with other effects at the coordinates of a fit, before any iteration.
@@ -696,7 +657,22 @@ class Fitter:
         return fit
 
 
-def _sizes_of(fit: Refit) -> tuple[tuple[str, float], ...]:
-    """Of each effect what acts and its size."""
-    acting = (effect.proposed.make(effect.proposed.mean).kind for effect in fit.effects)
-    return tuple((kind, round(effect.size, 6)) for kind, effect in zip(acting, fit.effects, strict=True))
+def _better_sizes(fit: Refit) -> list[tuple[int, float, float]]:
+    """Number of an effect, factor on its size, and gain [nats] where another size seems better; sizes nearby first.
+
+    Which size is the most probable in the linear model about the base is no matter of the fit: there tissue is as
+    soft as the base's, and what is far from linear needs more or less of a load. The prior of many coefficients
+    would cost tens of nats.
+    """
+    better: list[tuple[int, float, float]] = []
+    parts = column_slices(fit.effects, fit.columns.shape[1] - width_of(fit.effects))
+    for number, (effect, part) in enumerate(zip(fit.effects, parts, strict=True)):
+        factors = np.asarray(effect.sizes) / effect.size
+        if len(factors) < 2:
+            continue
+        others = fit.marginal.noise.of_noise(np.delete(fit.columns, np.r_[part], axis=1))
+        cause = Cause("", (Place(fit.columns[:, part]),), 0.0, factors)
+        [logs] = Blocks(others, fit.linear, [cause]).log_factors()
+        gains = logs - logs[np.argmin(np.abs(factors - 1.0))]
+        better += [(number, *each) for each in zip(factors.tolist(), gains.tolist(), strict=True) if each[1] > _BETTER]
+    return sorted(better, key=lambda each: abs(np.log(each[1])))
