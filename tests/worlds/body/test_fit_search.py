@@ -156,6 +156,19 @@ def test_a_fit_takes_the_most_probable_size(sets):
         assert free.log_evidence == pytest.approx(alone[best], abs=0.1)
 
 
+def test_a_fit_of_nothing_that_acts_may_begin_at_one_of_more(sets):
+    """From the optimum of a set with one mechanism the set without it comes to the same fit as by itself."""
+    weighed, nothing = sets.get(("gravity",)), sets.get(())
+    assert weighed is not None and nothing is not None and not nothing.effects
+    fitter = Fitter(sets.base)
+
+    def fit(begun: Refit | None) -> Refit:
+        return fitter.fit((), nothing.columns, [nothing.coordinates], nothing.marginal, subset=begun)
+
+    larger = fitter.fit(weighed.effects, weighed.columns, [weighed.coordinates], weighed.marginal)
+    assert fit(larger.without(0, sets.base)).log_evidence == pytest.approx(fit(None).log_evidence, abs=0.1)
+
+
 def sized(fit: Refit, number: int) -> Refit:
     """A result whose stiffness field has another size."""
     return replace(fit, marginal=replace(fit.marginal, sizes=fit.marginal.sizes._replace(field=number)))

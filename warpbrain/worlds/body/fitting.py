@@ -578,16 +578,19 @@ class Fitter:
         return best
 
     def _resized(self, fit: Refit) -> Refit | None:
-        """A better fit with an effect of another of its sizes; None if there is none."""
-        disproved: dict[int, float] = {}
+        """The fit with one effect at another of its sizes, if its log evidence is larger; None otherwise.
+
+        A size is left out where the linear model expects no more of it than of one whose fit was no better.
+        """
+        # by effect, the gain that the linear model expected of a size whose fit was no better
+        not_reached: dict[int, float] = {}
         for number, factor, gain in _better_sizes(fit):
-            # what was not gained with one size is not with another of which no more is expected
-            if gain < disproved.get(number, -np.inf) + _BETTER:
+            if gain < not_reached.get(number, -np.inf) + _BETTER:
                 continue
             resized = self._continued(fit.scaled(number, factor), fit.log_evidence)
             if resized is not None and resized.log_evidence > fit.log_evidence:
                 return resized
-            disproved[number] = gain
+            not_reached[number] = gain
         return None
 
     def _continued(self, begun: Refit, wanted: float) -> Refit | None:
@@ -654,7 +657,9 @@ class Fitter:
 
 
 def _better_sizes(fit: Refit) -> list[tuple[int, float, float]]:
-    """Number of an effect, factor on its size, and gain [nats] where another size seems better; sizes nearby first.
+    """Other sizes of larger log evidence in the linear model about a fit, those nearest to the present ones first.
+
+    Of each the number of the effect, the factor on its size, and the gain [nats].
 
     Which size is the most probable in the linear model about the base is no matter of the fit: there tissue is as
     soft as the base's, and what is far from linear needs more or less of a load. The prior of many coefficients
