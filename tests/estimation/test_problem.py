@@ -81,7 +81,8 @@ def test_nuisances_are_integrated_out_of_the_objective_and_of_its_gradient(probl
     gradient = prior.precision @ (point.state.theta - prior.mean) - J.T @ r
     for k in range(2):
         ends = [point.state.theta + step * np.eye(2)[k] for step in (1e-3, -1e-3)]
-        sides = [problem.beside(point, problem.forward.solve(end)).objective for end in ends]
+        about = point.nuisances, point.noise, point.model
+        sides = [problem.at(problem.forward.solve(end), *about).objective for end in ends]
         assert gradient[k] == pytest.approx((sides[0] - sides[1]) / 2e-3, rel=1e-4, abs=1e-3)
 
 

@@ -58,7 +58,7 @@ def test_forms_of_the_first_invariant_are_symmetric_and_no_others():
     known = {name: form for name, form in FORMS.items() if not name.startswith("linear")}
     random = np.random.default_rng(3)
     for form in known.values():
-        keys = next(iter(form.conventions.values())).keys
+        keys = next(iter(form.conventions.values())).keys.values()
         values = {key.name: float(random.uniform(0.1, 0.3)) for key in keys}
         values |= {key.name: (100.0, 30.0) if key.name == "mu" else (-3.0, 5.0) for key in keys if key.several}
         energies = form.energy(stretch_of(np.array([-0.2, 0.2])), **values)

@@ -7,9 +7,8 @@ import pytest
 from scipy.stats import norm
 
 from warpbrain.errors import InputError
-from warpbrain.gp.hierarchy import EFFECTS
+from warpbrain.gp.hierarchy import EFFECTS, OF_CURVES, OF_SIDES
 from warpbrain.gp.leaving_out import (
-    OF_CURVES,
     CoregionalisedCandidate,
     HierarchicalCandidate,
     Prediction,
@@ -76,7 +75,7 @@ def test_a_paper_is_left_out_with_all_its_studies():
         CoregionalisedCandidate("one a group", separate=True),
         CoregionalisedCandidate("with a mean", mean_modulus=1500.0),
         pytest.param(HierarchicalCandidate("hierarchical"), marks=pytest.mark.slow(4)),
-        HierarchicalCandidate("moduli only", without=OF_CURVES),
+        HierarchicalCandidate("moduli only", without=OF_CURVES + OF_SIDES),
     ],
     ids=lambda candidate: candidate.name,
 )
@@ -92,11 +91,11 @@ def test_candidates_predict_densities_that_integrate_to_one(candidate):
 
 
 def test_candidates_lack_what_they_should():
-    assert set(OF_CURVES) <= set(EFFECTS)
+    assert {*OF_CURVES, *OF_SIDES} <= set(EFFECTS)
     separate = CoregionalisedCandidate("one a group", separate=True).fitted(SOME)
     assert not separate.model.parameters.w.any()
-    flat_only = HierarchicalCandidate("moduli only", without=OF_CURVES).fitted(SOME)
-    assert all(flat_only.model.hierarchy.spread[name] == pytest.approx(1e-6) for name in OF_CURVES)
+    flat_only = HierarchicalCandidate("moduli only", without=OF_CURVES + OF_SIDES).fitted(SOME)
+    assert all(flat_only.model.hierarchy.spread[name] == pytest.approx(1e-6) for name in OF_CURVES + OF_SIDES)
     names = [candidate.name for candidate in candidates()]
     assert len(set(names)) == len(names) >= 10
 

@@ -30,9 +30,7 @@ from warpbrain.kernels.batched.motion import batched_motion_kernels
 from warpbrain.kernels.batched.parts import Parts, Pattern
 from warpbrain.kernels.batched.patch_assembly import PatchAssembly
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
-from warpbrain.kernels.module import KernelSet
 from warpbrain.kernels.persistent import shared_memory
-from warpbrain.kernels.tetrahedron import DeviceLaw
 from warpbrain.physics.laws import Law
 from warpbrain.simulation.dynamics import finest_tolerance
 from warpbrain.simulation.model import Material
@@ -44,73 +42,60 @@ def code_of(material: Material) -> tuple[type[Law], str]:
     return type(material.law), material.formulation
 
 
-@dataclass(frozen=True)
 class BatchGroup:
-    """Elements that share a law and formulation."""
+    """Elements that share a law and formulation: the tissues with some `labels`, whose parameters slots have.
 
-    law: DeviceLaw
-    kernels: KernelSet
-    members: NDArray[np.intp]  # elements, and which tissue of the group each is of
-    tissues: NDArray[np.intp]
-    on_device: Any  # the same for its kernels, with parameters
-    exact: wp.array  # the parameters in double precision
-    rows: Floats  # the same on the host, shape (tissues, slots, parameters)
-    known: Mapping[int, Floats]  # rows of each sample by its number, shape (tissues, parameters)
-
-
-class BatchMaterials:
-    """The laws of the samples that are in the slots, of all that may ever be placed, each with materials.
-
-    `InputError` if they are not all of the same laws.
+    `samples` are the materials of all that may ever be placed, by their numbers.
     """
 
-    def __init__(self, system: System, samples: Sequence[Sample], slots: int) -> None:
-        self._system = system
-        self._slots = slots
-        by_number = {sample.number: sample.materials for sample in samples if sample.materials is not None}
-        first = next(iter(by_number.values()))
-        for number, materials in by_number.items():
-            for label, material in materials.items():
-                if label not in first or code_of(material) != code_of(first[label]):
-                    raise InputError(
-                        f"sample {number}: tissue {label}: {material.law.name} ({material.formulation}): all samples "
-                        "of an ensemble have the same laws, with parameters of their own"
-                    )
-        labels: dict[tuple[type[Law], str], list[int]] = {}
-        for label in sorted(first):
-            labels.setdefault(code_of(first[label]), []).append(label)
-        self.groups = [self._group(alike, by_number) for alike in labels.values()]
-
-    def _group(self, labels: list[int], samples: Mapping[int, Mapping[int, Material]]) -> BatchGroup:
-        system, p = self._system, self._system.precision
+    def __init__(
+        self, system: System, labels: list[int], samples: Mapping[int, Mapping[int, Material]], slots: int
+    ) -> None:
         everyone = [materials[label] for materials in samples.values() for label in labels]
         law_type, formulation = code_of(everyone[0])
         # all at once: laws with fewer terms than another get terms of no weight
         laws = law_type.parameter_rows([material.law for material in everyone])
         table = np.array([(m.volumetric_modulus, *row) for m, row in zip(everyone, laws, strict=True)])
         table = table.reshape(len(samples), len(labels), -1)
-        # slots that never hold a sample hold the parameters of one, not zeros that a law may divide by
-        rows = np.repeat(table[0][:, None], self._slots, axis=1)
+        self._of_samples = dict(zip(samples, table, strict=True))
+        # (tissues, slots, parameters); slots that never hold a sample hold the parameters of one, not zeros that a law
+        # may divide by
+        self._rows = np.repeat(table[0][:, None], slots, axis=1)
         tissue = system.model.mesh.tissue
-        members = np.flatnonzero(np.isin(tissue, labels))
-        tissues = np.searchsorted(labels, tissue[members])
-        law = law_type.device_law(formulation)
-        array = partial(wp.array, device=system.device)
-        made, kernels = batched_element_kernels(law, p)
-        group = made()
-        group.elements, group.tissue = array(members, dtype=int), array(tissues, dtype=int)
-        flat = rows.reshape(-1, rows.shape[2])
-        group.parameters, exact = array(flat, dtype=p.scalar), array(flat, dtype=wp.float64)
-        known = dict(zip(samples, table, strict=True))
-        return BatchGroup(law, kernels, members, tissues, group, exact, rows, known)
+        # elements, and which tissue of the group each is of
+        self.members = np.flatnonzero(np.isin(tissue, labels))
+        self.tissues = np.searchsorted(labels, tissue[self.members])
+        self.law = law_type.device_law(formulation)
+        made, self.kernels = batched_element_kernels(self.law, system.precision)
+        array, flat = partial(wp.array, device=system.device), self._rows.reshape(-1, self._rows.shape[2])
+        # the same for its kernels, with parameters, and these in double precision
+        self.on_device, self.exact = made(), array(flat, dtype=wp.float64)
+        self.on_device.elements, self.on_device.tissue = array(self.members, dtype=int), array(self.tissues, dtype=int)
+        self.on_device.parameters = array(flat, dtype=system.precision.scalar)
 
     def place(self, numbers: Mapping[int, int]) -> None:
-        """Put samples, by their numbers, into slots."""
-        for group in self.groups:
-            for slot, number in numbers.items():
-                group.rows[:, slot] = group.known[number]
-            for parameters in (group.on_device.parameters, group.exact):
-                parameters.assign(group.rows.reshape(-1, group.rows.shape[2]))
+        """Put the parameters of samples, by their numbers, into slots."""
+        for slot, number in numbers.items():
+            self._rows[:, slot] = self._of_samples[number]
+        for parameters in (self.on_device.parameters, self.exact):
+            parameters.assign(self._rows.reshape(-1, self._rows.shape[2]))
+
+
+def groups_of(system: System, samples: Sequence[Sample], slots: int) -> list[BatchGroup]:
+    """Groups of the laws of samples; `InputError` if they are not all of the same laws."""
+    by_number = {sample.number: sample.materials for sample in samples if sample.materials is not None}
+    first = next(iter(by_number.values()))
+    for number, materials in by_number.items():
+        for label, material in materials.items():
+            if label not in first or code_of(material) != code_of(first[label]):
+                raise InputError(
+                    f"sample {number}: tissue {label}: {material.law.name} ({material.formulation}): all samples "
+                    "of an ensemble have the same laws, with parameters of their own"
+                )
+    labels: dict[tuple[type[Law], str], list[int]] = {}
+    for label in sorted(first):
+        labels.setdefault(code_of(first[label]), []).append(label)
+    return [BatchGroup(system, alike, by_number, slots) for alike in labels.values()]
 
 
 def pattern_of(system: System) -> Pattern:
@@ -200,7 +185,7 @@ class Batch:
         self.system, self.slots = system, slots
         self._linger = linger
         self._device, self._precision = system.device, system.precision
-        self._materials = BatchMaterials(system, samples, slots)
+        self._groups = groups_of(system, samples, slots)
         self._kernels = batched_motion_kernels(system.precision)
         _, self._sums_kernels = batched_solve_kernels(system.precision)
         self.shapes = np.zeros((0, system.size, 3)) if shapes is None else shapes
@@ -240,8 +225,8 @@ class Batch:
         s.external = self._array(model.external_forces(), p.vec3)
         if len(self.shapes):
             s.shapes = self._array(self.shapes, p.vec3)
-        self._chunks, self._groups = stages(n)
-        s.shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._groups, b)
+        self._chunks, self._stages = stages(n)
+        s.shares, self._sums = self._zeros(2, self._chunks, b), self._zeros(2, self._stages, b)
         # and what it tells: two norms, the smallest `J`, and whether these are new
         self._summary = self._zeros(4, b)
         self._totals, self._min_J = self._summary[:2], self._summary[2:3]
@@ -257,7 +242,13 @@ class Batch:
         )  # fmt: skip
         s.values, s.b, s.solving = self._cg.values, self._cg.right_hand_side, self._cg.solving
         # matrices are made of elements where they are solved for, or of tangents in memory
-        self._patches = self._patch_assembly() if self._cg.side_by_side else None
+        self._patches = None
+        if self._cg.side_by_side:
+            self._patches = PatchAssembly(
+                [(group.law, group.members, group.tissues, group.exact) for group in self._groups],
+                model.mesh.points, system.tetrahedra, system.shape_gradients, model.mesh.volumes, system.pairs.numpy(),
+                system.free.numpy() != 0.0, system.mass, s.u, s.values, p, shared_memory(self._device),
+            )  # fmt: skip
         s.tangents = self._zeros(0 if self._patches else m, TANGENT, b)
         self._every = self._array(np.arange(n), int)
         self.held = np.flatnonzero(np.any(model.constrained, axis=1))
@@ -269,14 +260,6 @@ class Batch:
         self._graph: Any = None
         self._graph_ahead: Any = None
         self._states_copied = wp.Event(self._device) if self._device.is_cuda else None
-
-    def _patch_assembly(self) -> PatchAssembly:
-        s, mesh = self.system, self.system.model.mesh
-        return PatchAssembly(
-            [(group.law, group.members, group.tissues, group.exact) for group in self._materials.groups],
-            mesh.points, s.tetrahedra, s.shape_gradients, mesh.volumes, s.pairs.numpy(), s.free.numpy() != 0.0, s.mass,
-            self._samples.u, self._cg.values, self._precision, shared_memory(self._device),
-        )  # fmt: skip
 
     def _array(self, values: Any, dtype: Any) -> wp.array:
         return wp.array(values, dtype=dtype, device=self._device)
@@ -294,7 +277,8 @@ class Batch:
         """Put samples, by their numbers, into slots: at rest, to be evaluated in the next pass."""
         if not numbers:
             return
-        self._materials.place(numbers)
+        for group in self._groups:
+            group.place(numbers)
         slots = self._array(list(numbers), int)
         self._launch(self._kernels.reset, (self.system.size, len(numbers)), slots, self._samples)
 
@@ -401,7 +385,7 @@ class Batch:
             self._assemble(begun)
         self._launch(self._kernels.begin, nodes, *begun, s)
         if len(self.shapes):
-            for group in self._materials.groups:
+            for group in self._groups:
                 of_elements = len(group.members), self.slots
                 self._launch(group.kernels.tangents_times, of_elements, *begun, group.on_device, s)
             self._launch(self._kernels.constrained_load, nodes, *begun, s)
@@ -418,11 +402,11 @@ class Batch:
     def _evaluate(self) -> None:
         """Forces, tangents where they are kept, `J` and balance at the states of the fresh list."""
         s, lanes, fresh = self._samples, self.slots, self._fresh
-        for group in self._materials.groups:
+        for group in self._groups:
             kernel = group.kernels.forces_and_tangents if self._patches is None else group.kernels.forces
             self._launch(kernel, (len(group.members), lanes), *fresh, group.on_device, s)
         self._launch(self._kernels.gather_forces, (self._chunks, lanes), *fresh, s)
-        self._launch(self._sums_kernels.add_shares, (2, self._groups, lanes), *fresh, s.shares, self._sums)
+        self._launch(self._sums_kernels.add_shares, (2, self._stages, lanes), *fresh, s.shares, self._sums)
         self._launch(self._sums_kernels.add_sums, (2, lanes), *fresh, self._sums, self._totals)
         shares = self._least_J.shape[0]
         self._launch(self._kernels.smallest, (shares, lanes), *fresh, self._J_share, s.element_J, self._least_J)

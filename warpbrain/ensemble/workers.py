@@ -98,17 +98,13 @@ class Job:
         parts += [self.steps, self.time_step, self.tolerance, self.precision, sorted(self.versions.items()), kind]
         for part in parts:
             for item in part if isinstance(part, tuple) else (part,):
-                digest.update(np.ascontiguousarray(item).tobytes() if isinstance(item, np.ndarray) else _text(item))
+                digest.update(item.tobytes() if isinstance(item, np.ndarray) else f"{item!r};".encode())
         return digest.hexdigest()
 
 
 def acts_before_all(mechanism: type[Mechanism]) -> bool:
     """Whether a mechanism is done with once loads and mesh are made, whatever the laws and the deformation are."""
     return issubclass(mechanism, Load) or hasattr(mechanism, "remaining")
-
-
-def _text(value: Any) -> bytes:
-    return f"{value!r};".encode()
 
 
 #: Samples beyond which a batch is no faster a sample, by kind of device; docs/ensembles.md has the times. On a CPU a
@@ -189,7 +185,6 @@ class Here:
         self.name = f"{self._device.name} ({self._device.alias})"
 
     def outcomes(self, job: Job) -> Iterator[list[Outcome]]:
-        """See `Workers`."""
         return job.outcomes(self._device.alias, self._batch)
 
 

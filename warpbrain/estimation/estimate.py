@@ -177,8 +177,8 @@ class Estimation:
         finer = [FinerMesh(self._device) for _ in self.forward.states]
         for _ in range(_MOST_ERRORS):
             self.listener.stage("error of the mesh: one equilibrium on elements of half the size")
-            state, first_order = modes[0].point.state, modes[0].linearised
-            errors.append(discretisation_error(finer, self.forward, state, (first_order.du, first_order.dR)))
+            state, derivatives = modes[0].point.state, modes[0].linearised.derivatives
+            errors.append(discretisation_error(finer, self.forward, state, derivatives))
             modes = self.fit(Nuisances(believed, errors[-1], self._registration), modes)
             if np.sqrt(2.0 * modes[0].laplace.posterior.negative_log(errors[-1].change.theta)) <= _SETTLED:
                 break

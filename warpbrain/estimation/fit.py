@@ -241,7 +241,7 @@ class GaussNewton:
                 predicted = here.state.u + np.tensordot(theta - here.state.theta, derivatives.du, axes=1)
                 state = problem.forward.solve_from(theta, (predicted, here.state.u))
                 newton += state.newton_iterations
-                there = problem.beside(start, state)
+                there = problem.at(state, start.nuisances, start.noise, start.model)
                 if there.objective < here.objective:
                     trial = there, problem.linearise(there)
             white = start.model.standardised(there.residual)

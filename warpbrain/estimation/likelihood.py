@@ -29,17 +29,6 @@ LEAST_SIGMA = 1e-9
 _ROUNDS, _SETTLED = 6, 2e-4
 
 
-def _beginnings(rows: Sensors) -> tuple[Floats, list[Bools], list[Bools]]:
-    """Standard deviation (n,) of each row, where none is declared relative to the others of the recording.
-
-    And the rows (n,) of each recording that declares it, and of each that does not.
-    """
-    undeclared = np.isnan(rows.sigma)
-    members = [rows.recordings == number for number in np.unique(rows.recordings)]
-    sigma = np.where(undeclared, 1.0 / np.sqrt(rows.weights), rows.sigma)
-    return sigma, [m for m in members if not undeclared[m].any()], [m for m in members if undeclared[m].any()]
-
-
 def typical_size(numbers: Floats, groups: Ints) -> float:
     """Standard deviation of numbers (n,) of which few are gross errors, by the median length of points.
 
@@ -160,7 +149,12 @@ class Likelihood:
         In the middle of the prior residuals are `expected` (n,), by the linear model about the fit, and one standard
         deviation of each number that is estimated changes them by `columns` (n, k).
         """
-        sigma, declared, undeclared = _beginnings(rows)
+        unknown = np.isnan(rows.sigma)
+        # where none is declared, relative to the others of the recording
+        sigma = np.where(unknown, 1.0 / np.sqrt(rows.weights), rows.sigma)
+        # rows (n,) of each recording
+        members_of = [rows.recordings == number for number in np.unique(rows.recordings)]
+        undeclared = [members for members in members_of if unknown[members].any()]
         left = expected
         for _ in range(2 if undeclared else 0):
             for members in undeclared:
@@ -176,7 +170,7 @@ class Likelihood:
                 noise = noise.with_gross_errors(expected, columns)
                 for members in undeclared:
                     noise = noise.with_likely_sigma(members, expected, columns)
-                if declared:
+                if len(undeclared) < len(members_of):
                     noise = noise.with_likely_scale(expected, columns)
                 if noise.is_near(last):
                     break

@@ -138,18 +138,11 @@ class Problem:
         """What was recorded beside a state, values of nuisances (q,) taken off."""
         return self.observations.at(*self.nuisances.observed(state, nuisances), motion=self.nuisances.motion(nuisances))
 
-    def at(self, state: State, nuisances: Floats, noise: Noise) -> Point:
-        """The objective at a state, nuisances linear about some values (q,) of them."""
+    def at(self, state: State, nuisances: Floats, noise: Noise, model: GaussianModel | None = None) -> Point:
+        """The objective at a state, nuisances linear about some values (q,) of them; or with the columns of a model."""
         rows = self.seen(state, nuisances)
-        model = noise.model.of_noise(self.nuisances.columns(rows, state.theta, nuisances), noise.scale)
-        return self._point(state, nuisances, rows, noise, model)
-
-    def beside(self, point: Point, state: State) -> Point:
-        """The objective at a state near a point, with the same columns of nuisances."""
-        rows = self.seen(state, point.nuisances)
-        return self._point(state, point.nuisances, rows, point.noise, point.model)
-
-    def _point(self, state: State, nuisances: Floats, rows: Sensors, noise: Noise, model: GaussianModel) -> Point:
+        if model is None:
+            model = noise.model.of_noise(self.nuisances.columns(rows, state.theta, nuisances), noise.scale)
         residual = rows.residual + model.columns @ self.nuisances.standardised(nuisances)
         misfit = -float(model.log_density(residual)) - noise.log_prior
         objective = misfit + self.mode.gaussian.negative_log(state.theta)

@@ -194,6 +194,7 @@ class Likelihood:
         assert info == 0
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         G = 0.5 * (inverse - np.outer(a, a))
+        members = (data.task[:, None] == np.arange(TASKS)).astype(np.float64)
         by_B = self._blocks(G * k)
         by_noise = np.bincount(data.task, weights=np.diag(G) / data.count, minlength=TASKS)
         extra = np.bincount(data.task, weights=data.count - 1, minlength=TASKS) / noise - self._scatter / noise**2
@@ -203,8 +204,6 @@ class Likelihood:
             np.diag(by_B) * parameters.kappa,
             (by_noise + 0.5 * extra) * noise,
         ]
-        members = np.zeros((data.size, TASKS))
-        members[np.arange(data.size), data.task] = 1.0
         by_task = k @ (members * a[:, None])
         # columns K_i a, of the length scale, w, kappa and the noise
         columns = [
@@ -497,9 +496,8 @@ class Coregionalised:
 
 def training_points(studies: Sequence[Study], mean_modulus: float = 0.0, count: int = 100) -> Replicates:
     """What the process learns from: `count` log energies of each study minus their prior mean, replicates reduced."""
-    points = dataset(studies, count)
-    away = points.log_energy - prior_mean(points.stretch, mean_modulus)
-    return Replicates.of(points.task, points.stretch, away)
+    task, stretch, log_energies = dataset(studies, count)
+    return Replicates.of(task, stretch, log_energies - prior_mean(stretch, mean_modulus))
 
 
 def prior_mean(stretches: Floats, modulus: float) -> Floats:

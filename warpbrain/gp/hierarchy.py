@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,6 +55,9 @@ MEAN_ASYMMETRY = (1.0, 0.5)
 #: moduli end changing, so that energies go on as neo-Hookean ones there.
 REACH = 0.5
 
+#: Effects that make a modulus change with strain, and differ between tension and compression.
+OF_CURVES = ("curve", "curve, anatomy", "curve, paper", "curve, study")
+OF_SIDES = ("asymmetry, paper", "asymmetry, study", "asymmetry at rest, paper", "asymmetry at rest, study")
 #: Effects and what their standard deviation is thought to be before the data are seen: the median of a log-normal prior
 #: whose logarithm has the standard deviation `PRIOR_SPREAD`.
 EFFECTS = {
@@ -62,18 +65,10 @@ EFFECTS = {
     "anatomy": 0.5,
     "group": 0.5,
     "paper": 0.7,
-    "study, MRE": 0.7,
-    "study, linear": 0.7,
-    "study, hyperelastic": 0.7,
+    **{f"study, {method}": 0.7 for method in METHODS},
     "study, abnormal": 1.0,
-    "curve": 0.5,
-    "curve, anatomy": 0.5,
-    "curve, paper": 0.5,
-    "curve, study": 0.5,
-    "asymmetry, paper": 0.3,
-    "asymmetry, study": 0.3,
-    "asymmetry at rest, paper": 0.3,
-    "asymmetry at rest, study": 0.3,
+    **dict.fromkeys(OF_CURVES, 0.5),
+    **dict.fromkeys(OF_SIDES, 0.3),
 }
 PRIOR_SPREAD = 1.0
 #: Standard deviation of what is left of a log modulus, not learnt: a published formula is not its data. Below 3 % the
@@ -239,30 +234,20 @@ class Structure:
         """Of two sets of places."""
         count = len(ANATOMIES)
         method_a, method_b = a.task // count, b.task // count
-        anatomy = _same(a.task % count, b.task % count)
-        paper, study = _same(a.source, b.source), _same(a.study, b.study)
+        same = {"anatomy": _same(a.task % count, b.task % count), "paper": _same(a.source, b.source)}
+        same["study"] = study = _same(a.study, b.study)
         abnormal = (a.task % count == ANATOMIES.index("abnormal")).astype(float)[:, None]
-        constant = {
-            "method": _same(method_a, method_b),
-            "anatomy": anatomy,
-            "group": _same(a.task, b.task),
-            "paper": paper,
-            "study, abnormal": study * abnormal,
-        }
+        constant = {"method": _same(method_a, method_b), "anatomy": same["anatomy"], "group": _same(a.task, b.task)}
+        constant |= {"paper": same["paper"], "study, abnormal": study * abnormal}
         for index, method in enumerate(METHODS):
             constant[f"study, {method}"] = study * (1.0 - abnormal) * (method_a == index)[:, None]
         x, y = bounded_strain(a.stretch)[:, None], bounded_strain(b.stretch)[None, :]
         curved = np.outer(a.curved, b.curved).astype(float)
         both = np.outer(a.asymmetric, b.asymmetric).astype(float)
         sides = both * np.sign(x) * np.sign(y)
-        constant |= {"asymmetry at rest, paper": paper * sides, "asymmetry at rest, study": study * sides}
-        even = {
-            "curve": curved,
-            "curve, anatomy": anatomy * curved,
-            "curve, paper": paper * curved,
-            "curve, study": study * curved,
-        }
-        odd = {"asymmetry, paper": paper * both, "asymmetry, study": study * both}
+        constant |= {f"asymmetry at rest, {level}": same[level] * sides for level in ("paper", "study")}
+        even = {"curve": curved} | {f"curve, {level}": matrix * curved for level, matrix in same.items()}
+        odd = {f"asymmetry, {level}": same[level] * both for level in ("paper", "study")}
         sizes = np.abs(x[:, 0]), np.abs(y[0])
         means = mean_asymmetry_of(a), mean_asymmetry_of(b)
         return cls(constant, even, odd, np.abs(x - y), np.abs(x + y), *sizes, *means)
@@ -387,14 +372,6 @@ def negative_log_likelihood(hierarchy: Hierarchy, seen: Observations) -> tuple[f
 ANCHORS = np.linspace(0.4, 1.8, 57)
 
 
-class Structures(NamedTuple):
-    """Structures of observations with places and with other places, and between the two, under any hierarchy."""
-
-    at: Structure
-    other: Structure
-    between: Structure
-
-
 @dataclass(frozen=True, eq=False)
 class Conditional:
     """The normal distribution of log moduli under a hierarchy, given observations."""
@@ -402,9 +379,11 @@ class Conditional:
     hierarchy: Hierarchy
     seen: Observations
 
-    def moments(self, structures: Structures) -> tuple[Floats, Floats]:
-        """Mean at places (n,) and covariance with other places (n, m)."""
-        at, other, between = structures
+    def moments(self, at: Structure, other: Structure, between: Structure) -> tuple[Floats, Floats]:
+        """Mean at places (n,) and covariance with other places (n, m).
+
+        By the structures of observations with places and with other places, and between the two.
+        """
         k = self._whitened(self.hierarchy.covariance(at))
         to = k if other is at else self._whitened(self.hierarchy.covariance(other))
         return CENTRE + k.T @ self._factored[1], self.hierarchy.covariance(between) - k.T @ to
@@ -489,9 +468,8 @@ class Hierarchical:
 
     def moments(self, at: Places) -> list[tuple[Floats, Floats]]:
         """Mean (n,) and covariance (n, n) of the log secant modulus at places, under each hierarchy."""
-        here = Structure.of(self._seen.places, at)
-        structures = Structures(here, here, Structure.of(at, at))
-        return [each.moments(structures) for each in self.conditionals]
+        here, among = Structure.of(self._seen.places, at), Structure.of(at, at)
+        return [each.moments(here, here, among) for each in self.conditionals]
 
     @staticmethod
     def places(groups: Sequence[str], stretches: ArrayLike) -> Places:
@@ -519,7 +497,7 @@ class Hierarchical:
             there = here if other is at else self.places(groups, other)
             to = Structure.of(seen, here)
             to_others = to if other is at else Structure.of(seen, there)
-            return self.conditionals[which].moments(Structures(to, to_others, Structure.of(here, there)))
+            return self.conditionals[which].moments(to, to_others, Structure.of(here, there))
 
         return log_energy(l, self._draws[which].at(tuple(groups), l, normal[1:], moments))
 

@@ -18,7 +18,7 @@ import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from scipy.special import logsumexp, ndtr
@@ -30,6 +30,8 @@ from warpbrain.gp.coregionalised import JITTER, TASKS, Coregionalised, Likelihoo
 from warpbrain.gp.hierarchy import (
     CENTRE,
     MEAN_ASYMMETRY,
+    OF_CURVES,
+    OF_SIDES,
     SAMPLE,
     Hierarchical,
     fit_hierarchy,
@@ -42,12 +44,8 @@ from warpbrain.gp.literature.study import METHODS, OFFSET, Study, invariant, log
 DEFAULT = "hierarchical (the default)"
 #: Of each study, for the coregionalised candidates.
 POINTS = 20
-#: Effects that a hierarchical candidate can lack.
+#: Effects of papers, which a hierarchical candidate can lack.
 OF_PAPERS = ("paper", "curve, paper", "asymmetry, paper", "asymmetry at rest, paper")
-OF_CURVES = (
-    *("curve", "curve, anatomy", "curve, paper", "curve, study"),
-    *("asymmetry, paper", "asymmetry, study", "asymmetry at rest, paper", "asymmetry at rest, study"),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,27 +61,6 @@ class Prediction:
     error: Floats
 
 
-class Candidate(Protocol):
-    """A kind of model, fitted or not."""
-
-    @property
-    def name(self) -> str:
-        """What it is, in a few words."""
-
-    def fitted(self, studies: Sequence[Study]) -> Candidate:
-        """The same kind fitted to studies, from where it stands."""
-
-    def predict(self, study: Study, stretches: Floats) -> Prediction:
-        """What it says of a study that it was not fitted to."""
-
-    def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
-        """How probable it holds it to be that studies which it was not fitted to are softer in the mean.
-
-        The level is the mean log energy over the stretches of a study, and over studies. Points of a study, and studies
-        of a paper, are no independent witnesses of a model's calibration; levels of papers are.
-        """
-
-
 @dataclass(frozen=True, eq=False)
 class CoregionalisedCandidate:
     """The paper's process, or one like it: `separate` groups share nothing but a length scale."""
@@ -96,6 +73,7 @@ class CoregionalisedCandidate:
     model: Coregionalised | None = None
 
     def fitted(self, studies: Sequence[Study]) -> CoregionalisedCandidate:
+        """The same kind fitted to studies, from where it stands."""
         data = training_points(studies, self.mean_modulus, POINTS)
         likelihood = Likelihood(data, self.kernel, JITTER)
         if self.model is not None:
@@ -110,12 +88,18 @@ class CoregionalisedCandidate:
         return replace(self, model=model)
 
     def predict(self, study: Study, stretches: Floats) -> Prediction:
+        """What it says of a study that it was not fitted to."""
         assert self.model is not None
         mean, spread = self.model.log_energy(study.group, stretches)
         error = np.log(study.energy(stretches) + OFFSET) - mean
         return _predicted(error[None], spread[None], error)
 
     def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
+        """How probable it holds it to be that studies which it was not fitted to are softer in the mean.
+
+        The level is the mean log energy over the stretches of a study, and over studies. Points of a study, and studies
+        of a paper, are no independent witnesses of a model's calibration; levels of papers are.
+        """
         assert self.model is not None
         mean, spread = self.model.level_of(studies, stretches)
         pairs = zip(studies, stretches, strict=True)
@@ -139,6 +123,7 @@ class HierarchicalCandidate:
     model: Hierarchical | None = None
 
     def fitted(self, studies: Sequence[Study]) -> HierarchicalCandidate:
+        """As `CoregionalisedCandidate.fitted`."""
         first = None if self.model is None else self.model.hierarchy
         seen = observations(studies)
         hierarchy, _ = fit_hierarchy(seen, self.kernel, first, self.without, self.mean_asymmetry)
@@ -146,6 +131,7 @@ class HierarchicalCandidate:
         return replace(self, model=Hierarchical(tuple(studies), hierarchy, "", sample))
 
     def predict(self, study: Study, stretches: Floats) -> Prediction:
+        """As of `CoregionalisedCandidate`."""
         assert self.model is not None
         moments = self.model.moduli_of([study], [stretches])
         means = np.array([mean for mean, _ in moments])
@@ -158,13 +144,16 @@ class HierarchicalCandidate:
         return _predicted(errors, spreads, away, slope)
 
     def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
-        """See `Candidate`; of log secant moduli, which differ from log energies by what is known."""
+        """As of `CoregionalisedCandidate`; of log secant moduli, which differ from log energies by what is known."""
         assert self.model is not None
         moduli = [log_secant_modulus(l, study.energy(l)) for study, l in zip(studies, stretches, strict=True)]
         level = np.mean([of_study.mean() for of_study in moduli])
         weights = np.concatenate([np.full(len(of_study), 1.0 / len(of_study) / len(moduli)) for of_study in moduli])
         each = ((weights @ m, np.sqrt(weights @ c @ weights)) for m, c in self.model.moduli_of(studies, stretches))
         return float(np.mean([ndtr((level - mean) / spread) for mean, spread in each]))
+
+
+Candidate = CoregionalisedCandidate | HierarchicalCandidate
 
 
 def candidates() -> tuple[Candidate, ...]:
@@ -183,7 +172,7 @@ def candidates() -> tuple[Candidate, ...]:
         HierarchicalCandidate("hierarchical, Matern 3/2", "matern32"),
         HierarchicalCandidate("hierarchical, squared exponential", "squared-exponential"),
         HierarchicalCandidate("hierarchical, papers not told apart", without=OF_PAPERS),
-        HierarchicalCandidate("hierarchical, moduli only", without=OF_CURVES, mean_asymmetry=(0.0, 0.0)),
+        HierarchicalCandidate("hierarchical, moduli only", without=OF_CURVES + OF_SIDES, mean_asymmetry=(0.0, 0.0)),
         HierarchicalCandidate("hierarchical, no mean asymmetry", mean_asymmetry=(0.0, 0.0)),
         HierarchicalCandidate("hierarchical, best hierarchy alone", sample=0),
     )
@@ -214,8 +203,8 @@ class Score:
     coverage_50: float  # part of the points within the central interval of 50 %
     coverage_95: float
     values: tuple[float, ...]  # log density of each study or paper
-    #: Probability integral transform of the level of each (`Candidate.level_pit`), evenly spread between 0 and 1 if the
-    #: model is calibrated; empty where it was not computed.
+    #: Probability integral transform of the level of each (`level_pit`), evenly spread between 0 and 1 if the model is
+    #: calibrated; empty where it was not computed.
     levels: tuple[float, ...] = ()
 
     @property

@@ -30,10 +30,8 @@ from warpbrain.gp.process import Process
 if TYPE_CHECKING:
     from warpbrain.physics.laws import Law
 
-#: How far exponents are searched: the paper's two settings.
-SEARCHES = ("low", "high")
-#: Largest `|alpha|` of the paper's searches; "high" has boxes to 5, 10, 20 and 50 there.
-_LIMITS = {"low": 5.0, "high": 50.0}
+#: Largest `|alpha|` that is searched. The paper has two settings: 5, and boxes to 5, 10, 20 and 50.
+FARTHEST = 50.0
 #: Smallest `|alpha|` that is positive or negative: between them laws are unstable (-2 to 1, the paper allows 0.1).
 _POSITIVE, _NEGATIVE = 0.1, 2.1
 #: Relative change of cost and of parameters at which a search ends.
@@ -81,8 +79,8 @@ class MetaModel:
         """Its derivatives by the parameters, (n, p): the numerators of supplement eq. (3)."""
         return np.stack([psi(stretches) for psi in self.basis], axis=1)
 
-    def boxes(self, search: str = "high") -> tuple[Box, ...]:
-        """Boxes whose best optimum is the fit, for one of `SEARCHES`."""
+    def boxes(self, limit: float = FARTHEST) -> tuple[Box, ...]:
+        """Boxes whose best optimum is the fit, with exponents up to a limit."""
         size = len(self.basis)
         return (Box((self.least,) * size, (math.inf,) * size, (1000.0,) * size),)
 
@@ -118,15 +116,13 @@ class _Ogden(MetaModel):
         """`e^x + 2 e^(-x/2) - 3`: with `q = e^(x/2)` it is `(q - 1)^2 (1 + 2/q)`, which has all its digits near 0."""
         return np.expm1(0.5 * power) ** 2 * (1.0 + 2.0 * np.exp(-0.5 * power))
 
-    def boxes(self, search: str = "high") -> tuple[Box, ...]:
+    def boxes(self, limit: float = FARTHEST) -> tuple[Box, ...]:
         """Exponents of either sign, each searched from its smallest and from its largest.
 
-        "low" goes to 5 and -5, as the paper's two boxes. "high" goes to 50 and -50: the paper has boxes to 5, 10, 20
-        and 50 there, all with the start of the smallest exponent, and the last of them holds the others. A curve can
-        have two optima in positive exponents (Schiavone 2009: 0.1 and 12.2), and then all searches of the paper may end
-        in the worse one: in one of 300 curves, of which searches from both ends missed none.
+        All boxes of the paper have the start of the smallest exponent, and the last of them holds the others. A curve
+        can have two optima in positive exponents (Schiavone 2009: 0.1 and 12.2), and then all searches of the paper may
+        end in the worse one: in one of 300 curves, of which searches from both ends missed none.
         """
-        limit = _LIMITS[search]
         return (
             *(Box((0.1, _POSITIVE), (math.inf, limit), (1000.0, alpha)) for alpha in (_POSITIVE, limit)),
             *(Box((-math.inf, -limit), (-0.1, -_NEGATIVE), (-1000.0, -alpha)) for alpha in (_NEGATIVE, limit)),
@@ -183,14 +179,14 @@ class Fit:
 
 
 def fit(
-    model: MetaModel, stretches: ArrayLike, log_energy: ArrayLike, search: str = "high", offset: float = 1e-3
+    model: MetaModel, stretches: ArrayLike, log_energy: ArrayLike, limit: float = FARTHEST, offset: float = 1e-3
 ) -> Fit:
     """Fit a meta-model to a curve of stretches `l` (n,), in any order, and log energies `y` (n,): the best optimum in
     all its boxes, `converged` False if no parameters come near to it.
 
-    `search` is one of `SEARCHES`, `offset` is `d` [Pa]. `InputError` if the arrays are not finite, of different lengths
-    or shorter than the parameters, a stretch is not between 1e-3 and 1e3, the offset is not positive, or the search is
-    unknown.
+    `limit` is the largest size of an exponent, `offset` is `d` [Pa]. `InputError` if the arrays are not finite, of
+    different lengths or shorter than the parameters, a stretch is not between 1e-3 and 1e3, or the offset is not
+    positive.
 
     Examples
     --------
@@ -200,18 +196,6 @@ def fit(
     >>> round(fit(METAMODELS["neo-hookean"], l, y).shear_modulus, 6)
     600.0
     """
-    l, y = _curve(model, stretches, log_energy)
-    if search not in SEARCHES:
-        raise InputError(f"search = {search!r}: expected one of {', '.join(SEARCHES)}")
-    if not (np.isfinite(offset) and offset > 0.0):
-        raise InputError(f"offset = {offset:g} Pa: expected a positive number")
-    with np.errstate(over="ignore", invalid="ignore"):
-        fits = [_search(model, box, l, y, offset) for box in model.boxes(search)]
-    best = min(fits, key=attrgetter("cost"))
-    return replace(best, evaluations=sum(fitted.evaluations for fitted in fits))
-
-
-def _curve(model: MetaModel, stretches: ArrayLike, log_energy: ArrayLike) -> tuple[Floats, Floats]:
     l, y = np.asarray(stretches, dtype=np.float64), np.asarray(log_energy, dtype=np.float64)
     if l.ndim != 1 or l.shape != y.shape:
         raise InputError(f"expected as many stretches as log energies, in a row: found shapes {l.shape} and {y.shape}")
@@ -225,7 +209,12 @@ def _curve(model: MetaModel, stretches: ArrayLike, log_energy: ArrayLike) -> tup
         if not good.all():
             at = int(np.argmin(good))
             raise InputError(f"{name} {at} is {values[at]:g}: expected {expected}")
-    return l, y
+    if not (np.isfinite(offset) and offset > 0.0):
+        raise InputError(f"offset = {offset:g} Pa: expected a positive number")
+    with np.errstate(over="ignore", invalid="ignore"):
+        fits = [_search(model, box, l, y, offset) for box in model.boxes(limit)]
+    best = min(fits, key=attrgetter("cost"))
+    return replace(best, evaluations=sum(fitted.evaluations for fitted in fits))
 
 
 def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> Fit:
@@ -246,18 +235,10 @@ def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> 
     start = np.log(np.abs(box.start))
     if not np.isfinite(np.sum(residual(start) ** 2)):
         return Fit(model, box.start, np.inf, len(y), False, "the residuals are too large for a sum of squares", 1)
+    bounds = np.log(nearest), np.log(np.where(bounded, farthest, _LARGEST))
     # the variant for which a bound can be reached in a step, so that parameters lie at it and not near it
-    result = least_squares(
-        residual,
-        start,
-        jacobian,
-        bounds=(np.log(nearest), np.log(np.where(bounded, farthest, _LARGEST))),
-        method="dogbox",
-        ftol=_TOLERANCE,
-        xtol=_TOLERANCE,
-        gtol=None,
-        max_nfev=_EVALUATIONS,
-    )
+    tolerances = {"ftol": _TOLERANCE, "xtol": _TOLERANCE, "gtol": None, "max_nfev": _EVALUATIONS}
+    result = least_squares(residual, start, jacobian, bounds=bounds, method="dogbox", **tolerances)
     held = (result.active_mask < 0) | (result.active_mask > 0) & bounded
     sizes = np.where(held, np.where(result.active_mask > 0, farthest, nearest), np.exp(result.x))
     # the residual stands upright on every direction that is not held at a bound
@@ -266,7 +247,7 @@ def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> 
     stationary = bool(np.all(upright | held))
     return Fit(
         model,
-        tuple(float(value) for value in signs * sizes),
+        tuple((signs * sizes).tolist()),
         float(result.cost),
         len(y),
         bool(result.success) and stationary,
@@ -343,8 +324,7 @@ def usual_stretches(group: str) -> Floats:
 def law_of_curve(model: Process, group: str, k: float = 0.0, law: str = "neo-hookean") -> Fit:
     """The law of the curve `k` standard deviations from the mean, as the paper samples.
 
-    Nothing is redrawn here: `warpbrain.gp.sampling.unstable` says what the law is worth. `InputError` if the model
-    has seen no study of the group, or there is no such law.
+    It may be `unstable`. `InputError` if the model has seen no study of the group, or there is no such law.
 
     Examples
     --------
@@ -399,8 +379,10 @@ def draw_laws(
     for name, value in (("number", number), ("seed", seed)):
         if value < 0:
             raise InputError(f"{name} {value}: expected a whole number of at least 0")
-    metamodels = [_metamodel(name) for name in _one_each(law, groups)]
-    formulations = _one_each(formulation, groups)
+    laws, formulations = (
+        [value] * len(groups) if isinstance(value, str) else list(value) for value in (law, formulation)
+    )
+    metamodels = [_metamodel(name) for name in laws]
     distinct = tuple(dict.fromkeys(groups))
     ranges = {group: usual_stretches(group) for group in distinct}
     # a draw is a function: groups of other ranges are the same draw where their ranges meet
@@ -411,14 +393,12 @@ def draw_laws(
         drawn = model.draw(distinct, at, (number, attempt) if attempt else number, seed)
         curves = {group: drawn[i, places[group]] for i, group in enumerate(distinct)}
         fits: list[Fit] = []
-        reason = ""
         for group, metamodel, shape in zip(groups, metamodels, formulations, strict=True):
             fits.append(_fit(model, metamodel, ranges[group], curves[group]))
-            reason = unstable(fits[-1], poisson, shape)
-            if reason:
+            if reason := unstable(fits[-1], poisson, shape):
                 rejected.append(f"{group}: {reason}")
                 break
-        if not reason:
+        else:
             drawn_at, drawn_curves = (tuple(of[group] for group in groups) for of in (ranges, curves))
             return DrawnLaws(number, seed, tuple(groups), drawn_at, drawn_curves, tuple(fits), tuple(rejected))
     raise SolveError(
@@ -494,7 +474,3 @@ def _metamodel(law: str) -> MetaModel:
     if law not in METAMODELS:
         raise InputError(f"law '{law}': expected one of {', '.join(METAMODELS)}")
     return METAMODELS[law]
-
-
-def _one_each(value: str | Sequence[str], groups: Sequence[str]) -> list[str]:
-    return [value] * len(groups) if isinstance(value, str) else list(value)

@@ -20,7 +20,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from warpbrain.atomic import whole_file
+from warpbrain.atomic import write_text
 from warpbrain.errors import InputError
 from warpbrain.gp.coregionalised import JITTER, TASKS, Coregionalised, Parameters, train, training_points
 from warpbrain.gp.hierarchy import (
@@ -136,8 +136,9 @@ def fit_model(
     """
     began = time.perf_counter()
     studies = read_studies(variant, add)
-    command = f"warpbrain gp fit --gp {kind} --variant {variant}" + (f" --climbs {climbs}" if climbs > 1 else "")
-    record: dict[str, Any] = {"command": command + (" --add studies.toml" if add else ""), "studies": len(studies)}
+    options = (f" --climbs {climbs}" if climbs > 1 else "") + (" --add studies.toml" if add else "")
+    command = f"warpbrain gp fit --gp {kind} --variant {variant}{options}"
+    record: dict[str, Any] = {"command": command, "studies": len(studies)}
     model: Process
     if kind == "hierarchical":
         progress(0.0, "climbing")
@@ -174,35 +175,24 @@ def fitted_hierarchical(
 
 def write_model(folder: Path, model: Process, record: dict[str, Any], added: Path | None = None) -> None:
     """Write a model with the record of its training, and the user's studies if any, to a folder that is there."""
+    table: dict[str, Any] = {"kind": model.name, "variant": model.variant}
     if isinstance(model, Hierarchical):
-        parameters = _described(model.hierarchy)
-        kernel = model.hierarchy.kernel
+        best, *sample = (
+            {**each.spread, "length scale": each.length_scale} for each in (model.hierarchy, *model.sample)
+        )
+        table |= {"kernel": model.hierarchy.kernel, "parameters": best, "training": record}
+        table |= {"format": FORMAT, "sample": sample}
     elif isinstance(model, Coregionalised):
-        parameters = {"length scale": model.parameters.length_scale, "jitter": model.jitter}
-        parameters |= {name: getattr(model.parameters, name).tolist() for name in ("w", "kappa", "noise")}
-        kernel = model.kernel
+        numbers = model.parameters
+        parameters = {"length scale": numbers.length_scale, "jitter": model.jitter}
+        parameters |= {name: getattr(numbers, name).tolist() for name in ("w", "kappa", "noise")}
+        table |= {"kernel": model.kernel, "parameters": parameters, "training": record}
     else:
         raise TypeError(f"{type(model).__name__} is not a model that can be written")
-    table: dict[str, Any] = {
-        "kind": model.name,
-        "variant": model.variant,
-        "kernel": kernel,
-        "parameters": parameters,
-        "training": record,
-    }
-    if isinstance(model, Hierarchical):
-        table |= {"format": FORMAT, "sample": [_described(drawn) for drawn in model.sample]}
     # the studies first: a model without them would be another one
     if added is not None:
-        text = added.read_text(encoding="utf-8")
-        with whole_file(folder / STUDIES) as path:
-            path.write_text(text, encoding="utf-8")
-    with whole_file(folder / MODEL) as path:
-        path.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
-
-
-def _described(hierarchy: Hierarchy) -> dict[str, Any]:
-    return {**hierarchy.spread, "length scale": hierarchy.length_scale}
+        write_text(folder / STUDIES, added.read_text(encoding="utf-8"))
+    write_text(folder / MODEL, json.dumps(table, indent=2) + "\n")
 
 
 def _choice(path: Path, table: dict[str, Any], key: str, known: tuple[Any, ...]) -> Any:

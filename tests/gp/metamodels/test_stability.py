@@ -32,7 +32,7 @@ def test_stable_fits(fit_: Fit, formulation: str) -> None:
 
 @pytest.mark.parametrize("alpha", [0.1, 0.5, 1.0])
 def test_the_small_exponents_of_the_boxes_are_unstable(alpha: float) -> None:
-    """The paper searches them: "low" and "high" both start there."""
+    """The paper searches them: both its settings start there."""
     assert "supplement Table 2" in unstable(fitted("ogden", 1000.0, alpha))
 
 

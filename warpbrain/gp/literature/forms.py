@@ -44,13 +44,8 @@ class Parameter:
 class Convention:
     """One way to write a form: the parameters that a paper gives, and what makes ours of them."""
 
-    keys: tuple[Parameter, ...]
+    keys: Mapping[str, Parameter]  # by name
     convert: Callable[..., Parameters]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the keys."""
-        return tuple(key.name for key in self.keys)
 
 
 @dataclass(frozen=True)
@@ -67,7 +62,7 @@ class Form:
     def convention_of(self, keys: Iterable[str]) -> str:
         """The convention that has most of the keys; of equals the first."""
         given = set(keys)
-        return max(self.conventions, key=lambda name: len(given & set(self.conventions[name].names)))
+        return max(self.conventions, key=lambda name: len(given & self.conventions[name].keys.keys()))
 
 
 def first(l: Floats) -> Floats:
@@ -82,7 +77,8 @@ def second(l: Floats) -> Floats:
 
 def _other(convert: Callable[..., Parameters], *keys: str | Parameter) -> Convention:
     """A paper's way; names are those of moduli."""
-    return Convention(tuple(Parameter(key) if isinstance(key, str) else key for key in keys), convert)
+    parameters = [Parameter(key) if isinstance(key, str) else key for key in keys]
+    return Convention({parameter.name: parameter for parameter in parameters}, convert)
 
 
 def _ours(*keys: str | Parameter) -> Convention:

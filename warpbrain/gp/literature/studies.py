@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -254,8 +254,7 @@ class _Entry:
         return None if sides[0] is None or sides[1] is None else (convention, sides[0], sides[1])
 
     def _parameters(self, form: str, convention: Convention, side: str, given: dict[str, Any]) -> Parameters | None:
-        keys = {key.name: key for key in convention.keys}
-        before = len(self.problems.found)
+        keys, before = convention.keys, len(self.problems.found)
         for name, value in given.items():
             if name not in keys:
                 self.problem(side + name, f"unknown key with form '{form}'", self._meant(form, name, keys, side))
@@ -280,9 +279,11 @@ class _Entry:
             return None
         return convention.convert(**numbers)
 
-    def _meant(self, form: str, name: str, keys: dict[str, Any], side: str) -> str:
+    @staticmethod
+    def _meant(form: str, name: str, keys: Mapping[str, Parameter], side: str) -> str:
+        """What an unknown key may be: one that is spelt like it, or one of other forms."""
         owners = [
-            form_of for form_of in FORMS if name in {n for c in FORMS[form_of].conventions.values() for n in c.names}
+            other for other, known in FORMS.items() if any(name in way.keys for way in known.conventions.values())
         ]
         near = nearest(name, [*keys, *(() if side else _KEYS)])
         if near.startswith("did"):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Floats, Ints
-from warpbrain.gp.literature.forms import FORMS, Parameters
+from warpbrain.gp.literature.forms import FORMS, Parameters, first
 
 #: How a study measured, in the paper's order: elastography, linear elasticity, hyperelasticity.
 METHODS = ("MRE", "linear", "hyperelastic")
@@ -125,52 +125,26 @@ def groups_of(studies: Sequence[Study]) -> tuple[str, ...]:
     return tuple(group for group in GROUPS if group in seen)
 
 
-@dataclass(frozen=True)
-class Dataset:
-    """Training points of the coregionalised process (n,), the studies one after the other.
-
-    `task` is the group of each point, 0 to 11, `log_energy` is `y = ln(Psi + 1e-4)` with energies in Pa, `study` the
-    index of the study in the sequence that the dataset was made from.
-    """
-
-    task: Ints
-    stretch: Floats
-    log_energy: Floats
-    study: Ints
-
-    def __len__(self) -> int:
-        return len(self.stretch)
-
-    def curves(self) -> tuple[int, ...]:
-        """Number of studies in each of the 12 tasks."""
-        _, points = np.unique(self.study, return_index=True)
-        return tuple(np.bincount(self.task[points], minlength=len(GROUPS)).tolist())
-
-
-def dataset(studies: Sequence[Study], count: int = 100) -> Dataset:
-    """The points of studies, `count` for each (`Study.grid`).
+def dataset(studies: Sequence[Study], count: int = 100) -> tuple[Ints, Floats, Floats]:
+    """Group 0 to 11, stretch and `y = ln(Psi + 1e-4)` of `count` points for each study (`Study.grid`); (n,) each.
 
     Examples
     --------
     >>> from warpbrain.gp.literature.studies import read_studies
-    >>> points = dataset(read_studies("as_published"))
-    >>> len(points), points.curves()
-    (7300, (5, 5, 1, 1, 1, 1, 16, 7, 10, 10, 15, 1))
+    >>> groups, stretches, log_energies = dataset(read_studies("as_published"))
+    >>> len(groups)
+    7300
     """
     grids = [study.grid(count) for study in studies]
     energies = [study.energy(grid) for study, grid in zip(studies, grids, strict=True)]
-    return Dataset(
-        task=np.repeat(np.array([study.task for study in studies], dtype=np.int64), count),
-        stretch=np.concatenate([*grids, np.empty(0)]),
-        log_energy=np.log(np.concatenate([*energies, np.empty(0)]) + OFFSET),
-        study=np.repeat(np.arange(len(studies), dtype=np.int64), count),
-    )
+    groups = np.repeat(np.array([study.task for study in studies], dtype=np.int64), count)
+    nothing = np.empty(0)
+    return groups, np.concatenate([*grids, nothing]), np.log(np.concatenate([*energies, nothing]) + OFFSET)
 
 
 def invariant(stretches: ArrayLike) -> Floats:
-    """`I(l) = (l^2 + 2/l - 3) / 2`, in the form `(l - 1)^2 (l + 2) / (2 l)` that keeps all digits near 1."""
-    l = np.asarray(stretches, dtype=np.float64)
-    return 0.5 * (l - 1.0) ** 2 * (l + 2.0) / l
+    """`I(l) = (I1 - 3) / 2 = (l^2 + 2/l - 3) / 2`, all digits of which are kept near 1."""
+    return 0.5 * first(np.asarray(stretches, dtype=np.float64))
 
 
 def equivalent_strain(stretches: ArrayLike) -> Floats:
