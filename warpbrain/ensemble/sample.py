@@ -47,7 +47,6 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """There is no answer."""
         return bool(self.reason)
 
     @property

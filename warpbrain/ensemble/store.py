@@ -100,7 +100,6 @@ class Store:
         return True
 
     def numbers(self) -> set[int]:
-        """Samples whose outcome is here."""
         return set(self._numbers)
 
     def write(self, outcomes: Sequence[Outcome]) -> None:

@@ -138,7 +138,6 @@ def bytes_per_slot(system: System) -> int:
 
 
 def free_bytes(system: System) -> int:
-    """Free memory of the device of a system."""
     if system.device.is_cuda:
         return int(system.device.free_memory)
     for line in Path("/proc/meminfo").read_text().splitlines() if Path("/proc/meminfo").exists() else ():

@@ -107,7 +107,6 @@ class Estimation:
             self.forward = Forward(case, self.prior_modes[0].gaussian.mean, device, elements, self.moments)
 
     def run(self) -> Posterior:
-        """All stages."""
         with self._counted("estimate"):
             modes = self.fit(Nuisances(registration=self._registration))
         errors: list[DiscretisationError] = []

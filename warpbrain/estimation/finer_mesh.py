@@ -101,15 +101,12 @@ class Difference:
         return root_mean_square(self.u)
 
     def less(self, other: Difference) -> Difference:
-        """By how much it is more than another."""
         return Difference(self.u - other.u, self.reactions - other.reactions, self.theta)
 
     def plus(self, other: Difference) -> Difference:
-        """Both together."""
         return Difference(self.u + other.u, self.reactions + other.reactions, self.theta)
 
     def times(self, factor: float) -> Difference:
-        """So many times as large."""
         return Difference(factor * self.u, factor * self.reactions, self.theta)
 
 
@@ -225,10 +222,9 @@ class FinerMesh:
         prolongation, model, u = self._last
         solver = SensitivitySolver(self._system, _DERIVATIVES)
         sensitivities = solver.solve(u, lambda at: model.with_materials(materials(at)), theta)
-        each = [
-            restricted(prolongation, du, dR) for du, dR in zip(sensitivities.u, sensitivities.reactions, strict=True)
-        ]
-        return np.array([du for du, _ in each]), np.array([dR for _, dR in each])
+        each = (restricted(prolongation, *one) for one in zip(sensitivities.u, sensitivities.reactions, strict=True))
+        du, dR = map(np.array, zip(*each, strict=True))
+        return du, dR
 
     def _system_of(self, model: Model) -> System:
         """The system of the last state with other parameters, or a new one if more than parameters changed."""

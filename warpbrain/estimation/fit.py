@@ -46,7 +46,6 @@ class Laplace:
 
     @cached_property
     def posterior(self) -> Gaussian:
-        """As a distribution."""
         # in the prior's own measure, where nothing is too large or too small to be inverted
         values, vectors = self._eigen
         basis = self.prior.factor @ vectors
@@ -94,8 +93,6 @@ def _normalised(columns: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class GaussNewtonStep:
-    """One line of the history."""
-
     iteration: int  # from 1
     objective: float  # `-ln` of likelihood times prior, before the step
     decrement: float  # length of the whole step in standard deviations of the posterior

@@ -77,7 +77,6 @@ class Sensors:
 
     @property
     def is_counted_from_rest(self) -> bool:
-        """Whether all rows are."""
         return bool((self.before < 0).all())
 
     @cached_property
@@ -239,23 +238,17 @@ class Observations:
 
         def each(value_of: Callable[[Observation], Any]) -> Any:
             """A value of each observation, or of each of its rows, for every component of these."""
-            parts = []
-            for observation in self.recordings:
-                value = np.asarray(value_of(observation))
-                values = value if value.ndim else np.full(len(observation.rows), value)
-                parts.append(np.repeat(values, observation.size, axis=0))
-            return np.concatenate(parts)
+            values = [(seen, np.asarray(value_of(seen))) for seen in self.recordings]
+            of_rows = [value if value.ndim else np.full(len(seen.rows), value) for seen, value in values]
+            return np.repeat(np.concatenate(of_rows), sizes, axis=0)
 
         same = ("positions", "times", "after", "before", "weights")
-        sizes = [np.full(len(observation.rows), observation.size) for observation in self.recordings]
-        count = sum(map(len, sizes))
+        sizes = np.concatenate([np.full(len(seen.rows), seen.size) for seen in self.recordings])
         return {name: each(operator.attrgetter(name)) for name in same} | {
-            "sigma": each(lambda observation: np.nan if observation.sigma is None else observation.sigma),
-            "over_element": np.concatenate(
-                [observation.over_element.reshape(-1, 3) for observation in self.recordings]
-            ),
-            "groups": np.repeat(np.arange(count), np.concatenate(sizes)),
-            "recordings": each(lambda observation: names.index(observation.name)),
+            "sigma": each(lambda seen: np.nan if seen.sigma is None else seen.sigma),
+            "over_element": np.concatenate([seen.over_element.reshape(-1, 3) for seen in self.recordings]),
+            "groups": np.repeat(np.arange(len(sizes)), sizes),
+            "recordings": each(lambda seen: names.index(seen.name)),
             "names": names,
             "references": each(operator.attrgetter("reference")),
             "radius": self.radius,

@@ -105,7 +105,6 @@ class Parameters:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """With tissue and unit."""
         return tuple(parameter.name for parameter in self)
 
     @property
@@ -200,7 +199,6 @@ class Gaussian:
 
     @cached_property
     def precision(self) -> Floats:
-        """Inverse of the covariance."""
         inverse = np.linalg.inv(self.factor)
         return inverse.T @ inverse
 
@@ -255,10 +253,8 @@ def _declared_prior(case: Case, parameters: Parameters, count: int, seed: int) -
         theta = mean + deviations * rng.normal(size=len(mean))
         if np.all((theta > parameters.low) & (theta < parameters.high)):
             draws.append(theta)
-    bounds = np.zeros(len(parameters.tissues))
-    laws, poisson, formulations = parameters.laws_of, parameters.poisson, parameters.formulations
-    about = parameters.tissues, laws, poisson, formulations, seed
-    return Prior(cast(Process, _NO_STUDIES), *about, np.array(draws), attempts, bounds)
+    about = parameters.tissues, parameters.laws_of, parameters.poisson, parameters.formulations, seed
+    return Prior(cast(Process, _NO_STUDIES), *about, np.array(draws), attempts, np.zeros(len(parameters.tissues)))
 
 
 def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed: int = 0) -> Prior:
@@ -274,7 +270,7 @@ def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed:
 
     process = trained() if model is None else model
     require_groups(case, [label for labels in parameters.labels for label in labels], process)
-    tissues = tuple(parameters.groups), tuple(parameters.laws_of), parameters.poisson, tuple(parameters.formulations)
+    tissues = parameters.groups, parameters.laws_of, parameters.poisson, parameters.formulations
     return _prior_of_tissues(process, *tissues, count, seed)
 
 

@@ -78,12 +78,8 @@ class OverallErrors:
         overall = []
         for role in dict.fromkeys(prediction.role for prediction in each if prediction.unit == "m"):
             lengths = [prediction for prediction in each if prediction.role == role and prediction.unit == "m"]
-            residuals = (
-                [prediction.run.residuals_before for prediction in lengths],
-                [prediction.fitted.residuals_after for prediction in lengths],
-                [prediction.run.residuals_after for prediction in lengths],
-            )
-            errors = (by_unit(("m", residual) for residual in values)["m"] for values in residuals)
+            residuals = [(p.run.residuals_before, p.fitted.residuals_after, p.run.residuals_after) for p in lengths]
+            errors = (by_unit(("m", residual) for residual in values)["m"] for values in zip(*residuals, strict=True))
             overall.append(cls(role, sum(prediction.fitted.count for prediction in lengths), *errors))
         return tuple(overall)
 

@@ -121,8 +121,6 @@ class Linearised:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What is estimated from what."""
-
     forward: Forward
     observations: Observations
     mode: PriorMode
@@ -131,7 +129,6 @@ class Problem:
 
     @property
     def parameters(self) -> Parameters:
-        """What `theta` means."""
         return self.forward.parameters
 
     def seen(self, state: State, nuisances: Floats) -> Sensors:

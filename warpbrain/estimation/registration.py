@@ -41,7 +41,8 @@ def moved_back_columns(positions: Floats, motion: Floats, centre: Floats) -> Flo
     back = _turned_back(motion)
     columns = np.zeros((len(positions), 3, 6))
     columns[:, :, :3] = -back
-    columns[:, :, 3:] = _crossed((positions - centre - motion[:3]) @ back.T) @ _left_jacobian(-motion[3:])
+    turned = (positions - centre - motion[:3]) @ back.T
+    columns[:, :, 3:] = np.cross(np.eye(3), turned[:, None]) @ _left_jacobian(-motion[3:])
     return columns
 
 
@@ -77,17 +78,10 @@ def _turned_back(motion: Floats) -> Floats:
     return np.asarray(Rotation.from_rotvec(-motion[3:]).as_matrix())
 
 
-def _crossed(vectors: Floats) -> Floats:
-    """Matrices (n, 3, 3) that take `w` to the cross product of each vector (n, 3) with it."""
-    x, y, z = vectors.T
-    o = np.zeros(len(vectors))
-    return np.stack([o, -z, y, z, o, -x, -y, x, o], axis=1).reshape(-1, 3, 3)
-
-
 def _left_jacobian(turn: Floats) -> Floats:
     """`J` with `R(w + dw) = R(J dw) R(w)` to first order (Barfoot 2017, State Estimation for Robotics, eq. 7.77)."""
     angle = float(np.linalg.norm(turn))
-    [K] = _crossed(turn[None])
+    K = np.cross(np.eye(3), turn)
     first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
     # the series is exact to rounding below this
     if angle > 1e-3:

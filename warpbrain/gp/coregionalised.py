@@ -74,7 +74,6 @@ class Parameters:
 
     @classmethod
     def from_vector(cls, vector: Floats) -> Parameters:
-        """The parameters of `to_vector`."""
         w, kappa, noise = np.split(vector[1:], 3)
         return cls(float(np.exp(vector[0])), w, np.exp(kappa), np.exp(noise))
 
@@ -105,7 +104,6 @@ class Replicates:
 
     @property
     def size(self) -> int:
-        """How many means there are."""
         return len(self.x)
 
     def thinned(self, step: int) -> Replicates:
@@ -418,7 +416,6 @@ class Coregionalised:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Groups that it has seen studies of."""
         return groups_of(self.studies)
 
     def log_energy(self, group: str, stretches: ArrayLike) -> tuple[Floats, Floats]:
@@ -429,7 +426,6 @@ class Coregionalised:
         return mean, np.sqrt(np.maximum(variance, 0.0))
 
     def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
-        """The curve `k` standard deviations from the mean, see `Process`."""
         mean, spread = self.log_energy(group, stretches)
         return mean + np.multiply.outer(np.asarray(k, dtype=np.float64), spread)
 

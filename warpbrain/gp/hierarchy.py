@@ -168,7 +168,6 @@ class Hierarchy:
     def from_vector(
         cls, vector: Floats, kernel: str = "matern52", mean_asymmetry: tuple[float, float] = MEAN_ASYMMETRY
     ) -> Hierarchy:
-        """The hierarchy of `to_vector`."""
         values = np.exp(vector).tolist()
         return cls(dict(zip(EFFECTS, values[:-1], strict=True)), values[-1], kernel, mean_asymmetry)
 
@@ -231,7 +230,6 @@ class Structure:
 
     @classmethod
     def of(cls, a: Places, b: Places) -> Structure:
-        """Of two sets of places."""
         count = len(ANATOMIES)
         method_a, method_b = a.task // count, b.task // count
         same = {"anatomy": _same(a.task % count, b.task % count), "paper": _same(a.source, b.source)}
@@ -430,7 +428,6 @@ class Hierarchical:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Groups that it has seen studies of."""
         return groups_of(self.studies)
 
     def modulus(self, groups: Sequence[str], stretches: ArrayLike) -> tuple[Floats, Floats]:
@@ -485,7 +482,6 @@ class Hierarchical:
         return log_energy(stretches, mean[0] + away)
 
     def draw(self, groups: Sequence[str], stretches: ArrayLike, number: int | tuple[int, ...], seed: int = 0) -> Floats:
-        """Draw `number` of a seed, see `Process`."""
         from scipy.special import ndtr
 
         l = np.asarray(stretches, dtype=np.float64)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +68,6 @@ class MetaModel:
     parameter_names: tuple[str, ...]
     units: tuple[str, ...]  # of the parameters: "Pa", or "" for a number without unit
     basis: tuple[Callable[[Floats], Floats], ...] = ()
-    moduli: tuple[float, ...] = ()  # shear modulus at rest of each for a parameter of one
     least: float = 0.1  # [Pa], of the parameters of a fit
 
     def energy(self, stretches: Floats, values: Values) -> Floats:
@@ -90,10 +89,6 @@ class MetaModel:
 
         kind: Any = LAWS[self.name]
         return kind(*map(float, values))
-
-    def shear_modulus(self, values: Values) -> float:
-        """Shear modulus at rest `mu0` [Pa]; `d2Psi/dl2 = 3 mu0` at `l = 1`."""
-        return sum(modulus * float(value) for modulus, value in zip(self.moduli, values, strict=True))
 
 
 class _Ogden(MetaModel):
@@ -134,17 +129,13 @@ class _Ogden(MetaModel):
         mu, alpha = values
         return Ogden((float(mu),), (float(alpha),))
 
-    def shear_modulus(self, values: Values) -> float:
-        mu, alpha = values
-        return 0.5 * float(mu) * float(alpha)
-
 
 #: Meta-models by the name of their law.
 METAMODELS: dict[str, MetaModel] = {
     model.name: model
     for model in (
-        MetaModel("neo-hookean", ("mu",), ("Pa",), (invariant,), (1.0,), least=1e-3),
-        MetaModel("mooney-rivlin", ("C1", "C2"), ("Pa", "Pa"), (forms.first, forms.second), (2.0, 2.0)),
+        MetaModel("neo-hookean", ("mu",), ("Pa",), (invariant,), least=1e-3),
+        MetaModel("mooney-rivlin", ("C1", "C2"), ("Pa", "Pa"), (forms.first, forms.second)),
         _Ogden("ogden", ("mu", "alpha"), ("Pa", "")),
     )
 }
@@ -171,10 +162,9 @@ class Fit:
     @property
     def shear_modulus(self) -> float:
         """Shear modulus at rest `mu0` [Pa]."""
-        return self.model.shear_modulus(self.values)
+        return self.law().shear_modulus
 
     def law(self) -> Law:
-        """The law that a simulation takes."""
         return self.model.law(self.values)
 
 
@@ -218,7 +208,6 @@ def fit(
 
 
 def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> Fit:
-    """Search one box from its start."""
     from scipy.optimize import least_squares
 
     signs = np.sign(box.start)
@@ -263,19 +252,12 @@ def unstable(fit: Fit, poisson: float = 0.45, formulation: str = "coupled") -> s
 
     `InputError` if the Poisson ratio at rest is outside (-1, 0.5) or the formulation is unknown.
     """
+    from warpbrain.physics.laws.stability import UnstableLawError, require_stable
+
     try:
         law = fit.law()
     except InputError as error:
         return str(error)
-    # the conditions are signs, and ratios to the shear modulus: all neo-Hookean laws are one
-    return _instability(law, poisson, formulation) if _instability(law.scaled_to(1.0), poisson, formulation) else ""
-
-
-@lru_cache(maxsize=64)
-def _instability(law: Law, poisson: float, formulation: str) -> str:
-    """The message of `require_stable`, kept for the last laws that were asked for; empty of a stable one."""
-    from warpbrain.physics.laws.stability import UnstableLawError, require_stable
-
     try:
         require_stable(law, poisson, formulation)
     except UnstableLawError as error:

@@ -148,7 +148,6 @@ class _Entry:
         self.out = False
 
     def problem(self, key: str, message: str, cure: str = "") -> None:
-        """Note what is wrong with a key."""
         self.problems.add(self.path, f"[{self.where}] {key}".rstrip(), message, cure)
 
     def correct(self) -> None:
