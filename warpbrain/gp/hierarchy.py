@@ -426,6 +426,16 @@ class Hierarchical:
     name = "hierarchical"
     _moduli: dict[tuple[Any, ...], tuple[Floats, Floats]] = field(default_factory=dict, init=False, repr=False)
 
+    @classmethod
+    def fitted(
+        cls, studies: Sequence[Study], variant: str, kernel: str = "matern52", sample: int = SAMPLE, **how: Any
+    ) -> tuple[Hierarchical, Fitted]:
+        """The model of studies with a sample of hierarchies, and how its fit ended; `how` is of `fit_hierarchy`."""
+        seen = observations(studies)
+        hierarchy, fitted = fit_hierarchy(seen, kernel, **how)
+        drawn = sample_hierarchies(hierarchy, seen, sample) if sample else ()
+        return cls(tuple(studies), hierarchy, variant, drawn), fitted
+
     @property
     def groups(self) -> tuple[str, ...]:
         return groups_of(self.studies)

@@ -27,17 +27,7 @@ from warpbrain.arrays import Floats
 from warpbrain.atomic import write_csv
 from warpbrain.errors import InputError
 from warpbrain.gp.coregionalised import JITTER, TASKS, Coregionalised, Likelihood, climb, start, train, training_points
-from warpbrain.gp.hierarchy import (
-    CENTRE,
-    MEAN_ASYMMETRY,
-    OF_CURVES,
-    OF_SIDES,
-    SAMPLE,
-    Hierarchical,
-    fit_hierarchy,
-    observations,
-    sample_hierarchies,
-)
+from warpbrain.gp.hierarchy import CENTRE, MEAN_ASYMMETRY, OF_CURVES, OF_SIDES, SAMPLE, Hierarchical
 from warpbrain.gp.literature.study import METHODS, OFFSET, Study, invariant, log_secant_modulus
 
 #: Name of the model that ships as the default.
@@ -97,8 +87,7 @@ class CoregionalisedCandidate:
     def level_pit(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> float:
         """How probable it holds it to be that studies which it was not fitted to are softer in the mean.
 
-        The level is the mean log energy over the stretches of a study, and over studies. Points of a study, and studies
-        of a paper, are no independent witnesses of a model's calibration; levels of papers are.
+        That is of the level: the mean log energy over the stretches of a study, and over studies.
         """
         assert self.model is not None
         mean, spread = self.model.level_of(studies, stretches)
@@ -125,10 +114,8 @@ class HierarchicalCandidate:
     def fitted(self, studies: Sequence[Study]) -> HierarchicalCandidate:
         """As `CoregionalisedCandidate.fitted`."""
         first = None if self.model is None else self.model.hierarchy
-        seen = observations(studies)
-        hierarchy, _ = fit_hierarchy(seen, self.kernel, first, self.without, self.mean_asymmetry)
-        sample = sample_hierarchies(hierarchy, seen, self.sample) if self.sample else ()
-        return replace(self, model=Hierarchical(tuple(studies), hierarchy, "", sample))
+        how = {"first": first, "without": self.without, "mean_asymmetry": self.mean_asymmetry}
+        return replace(self, model=Hierarchical.fitted(studies, "", self.kernel, self.sample, **how)[0])
 
     def predict(self, study: Study, stretches: Floats) -> Prediction:
         """As of `CoregionalisedCandidate`."""

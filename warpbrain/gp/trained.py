@@ -23,18 +23,9 @@ import numpy as np
 from warpbrain.atomic import write_text
 from warpbrain.errors import InputError
 from warpbrain.gp.coregionalised import JITTER, TASKS, Coregionalised, Parameters, train, training_points
-from warpbrain.gp.hierarchy import (
-    EFFECTS,
-    SAMPLE,
-    Fitted,
-    Hierarchical,
-    Hierarchy,
-    fit_hierarchy,
-    observations,
-    sample_hierarchies,
-)
+from warpbrain.gp.hierarchy import EFFECTS, Hierarchical, Hierarchy
 from warpbrain.gp.literature.studies import VARIANTS, Variant, read_studies
-from warpbrain.gp.literature.study import GROUPS, Study
+from warpbrain.gp.literature.study import GROUPS
 from warpbrain.gp.process import KERNELS, Process
 from warpbrain.keys import finite
 
@@ -101,7 +92,7 @@ def read_model(folder: Path) -> Process:
     if kind == "hierarchical":
         if _choice(path, table | {"format": table.get("format", 1)}, "format", (1, FORMAT)) == 1:
             warnings.warn(f"{path}: of an older format, without a mean asymmetry: fitted again", stacklevel=2)
-            return fitted_hierarchical(studies, variant, kernel)[0]
+            return Hierarchical.fitted(studies, variant, kernel)[0]
         sample = table.get("sample")
         if not isinstance(sample, list) or not all(isinstance(drawn, dict) for drawn in sample):
             raise InputError(f"{path}: sample: expected tables of parameters")
@@ -142,7 +133,7 @@ def fit_model(
     model: Process
     if kind == "hierarchical":
         progress(0.0, "climbing")
-        model, fitted = fitted_hierarchical(studies, variant)
+        model, fitted = Hierarchical.fitted(studies, variant)
         record |= asdict(fitted)
     else:
         data = training_points(studies)
@@ -162,15 +153,6 @@ def fit_model(
         }
     record["seconds"] = time.perf_counter() - began
     return model, record
-
-
-def fitted_hierarchical(
-    studies: tuple[Study, ...], variant: str, kernel: str = "matern52"
-) -> tuple[Hierarchical, Fitted]:
-    """The hierarchical model of studies, with a sample of hierarchies, and how its fit ended."""
-    seen = observations(studies)
-    hierarchy, fitted = fit_hierarchy(seen, kernel)
-    return Hierarchical(studies, hierarchy, variant, sample_hierarchies(hierarchy, seen, SAMPLE)), fitted
 
 
 def write_model(folder: Path, model: Process, record: dict[str, Any], added: Path | None = None) -> None:
