@@ -143,22 +143,19 @@ class ResultRoom:
     """
 
     def __init__(self, nodes: int, samples: int) -> None:
-        self._shape, self._samples = (nodes, 3), samples
-        self._ready = self._empty(0)
-
-    def _empty(self, count: int) -> Floats:
-        return np.empty((count, *self._shape))
+        self._nodes, self._samples = nodes, samples
+        self._ready = np.empty((0, nodes, 3))
 
     def prepare(self) -> None:
         """Make room ready if there is none."""
         if not len(self._ready):
-            self._ready = self._empty(self._samples)
-            self._ready.fill(0.0)
+            # unlike `zeros`, which waits until it is written to
+            self._ready = np.full((self._samples, self._nodes, 3), 0.0)
 
     def take(self, count: int) -> Floats:
         """An array (count, n, 3) of any numbers, ready or not."""
         if count > len(self._ready):
-            return self._empty(count)
+            return np.empty((count, self._nodes, 3))
         taken, self._ready = self._ready[:count], self._ready[count:]
         return taken
 

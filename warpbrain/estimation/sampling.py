@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -113,19 +112,13 @@ class Proposal:
     def log_density(self, theta: Floats) -> Floats:
         """Log density (n,) at points (n, p)."""
         from scipy.special import logsumexp
-
-        terms = []
-        for mode, tails, share, mass in zip(self.modes, self._tails, self.shares, self._masses, strict=True):
-            logs = tails.logpdf(theta)
-            terms.append(np.where(self._inside(mode, theta), logs + np.log(share / mass), -np.inf))
-        return np.asarray(logsumexp(terms, axis=0), dtype=np.float64)
-
-    @cached_property
-    def _tails(self) -> tuple[Any, ...]:
-        """The whole t around each estimate, of SciPy."""
         from scipy.stats import multivariate_t
 
-        return tuple(multivariate_t(mode.theta, mode.laplace.posterior.covariance, _NU) for mode in self.modes)
+        terms = []
+        for mode, share, mass in zip(self.modes, self.shares, self._masses, strict=True):
+            logs = multivariate_t.logpdf(theta, mode.theta, mode.laplace.posterior.covariance, _NU)
+            terms.append(np.where(self._inside(mode, theta), logs + np.log(share / mass), -np.inf))
+        return np.asarray(logsumexp(terms, axis=0), dtype=np.float64)
 
     @cached_property
     def _masses(self) -> Floats:
@@ -163,14 +156,7 @@ class Smoothed:
 
 
 def pareto_smoothed(log_weights: Floats) -> Smoothed:
-    """Smooth weights (n,), given as logarithms up to a constant; minus infinity for what is impossible.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> pareto_smoothed(np.zeros(100)).effective
-    100.0
-    """
+    """Smooth weights (n,), given as logarithms up to a constant; minus infinity for what is impossible."""
     largest = float(log_weights.max())
     if not np.isfinite(largest):
         return Smoothed(np.full(len(log_weights), 1.0 / len(log_weights)), np.inf)
@@ -323,13 +309,7 @@ def run_chain(
 
 
 def effective_size(values: Floats) -> float:
-    """Independent draws that would tell as much of the mean as a chain (n,): Geyer's initial positive sequence (1992).
-
-    Examples
-    --------
-    >>> round(effective_size(np.tile([0.0, 1.0], 50)))
-    100
-    """
+    """Independent draws that tell as much of the mean as a chain (n,): Geyer's initial positive sequence (1992)."""
     n = len(values)
     away = values - values.mean()
     variance = float(away @ away) / n

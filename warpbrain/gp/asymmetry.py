@@ -38,15 +38,7 @@ class Asymmetry:
 
 
 def asymmetry(model: Hierarchical, group: str) -> Asymmetry:
-    """The asymmetry of a hyperelastic group, without the error of a finite number of draws.
-
-    Examples
-    --------
-    >>> from warpbrain.gp.trained import trained
-    >>> brain = asymmetry(trained(), "hyperelastic/brain")
-    >>> brain.low < brain.mean < brain.high < 0.0
-    True
-    """
+    """The asymmetry of a hyperelastic group, without the error of a finite number of draws."""
     from scipy.special import ndtr
 
     strain = _largest_strain(STRETCHES[group])

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import islice, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,12 +52,8 @@ def from_coordinates(law: str, values: Sequence[float]) -> Law:
 
 def laws_from(names: Sequence[str], values: Sequence[float]) -> tuple[Law, ...]:
     """Laws by their names, of the coordinates of all of them, one after the other."""
-    rest, laws = list(values), []
-    for name in names:
-        count = len(coordinates(name))
-        laws.append(from_coordinates(name, rest[:count]))
-        del rest[:count]
-    return tuple(laws)
+    rest = iter(values)
+    return tuple(from_coordinates(name, list(islice(rest, len(coordinates(name))))) for name in names)
 
 
 #: Smallest width of a kernel along a bounded coordinate, relative to the box: where all samples are on one side, their

@@ -177,14 +177,6 @@ def fit(
     `limit` is the largest size of an exponent, `offset` is `d` [Pa]. `InputError` if the arrays are not finite, of
     different lengths or shorter than the parameters, a stretch is not between 1e-3 and 1e3, or the offset is not
     positive.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> l = np.linspace(0.9, 1.1, 101)
-    >>> y = np.log(300.0 * (l**2 + 2.0 / l - 3.0) + 1e-3)
-    >>> round(fit(METAMODELS["neo-hookean"], l, y).shear_modulus, 6)
-    600.0
     """
     l, y = np.asarray(stretches, dtype=np.float64), np.asarray(log_energy, dtype=np.float64)
     if l.ndim != 1 or l.shape != y.shape:
@@ -307,12 +299,6 @@ def law_of_curve(model: Process, group: str, k: float = 0.0, law: str = "neo-hoo
     """The law of the curve `k` standard deviations from the mean, as the paper samples.
 
     It may be `unstable`. `InputError` if the model has seen no study of the group, or there is no such law.
-
-    Examples
-    --------
-    >>> from warpbrain.gp.trained import trained
-    >>> law_of_curve(trained(), "hyperelastic/brain").shear_modulus > 400.0
-    True
     """
     _require_seen(model, [group])
     stretches = usual_stretches(group)
@@ -412,15 +398,7 @@ class Moduli:
 
 
 def moduli(model: Process, group: str, law: str, draws: int = 1000, seed: int = 0, poisson: float = 0.45) -> Moduli:
-    """Fit a law to the curves of a group, and to stable draws of it; errors are those of `draw_laws`.
-
-    Examples
-    --------
-    >>> from warpbrain.gp.trained import trained
-    >>> brain = moduli(trained(), "hyperelastic/brain", "neo-hookean", draws=40)
-    >>> brain.low < brain.median < brain.high
-    True
-    """
+    """Fit a law to the curves of a group, and to stable draws of it; errors are those of `draw_laws`."""
     fits = tuple(law_of_curve(model, group, k, law) for k in CURVES)
     drawn = [draw_laws(model, [group], law, number, seed, poisson) for number in range(draws)]
     values = np.array([draw.shear_moduli[0] for draw in drawn])

@@ -126,15 +126,7 @@ def groups_of(studies: Sequence[Study]) -> tuple[str, ...]:
 
 
 def dataset(studies: Sequence[Study], count: int = 100) -> tuple[Ints, Floats, Floats]:
-    """Group 0 to 11, stretch and `y = ln(Psi + 1e-4)` of `count` points for each study (`Study.grid`); (n,) each.
-
-    Examples
-    --------
-    >>> from warpbrain.gp.literature.studies import read_studies
-    >>> groups, stretches, log_energies = dataset(read_studies("as_published"))
-    >>> len(groups)
-    7300
-    """
+    """Group 0 to 11, stretch and `y = ln(Psi + 1e-4)` of `count` points for each study (`Study.grid`); (n,) each."""
     grids = [study.grid(count) for study in studies]
     energies = [study.energy(grid) for study, grid in zip(studies, grids, strict=True)]
     groups = np.repeat(np.array([study.task for study in studies], dtype=np.int64), count)
