@@ -119,28 +119,26 @@ class Observations:
 def observations(studies: Sequence[Study]) -> Observations:
     """Secant moduli: `STRETCHES` for a hyperelastic study, one for another."""
     names = papers(studies)
-    rows: list[tuple[int, int, int, float, bool]] = []
-    moduli = [np.empty(0)]
+    grids, moduli = [], [np.empty(0)]
     half = STRETCHES // 2
     middle = (np.arange(half) + 0.5) / half
-    for index, study in enumerate(studies):
+    for study in studies:
         low, high = study.stretch
         # the middles of equal parts of its range, so that neither 1 nor an end is among them
         curved = np.concatenate([low + (1.0 - low) * middle, 1.0 + (high - 1.0) * middle])
         grid = curved if study.hyperelastic else np.array([low, high])
         values = log_secant_modulus(grid, study.energy(grid))
-        if not study.hyperelastic:
-            grid, values = np.ones(1), values.mean(keepdims=True)
-        rows += [(index, names.index(study.paper), study.task, l, study.symmetric) for l in grid]
-        moduli.append(values)
-    return Observations(places_of(rows), np.concatenate(moduli))
+        grids.append(grid if study.hyperelastic else np.ones(1))
+        moduli.append(values if study.hyperelastic else values.mean(keepdims=True))
+    curves = [(index, names.index(each.paper), each.task, each.symmetric) for index, each in enumerate(studies)]
+    return Observations(places_of(curves, grids), np.concatenate(moduli))
 
 
-def places_of(rows: Sequence[tuple[int, int, int, float, bool]]) -> Places:
-    """Places of rows of their numbers."""
-    table = np.array(rows, dtype=np.float64).reshape(-1, 5)
-    study, source, task = table[:, :3].T.astype(np.int64)
-    return Places(study, source, task, table[:, 3], table[:, 4] == 1.0)
+def places_of(curves: Sequence[tuple[int, int, int, bool]], stretches: Sequence[Floats]) -> Places:
+    """Places at the stretches of each of some curves, by `study`, `source`, `task` and `symmetric` of each."""
+    each = np.array(curves, dtype=np.int64).reshape(-1, 4)
+    study, source, task, symmetric = np.repeat(each, [len(at) for at in stretches], axis=0).T
+    return Places(study, source, task, np.concatenate([np.empty(0), *stretches]), symmetric == 1)
 
 
 def papers(studies: Sequence[Study]) -> list[str]:
@@ -466,12 +464,8 @@ class Hierarchical:
         known = papers(self.studies)
         new = sorted({study.paper for study in studies} - set(known))
         sources = {**{name: index for index, name in enumerate(known)}, **{n: -1 - k for k, n in enumerate(new)}}
-        rows = [
-            (-1 - index, sources[study.paper], study.task, l, study.symmetric)
-            for index, (study, at) in enumerate(zip(studies, stretches, strict=True))
-            for l in at
-        ]
-        return self.moments(places_of(rows))
+        curves = [(-1 - index, sources[each.paper], each.task, each.symmetric) for index, each in enumerate(studies)]
+        return self.moments(places_of(curves, stretches))
 
     def moments(self, at: Places) -> list[tuple[Floats, Floats]]:
         """Mean (n,) and covariance (n, n) of the log secant modulus at places, under each hierarchy."""
@@ -482,8 +476,8 @@ class Hierarchical:
     def places(groups: Sequence[str], stretches: ArrayLike) -> Places:
         """Places (groups * n) of one new paper, with one new study a group, free to be asymmetric."""
         l = np.asarray(stretches, dtype=np.float64)
-        numbered = enumerate(map(GROUPS.index, groups))
-        return places_of([(-1 - index, -1, task, stretch, False) for index, task in numbered for stretch in l])
+        curves = [(-1 - index, -1, GROUPS.index(group), False) for index, group in enumerate(groups)]
+        return places_of(curves, [l] * len(groups))
 
     def curve(self, group: str, stretches: ArrayLike, k: ArrayLike = 0.0) -> Floats:
         """The curve `k` standard deviations from the mean, see `Process`."""
