@@ -30,6 +30,7 @@ from warpbrain.errors import require_kind
 from warpbrain.frame import METRES
 from warpbrain.mesh.abaqus import read_abaqus
 from warpbrain.mesh.patience import patience
+from warpbrain.mesh.surface import nodes_of
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
 from warpbrain.mesh.vtu import read_vtu, write_vtu
 
@@ -155,7 +156,10 @@ def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
     points = np.asarray(raw.points, dtype=np.float64)
     # the corners come first in every numbering of second-order tetrahedra that meshio knows
     tetrahedra = np.concatenate([raw.cells[b].data[:, :4] for b in blocks])
-    node_sets = _members(raw.point_data, "") | _named(raw.point_sets, len(points))
+    vectors = _vectors(raw.point_data, cells, tetrahedra)
+    # sets that a file holds as lists of nodes, as Abaqus' NSET
+    listed = {name: np.asarray(ids, dtype=np.int64) for name, ids in (raw.point_sets or {}).items()}
+    node_sets = _members(raw.point_data, "") | {name: nodes_of(ids, len(points)) for name, ids in listed.items()}
     numbers = np.arange(len(points))
     if middles := [raw.cells[b].data[:, 4:] for b in blocks if kinds[b] == "tetra10"]:
         # nodes on edges go; one that no tetrahedron has stays, to be found and named
@@ -172,7 +176,7 @@ def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
         cells.get(label),  # type: ignore[arg-type]  # TetMesh fills in and converts labels itself
         node_sets,
         _members({name: data for name, data in cells.items() if name != label}, ELEMENT_SET_PREFIX),
-        _vectors(raw.point_data, cells, np.concatenate([raw.cells[b].data[:, :4] for b in blocks])),
+        vectors,
     )
     return MeshInFile(mesh, numbers, len(raw.points))
 
@@ -180,29 +184,17 @@ def _from_meshio(raw: Any, scale: float, tissue: str | None) -> MeshInFile:
 def _vectors(
     of_points: Mapping[str, Any], of_cells: Mapping[str, Any], tetrahedra: NDArray[np.integer]
 ) -> dict[str, Floats]:
+    def real(arrays: Mapping[str, Any]) -> dict[str, Floats]:
+        shaped = {name: array for name, data in arrays.items() if (array := np.asarray(data)).shape[1:] == (3,)}
+        return {name: array.astype(np.float64) for name, array in shaped.items() if array.dtype.kind == "f"}
+
     vectors = {}
-    for name, data in of_points.items():
-        if _is_vectors(data):
-            at_nodes = np.asarray(data, dtype=np.float64)[tetrahedra]
-            with np.errstate(invalid="ignore"):
-                against = np.einsum("eaj,ej->ea", at_nodes, at_nodes[:, 0]) < 0.0
-            vectors[name] = np.where(against[:, :, None], -at_nodes, at_nodes).mean(axis=1)
-    return vectors | {name: np.asarray(data, dtype=np.float64) for name, data in of_cells.items() if _is_vectors(data)}
-
-
-def _is_vectors(data: Any) -> bool:
-    array = np.asarray(data)
-    return array.ndim == 2 and array.shape[1] == 3 and array.dtype.kind == "f"
-
-
-def _named(sets: Mapping[str, Any], count: int) -> dict[str, Bools]:
-    """Sets that a file holds as lists of nodes, as Abaqus' NSET."""
-    node_sets = {}
-    for name, ids in (sets or {}).items():
-        members = np.zeros(count, dtype=bool)
-        members[np.asarray(ids, dtype=np.int64)] = True
-        node_sets[name] = members
-    return node_sets
+    for name, data in real(of_points).items():
+        at_nodes = data[tetrahedra]
+        with np.errstate(invalid="ignore"):
+            against = np.einsum("eaj,ej->ea", at_nodes, at_nodes[:, 0]) < 0.0
+        vectors[name] = np.where(against[:, :, None], -at_nodes, at_nodes).mean(axis=1)
+    return vectors | real(of_cells)
 
 
 def _members(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, Bools]:

@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Int32s, Ints
+from warpbrain.arrays import Bools, Ints
 from warpbrain.mesh.abaqus import MATERIAL_SETS
 from warpbrain.mesh.files import ELEMENT_SET_PREFIX, TETRAHEDRA, ends_inside_a_number, mesh_in_file, read_raw
 from warpbrain.mesh.tet_mesh import MeshError, TetMesh
@@ -55,48 +55,46 @@ def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithReg
     notes: list[str] = []
     if ends_inside_a_number(path):
         notes.append(f"{path.name} ends in a number without a line break: is it cut off?")
-    physical = {(int(dim), int(tag)): name for name, (tag, dim) in _groups(raw).items()}
-    parts = _partition(raw)
-    if parts is not None:
-        numbers = dict(enumerate(parts, 1))
-        raw.cell_data[SETS] = _numbered(raw, list(parts))
+    # physical groups of Gmsh: tag and dimension
+    groups = {name: value for name, value in (raw.field_data or {}).items() if np.shape(value) == (2,)}
+    physical = {(int(dim), int(tag)): name for name, (tag, dim) in groups.items()}
+    others = [name for name in raw.cell_sets or {} if name not in groups and not name.startswith("gmsh:")]
+    sets = {name: _members(raw, name) for name in others}
+    of_tetrahedra = {name: _of_tetrahedra(raw, members) for name, members in sets.items()}
+    parts = _partition(of_tetrahedra, *(raw.info or {}).get(MATERIAL_SETS, ([], [])))
+    if parts:
+        numbered = list(enumerate(parts, 1))
+        raw.cell_data[SETS] = [
+            np.sum([number * sets[name][block] for number, name in numbered], axis=0) for block in range(len(raw.cells))
+        ]
     chosen = _chosen(path, raw, array)
     names: dict[int, str] = {}
-    if chosen == SETS and parts is not None:
-        names = numbers
+    if chosen == SETS and parts:
+        names = dict(numbered)
         notes.append(f"tissues are the sets of elements {', '.join(parts)}")
     elif chosen is not None:
-        values = np.unique(_of_tetrahedra(raw, chosen))
+        values = np.unique(_of_tetrahedra(raw, raw.cell_data[chosen]))
         names = {int(v): physical[3, int(v)] for v in values if chosen == _PHYSICAL and (3, int(v)) in physical}
         if chosen != "tissue":
             what = "physical groups of Gmsh" if chosen == _PHYSICAL else f"values of the cell array '{chosen}'"
             notes.append(f"tissues are the {what}: {', '.join(names.get(int(v), str(int(v))) for v in values)}")
-    elif sets := {name: int(each.sum()) for name, each in _sets_of_tetrahedra(raw).items() if each.any()}:
-        listed = ", ".join(f"{name} ({count} tetrahedra)" for name, count in sets.items())
+    elif counts := {name: int(members.sum()) for name, members in of_tetrahedra.items() if members.any()}:
+        listed = ", ".join(f"{name} ({count} tetrahedra)" for name, count in counts.items())
         notes.append(f"sets of elements that overlap or leave some out are no tissues: {listed}")
-    notes += _name_nodes(raw, chosen, physical)
-    for name in raw.cell_sets or {}:
-        if not (chosen == SETS and parts is not None and name in parts) and name not in _groups(raw):
-            members = _members(raw, name)
-            if any(members[b].any() for b in _blocks(raw)):
-                raw.cell_data[ELEMENT_SET_PREFIX + _plain(name)] = [each.astype(np.uint8) for each in members]
+    notes += _name_nodes(raw, sets, None if chosen == SETS else chosen, physical)
+    for name, members in of_tetrahedra.items():
+        if members.any() and not (chosen == SETS and name in parts):
+            raw.cell_data[ELEMENT_SET_PREFIX + _plain(name)] = [each.astype(np.uint8) for each in sets[name]]
     if chosen is not None and chosen != "tissue":
         raw.cell_data["tissue"] = raw.cell_data[chosen]
     raw.cell_data.pop(SETS, None)
     return MeshWithRegions(mesh_in_file(path, raw, unit).mesh, names, tuple(notes))
 
 
-def _blocks(raw: Any) -> list[int]:
-    return [number for number, block in enumerate(raw.cells) if block.type in TETRAHEDRA]
-
-
-def _groups(raw: Any) -> Mapping[str, Any]:
-    """Physical groups by name: their tag and dimension."""
-    return {name: value for name, value in (raw.field_data or {}).items() if np.shape(value) == (2,)}
-
-
-def _of_tetrahedra(raw: Any, name: str) -> NDArray[Any]:
-    return np.concatenate([np.asarray(raw.cell_data[name][b]) for b in _blocks(raw)])
+def _of_tetrahedra(raw: Any, of_blocks: Sequence[Any]) -> NDArray[Any]:
+    """What is there for each cell of each block, of the tetrahedra alone."""
+    pairs = zip(raw.cells, of_blocks, strict=True)
+    return np.concatenate([np.asarray(values) for block, values in pairs if block.type in TETRAHEDRA])
 
 
 def _whole(values: NDArray[Any]) -> Ints | None:
@@ -122,7 +120,7 @@ def _chosen(path: Path, raw: Any, array: str | None) -> str | None:
         return "tissue"
     values: dict[str, int] = {}
     for name in raw.cell_data:
-        whole = _whole(_of_tetrahedra(raw, name))
+        whole = _whole(_of_tetrahedra(raw, raw.cell_data[name]))
         if name.startswith(ELEMENT_SET_PREFIX) or _BOOKKEEPING.fullmatch(name) or whole is None or not len(whole):
             continue
         distinct = np.unique(whole)
@@ -138,23 +136,15 @@ def _chosen(path: Path, raw: Any, array: str | None) -> str | None:
     return several[0] if len(several) == 1 else None
 
 
-def _partition(raw: Any) -> list[str] | None:
-    """Sets of elements of which every tetrahedron is in one, and in one only; None if there are none such."""
-    members = _sets_of_tetrahedra(raw)
-    sections, of_elements = (raw.info or {}).get(MATERIAL_SETS, ([], []))
+def _partition(members: Mapping[str, Bools], sections: Sequence[str], of_elements: Sequence[str]) -> list[str]:
+    """Sets of elements of which every tetrahedron is in one, and in one only; none if there are none such."""
     for names in (sections, list(members), of_elements):
         parts = [name for name in names if members[name].any() and not members[name].all()]
         # one set of all, if it is the only one
         parts = parts or [name for name in names if members[name].all()]
-        if parts and (np.sum([members[name].astype(int) for name in parts], axis=0) == 1).all():
+        if parts and (np.sum([members[name] for name in parts], axis=0) == 1).all():
             return parts
-    return None
-
-
-def _sets_of_tetrahedra(raw: Any) -> dict[str, Bools]:
-    """Which tetrahedra (m,) are in each set of elements."""
-    names = [name for name in raw.cell_sets or {} if name not in _groups(raw) and not name.startswith("gmsh:")]
-    return {name: np.concatenate([_members(raw, name)[b] for b in _blocks(raw)]) for name in names}
+    return []
 
 
 def _members(raw: Any, name: str) -> list[Bools]:
@@ -168,15 +158,9 @@ def _members(raw: Any, name: str) -> list[Bools]:
     return all_members
 
 
-def _numbered(raw: Any, names: list[str]) -> list[Int32s]:
-    values = [np.zeros(len(block.data), dtype=np.int32) for block in raw.cells]
-    for number, name in enumerate(names, 1):
-        for each, members in zip(values, _members(raw, name), strict=True):
-            each[members] = number
-    return values
-
-
-def _name_nodes(raw: Any, chosen: str | None, physical: Mapping[tuple[int, int], str]) -> list[str]:
+def _name_nodes(
+    raw: Any, sets: Mapping[str, list[Bools]], chosen: str | None, physical: Mapping[tuple[int, int], str]
+) -> list[str]:
     """Add node sets of faces, edges and points, and of the values of point arrays; says which."""
     added: dict[str, list[Ints]] = {}
     for number, block in enumerate(raw.cells):
@@ -184,20 +168,16 @@ def _name_nodes(raw: Any, chosen: str | None, physical: Mapping[tuple[int, int],
             continue
         dimension = _DIMENSION.get(block.type, 2)
         labels = _whole(np.asarray(raw.cell_data[chosen][number])) if chosen in raw.cell_data else None
-        values = [] if labels is None or chosen == SETS else [int(v) for v in np.unique(labels) if v != 0]
-        for value in values if len(values) <= MOST_VALUES else []:
-            name = physical.get((dimension, value), f"{str(chosen).removeprefix('gmsh:')}-{value}")
-            assert labels is not None  # values are of them
-            added.setdefault(name, []).append(np.unique(block.data[labels == value]))
-        for name in raw.cell_sets or {}:
-            if name not in _groups(raw) and not name.startswith("gmsh:"):
-                members = _members(raw, name)[number]
-                if members.any():
-                    added.setdefault(name, []).append(np.unique(block.data[members]))
+        if labels is not None and len(values := np.unique(labels[labels != 0])) <= MOST_VALUES:
+            for value in values.tolist():
+                name = physical.get((dimension, value), f"{str(chosen).removeprefix('gmsh:')}-{value}")
+                added.setdefault(name, []).append(block.data[labels == value].ravel())
+        for name, members in sets.items():
+            if members[number].any():
+                added.setdefault(name, []).append(block.data[members[number]].ravel())
     notes = []
     for name, values_at in list(raw.point_data.items()):
-        values_of_points = np.asarray(values_at)
-        whole = _whole(values_of_points)
+        whole = _whole(np.asarray(values_at))
         if whole is None:
             continue
         marks = np.unique(whole[whole != 0])
