@@ -15,8 +15,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats, Int32s, Ints
-from warpbrain.mesh.integrals import shape_values, triangle_rule
+from warpbrain.arrays import Floats, Ints
+from warpbrain.mesh.integrals import shapes_of, triangle_rule
 from warpbrain.mesh.quadratic import QuadraticMesh
 from warpbrain.mesh.tet_mesh import TetMesh
 
@@ -40,27 +40,25 @@ def integrals_above(mesh: TetMesh | QuadraticMesh, up: ArrayLike, level: float) 
     """`int N_a dV` over the part of each tetrahedron where `x . up > level`.
 
     `up` (3,): unit normal of the plane. `level`: its distance from the origin along `up` [m]. Returns (m, 4) or
-    (m, 10) [m3], for the nodes of each tetrahedron in the order of `elements_of_nodes`; not to be written to.
+    (m, 10) [m3], for the nodes of each tetrahedron in the order of `shapes_of`; not to be written to.
     """
-    above, key = np.asarray(up, dtype=np.float64), (type(mesh), "integrals above", float(level))
-    corners = mesh if isinstance(mesh, TetMesh) else mesh.corners
-    return corners.made_once((*key, *above.tolist()), lambda: _integrals_above(mesh, above, float(level)))
+    up = np.asarray(up, dtype=np.float64)
 
+    def integrals() -> Floats:
+        cut = _Cut(mesh, up, float(level))
+        whole = integrals_of_shapes(mesh)
+        result = np.where((cut.count == 4)[:, None], whole, 0.0)
+        for elements, corners, sign in cut.solids():
+            # sign -1: what is below is cut off from the whole
+            bary = np.einsum("qc,kca->kqa", _RULE, corners)
+            volumes = np.abs(np.linalg.det(corners)) * cut.volumes[elements]
+            np.add.at(result, elements, sign * (volumes[:, None] * cut.shapes(bary).mean(axis=1)))
+        below = cut.count == 3
+        result[below] += whole[below]
+        return result
 
-def _integrals_above(mesh: TetMesh | QuadraticMesh, up: Floats, level: float) -> Floats:
-    """The same, computed anew."""
-    cut = _Cut(mesh, up, level)
-    whole = integrals_of_shapes(mesh)
-    integrals = np.where((cut.count == 4)[:, None], whole, 0.0)
-    for elements, corners, sign in cut.solids():
-        # sign -1: what is below is cut off from the whole
-        bary = np.einsum("qc,kca->kqa", _RULE, corners)
-        volumes = np.abs(np.linalg.det(corners)) * cut.volumes[elements]
-        part = volumes[:, None] * cut.shapes(bary).mean(axis=1)
-        np.add.at(integrals, elements, sign * part)
-    below = cut.count == 3
-    integrals[below] += whole[below]
-    return integrals
+    key = (type(mesh), "integrals above", float(level), *up.tolist())
+    return shapes_of(mesh)[0].made_once(key, integrals)
 
 
 def integrals_on_plane(
@@ -84,14 +82,9 @@ def integrals_on_plane(
     return integrals
 
 
-def elements_of_nodes(mesh: TetMesh | QuadraticMesh) -> Int32s:
-    """Nodes of each tetrahedron, (m, 4) or (m, 10), in the order of the integrals."""
-    return mesh.tetrahedra if isinstance(mesh, TetMesh) else mesh.elements
-
-
 def summed_at_nodes(mesh: TetMesh | QuadraticMesh, values: Floats) -> Floats:
     """Values (m, s, ...) at the nodes of tetrahedra, added up at each node (n, ...)."""
-    nodes, count = elements_of_nodes(mesh).ravel(), len(mesh.points)
+    nodes, count = shapes_of(mesh)[1].ravel(), len(mesh.points)
     columns = values.reshape(len(nodes), -1).T
     sums = [np.bincount(nodes, weights=column, minlength=count).astype(np.float64) for column in columns]
     return np.stack(sums, axis=1).reshape(count, *values.shape[2:])
@@ -104,10 +97,8 @@ class _Cut:
     """
 
     def __init__(self, mesh: TetMesh | QuadraticMesh, up: Floats, level: float) -> None:
-        linear = isinstance(mesh, TetMesh)
-        self.shapes: Callable[[Floats], Floats] = (lambda bary: bary) if linear else _quadratic
-        self.volumes = mesh.volumes if isinstance(mesh, TetMesh) else mesh.corners.volumes
-        self.corners = mesh.points[elements_of_nodes(mesh)[:, :4]]
+        tetrahedra, elements, self.shapes = shapes_of(mesh)
+        self.volumes, self.corners = tetrahedra.volumes, mesh.points[elements[:, :4]]
         self._heights = self.corners @ up - level
         self.count = (self._heights > 0.0).sum(axis=1)
         # the highest first: those above the plane come before those below it
@@ -144,7 +135,3 @@ class _Cut:
         first, second = (self._heights[elements][rows, self._order[elements, rank]] for rank in (one, other))
         share = (first / (first - second))[:, None]
         return (1.0 - share) * self._corner(elements, one) + share * self._corner(elements, other)
-
-
-def _quadratic(bary: Floats) -> Floats:
-    return shape_values(bary.reshape(-1, 4)).reshape(*bary.shape[:-1], 10)

@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.mesh.quadratic import QuadraticMesh
-from warpbrain.mesh.surface import face_vectors
+from warpbrain.mesh.surface import EDGES, face_vectors
 from warpbrain.mesh.tet_mesh import TetMesh
 
 #: Values (k, 3) of a field at points (k, 3).
@@ -44,14 +44,20 @@ def tetrahedron_rule() -> tuple[Floats, Floats]:
 
 
 def shape_values(bary: Floats) -> Floats:
-    """Quadratic shape functions (q, 6) on triangles or (q, 10) on tetrahedra, at barycentric points (q, 3) or (q, 4).
+    """Quadratic shape functions (..., 6) on triangles or (..., 10) on tetrahedra, at barycentric points (..., 3 or 4).
 
     Those of corners, `L (2 L - 1)`, then those of edges, `4 L_a L_b`: 01, 02, 12 of a triangle, in the order of
     `warpbrain.mesh.surface.EDGES` of a tetrahedron.
     """
-    triangle = bary.shape[1] == 3
-    first, second = ((0, 0, 1), (1, 2, 2)) if triangle else ((0, 0, 0, 1, 1, 2), (1, 2, 3, 2, 3, 3))
-    return np.concatenate([bary * (2.0 * bary - 1.0), 4.0 * bary[:, first] * bary[:, second]], axis=1)
+    first, second = EDGES[[0, 1, 3]].T if bary.shape[-1] == 3 else EDGES.T
+    return np.concatenate([bary * (2.0 * bary - 1.0), 4.0 * bary[..., first] * bary[..., second]], axis=-1)
+
+
+def shapes_of(mesh: TetMesh | QuadraticMesh) -> tuple[TetMesh, Int32s, Callable[[Floats], Floats]]:
+    """The tetrahedra of a mesh, the nodes (m, 4) or (m, 10) of each, corners first, and their shape functions."""
+    if isinstance(mesh, TetMesh):
+        return mesh, mesh.tetrahedra, lambda bary: bary
+    return mesh.corners, mesh.elements, shape_values
 
 
 def volume_forces(mesh: TetMesh | QuadraticMesh, density: Field) -> Floats:
@@ -60,38 +66,25 @@ def volume_forces(mesh: TetMesh | QuadraticMesh, density: Field) -> Floats:
     What jumps at a plane: `warpbrain.mesh.half_space`.
     """
     bary, weights = tetrahedron_rule()
-    if isinstance(mesh, TetMesh):
-        sizes = weights[:, None] * mesh.volumes
-        return _summed(mesh, mesh.tetrahedra, _points_on(mesh.points[mesh.tetrahedra], bary), sizes, bary, density)
-    corners = mesh.points[mesh.elements[:, :4]]
-    sizes = weights[:, None] * mesh.corners.volumes
-    return _summed(mesh, mesh.elements, _points_on(corners, bary), sizes, shape_values(bary), density)
+    corners, elements, shapes = shapes_of(mesh)
+    at = _points_on(corners.points[elements[:, :4]], bary)
+    return _summed(mesh, elements, at, weights[:, None] * corners.volumes, shapes(bary), density)
 
 
 def surface_forces(
     mesh: TetMesh | QuadraticMesh, traction: Field, triangles: NDArray[np.integer] | slice = slice(None)
 ) -> Floats:
     """Forces (n, 3) [N] of a force on the boundary [Pa], or on some of its triangles, by a rule of degree 4 on each."""
-    bary, _ = triangle_rule()
-    if isinstance(mesh, TetMesh):
-        faces, shapes, (at, sizes) = mesh.boundary, bary, rule_on_boundary(mesh)
-    else:
-        faces, shapes, (at, sizes) = mesh.faces, shape_values(bary), rule_on_boundary(mesh.corners)
-    return _summed(mesh, faces[triangles], at[:, triangles], sizes[:, triangles], shapes, traction)
-
-
-def rule_on_boundary(mesh: TetMesh) -> tuple[Floats, Floats]:
-    """Points (q, b, 3) [m] of the rule on the triangles of a boundary, and for what area (q, b) [m2] each stands.
-
-    Made once for a mesh and all that share its elements.
-    """
-    rule: tuple[Floats, Floats] | None = mesh.shared.get("rule on boundary")
-    if rule is None:
-        bary, weights = triangle_rule()
-        areas = np.linalg.norm(face_vectors(mesh.points, mesh.boundary), axis=1)
-        rule = _points_on(mesh.points[mesh.boundary], bary), weights[:, None] * areas
-        mesh.shared["rule on boundary"] = rule
-    return rule
+    bary, weights = triangle_rule()
+    corners, _, shapes = shapes_of(mesh)
+    # points (q, b, 3) of the rule, and for what area (q, b) each stands: of all meshes that share these elements
+    if "rule on boundary" not in corners.shared:
+        areas = np.linalg.norm(face_vectors(corners.points, corners.boundary), axis=1)
+        rule = _points_on(corners.points[corners.boundary], bary), weights[:, None] * areas
+        corners.shared["rule on boundary"] = rule
+    at, sizes = corners.shared["rule on boundary"]
+    faces = mesh.boundary if isinstance(mesh, TetMesh) else mesh.faces
+    return _summed(mesh, faces[triangles], at[:, triangles], sizes[:, triangles], shapes(bary), traction)
 
 
 def _points_on(corners: Floats, bary: Floats) -> Floats:

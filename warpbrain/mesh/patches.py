@@ -41,7 +41,11 @@ def patch_around(points: ArrayLike, faces: ArrayLike, centre: ArrayLike, radius:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     facing = normals @ normals[start] > _ASIDE
     taken = np.flatnonzero((distance < radius) & facing)
-    within = _nearest_on_sides(corners[near[taken]][:, SIDES])[1].ravel() < radius
+    # how near the sides come to the centre
+    start_of, end_of = np.moveaxis(corners[near[taken]][:, SIDES], 2, 0)
+    along = end_of - start_of
+    part = np.clip(-(start_of * along).sum(axis=-1) / (along**2).sum(axis=-1), 0.0, 1.0)
+    within = np.linalg.norm(start_of + part[..., None] * along, axis=-1).ravel() < radius
     together = closed_surfaces(triangles[near[taken]], within)
     return np.asarray(near[taken[together == together[np.searchsorted(taken, start)]]])
 
@@ -78,10 +82,3 @@ def closest_on_triangles(points: Floats, corners: Floats) -> tuple[Floats, Float
 
 def _distance(points: Floats, corners: Floats, weights: Floats) -> Floats:
     return np.linalg.norm(np.einsum("ni,nij->nj", weights, corners - points[..., None, :]), axis=1)
-
-
-def _nearest_on_sides(ends: Floats) -> tuple[Floats, Floats]:
-    """Where on segments with ends (..., 2, 3) the point nearest to the origin is, 0 to 1, and how far away."""
-    along = ends[..., 1, :] - ends[..., 0, :]
-    part = np.clip(-(ends[..., 0, :] * along).sum(axis=-1) / (along**2).sum(axis=-1), 0.0, 1.0)
-    return part, np.linalg.norm(ends[..., 0, :] + part[..., None] * along, axis=-1)

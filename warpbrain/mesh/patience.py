@@ -64,14 +64,18 @@ def _time(seconds: float) -> Iterator[None]:
 
 @contextmanager
 def _memory(limit: int) -> Iterator[None]:
-    taken = _address_space()
-    if taken is None:
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    except (OSError, ValueError, IndexError):
+        pages = 0
+    if not pages:
+        # a system that does not say how much of its address space a process has
         yield
         return
     import resource
 
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    wanted = taken + limit
+    wanted = pages * os.sysconf("SC_PAGE_SIZE") + limit
     if soft != resource.RLIM_INFINITY:
         wanted = min(wanted, soft)
     resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
@@ -81,12 +85,3 @@ def _memory(limit: int) -> Iterator[None]:
         raise MemoryError(f"needs more than {limit / 1e9:.1f} GB of memory: is a counter in it wrong?") from None
     finally:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-
-
-def _address_space() -> int | None:
-    """Bytes of address space that this process has; None where it does not say."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-    except (OSError, ValueError, IndexError):
-        return None
-    return pages * os.sysconf("SC_PAGE_SIZE")

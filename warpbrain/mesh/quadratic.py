@@ -38,16 +38,20 @@ class QuadraticMesh:
 
     def __post_init__(self) -> None:
         node_mesh, ends = finer_mesh(self.corners)
-        if "ten nodes" not in self.corners.shared:
+        object.__setattr__(self, "node_mesh", node_mesh)
+        object.__setattr__(self, "ends", ends)
+        shared = self.corners.shared
+        if "ten nodes" not in shared:
             corners = np.sort(self.corners.tetrahedra, axis=1)
-            elements = np.concatenate([corners, _middles(len(self.corners.points), ends, corners[:, EDGES])], axis=1)
-            self.corners.shared["ten nodes"] = elements.astype(np.int32)
-        for name, value in (("node_mesh", node_mesh), ("ends", ends), ("elements", self.corners.shared["ten nodes"])):
-            object.__setattr__(self, name, value)
+            shared["ten nodes"] = np.concatenate([corners, self.middles(corners[:, EDGES])], axis=1).astype(np.int32)
+        object.__setattr__(self, "elements", shared["ten nodes"])
 
     def middles(self, edges: NDArray[np.integer]) -> Ints:
         """Node in the middle of each edge (..., 2), its ends ascending."""
-        return _middles(len(self.corners.points), self.ends, edges)
+        count = len(self.corners.points)
+        factors = np.array([count, 1])
+        numbers = np.searchsorted(self.ends[count:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
+        return np.asarray(count + numbers, dtype=np.int64)
 
     @property
     def points(self) -> Floats:
@@ -113,10 +117,3 @@ def quadratic_interpolant(weights: Floats, corners: Floats, middles: Floats) -> 
     """
     of_corners = np.einsum("na,nac->nc", weights * (2.0 * weights - 1.0), corners)
     return np.asarray(of_corners + np.einsum("na,nac->nc", 4.0 * weights[:, EDGES].prod(axis=2), middles))
-
-
-def _middles(corners: int, ends: Int32s, edges: NDArray[np.integer]) -> Ints:
-    """Node in the middle of each edge (..., 2), its ends ascending, of all nodes with their `ends`, corners first."""
-    factors = np.array([corners, 1])
-    edge_numbers = np.searchsorted(ends[corners:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
-    return np.asarray(corners + edge_numbers, dtype=np.int64)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpbrain.arrays import Bools, Floats, Int32s, Ints
+from warpbrain.arrays import Bools, Floats, Int32s
 from warpbrain.errors import InputError
 from warpbrain.mesh.surface import EDGES, FACES, boundary_faces, in_rows, interface_faces
 
@@ -348,24 +348,19 @@ def _defects(points: Floats, tetrahedra: Int32s) -> list[str]:
     if unused.any():
         defects.append(f"{unused.sum()} node(s) belong to no tetrahedron: node {_ids(unused)}; take them out")
     whole = np.flatnonzero(~outside & ~repeated)
-    return defects + _flat_or_inverted(points, tetrahedra[whole], whole, bad)
-
-
-def _flat_or_inverted(points: Floats, tetrahedra: Int32s, numbers: Ints, bad: Bools) -> list[str]:
-    corner = points[tetrahedra]
-    measurable = ~bad[tetrahedra].any(axis=1)
+    corner = points[tetrahedra[whole]]
+    measurable = ~bad[tetrahedra[whole]].any(axis=1)
     with np.errstate(invalid="ignore", over="ignore"):
-        volumes = signed_volumes(points, tetrahedra)
+        volumes = signed_volumes(points, tetrahedra[whole])
         longest = np.sqrt(((corner[:, EDGES[:, 0]] - corner[:, EDGES[:, 1]]) ** 2).sum(-1).max(axis=1))
         # flat to rounding: such a volume has no sign that means anything
         flat = measurable & (np.abs(volumes) <= 1e-12 * longest**3)
         inverted = measurable & ~flat & (volumes < 0)
-    defects = []
     if flat.any():
-        defects.append(f"{flat.sum()} tetrahedra have zero volume: tetrahedron {_ids(numbers[flat])}")
+        defects.append(f"{flat.sum()} tetrahedra have zero volume: tetrahedron {_ids(whole[flat])}")
     if inverted.any():
         defects.append(
-            f"{inverted.sum()} tetrahedra are inverted (negative volume): tetrahedron {_ids(numbers[inverted])}; "
+            f"{inverted.sum()} tetrahedra are inverted (negative volume): tetrahedron {_ids(whole[inverted])}; "
             "swap two nodes of each"
         )
     return defects
