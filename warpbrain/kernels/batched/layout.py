@@ -1,11 +1,12 @@
 """What kernels know of the samples of a batch; vectors and blocks of one, whose slot is the last index of arrays."""
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import warp as wp
 
-from warpbrain.kernels.module import Precision
+from warpbrain.kernels.module import KernelSet, Precision
 
 #: Rows of the mesh that one thread works through; their share of a sum is added up on the way.
 ROWS = 4
@@ -19,6 +20,19 @@ def stages(rows: int) -> tuple[int, int]:
     """How many threads a sum over `rows` takes in its first and in its second stage."""
     chunks = -(-rows // ROWS)
     return chunks, -(-chunks // SHARES)
+
+
+def sample_kernel(kernels: KernelSet, Samples: Any, function: Callable[..., None]) -> Any:
+    """Make a kernel ``(slots, count, s)``, one thread for an item and a lane, of a function ``(item, slot, s)``."""
+    of_sample = wp.func(function, inline=True)
+
+    def kernel(slots: wp.array[int], count: wp.array[int], s: Samples):
+        i, lane = wp.tid()
+        if lane < count[0]:
+            of_sample(i, slots[lane], s)
+
+    kernel.__name__, kernel.__qualname__ = function.__name__, function.__qualname__
+    return kernels.add(kernel)
 
 
 @cache

@@ -54,8 +54,7 @@ class BatchedConjugateGradient:
     ) -> None:
         n, _, slots = x.shape
         self._device = device = x.device
-        self._tolerance, self._max_iterations = tolerance, max_iterations
-        self._precision, self._size, self._slots = precision, n, slots
+        self._size, self._slots = n, slots
         self._chunks, self._groups = stages(n)
 
         def zeros(*shape: int, dtype: Any = precision.scalar) -> wp.array:
@@ -85,6 +84,7 @@ class BatchedConjugateGradient:
         for name in ("alpha", "beta", "rr", "rz", "goal"):
             setattr(s, name, zeros(slots))
         s.iterations, s.solving = zeros(slots, dtype=int), self.solving
+        s.tolerance, s.max_iterations = tolerance, max_iterations
         self._active, self._count, self._go_on = zeros(slots, dtype=int), zeros(1, dtype=int), zeros(1, dtype=int)
 
     def _launch(self, kernel: Any, dim: Any, *inputs: Any) -> None:
@@ -99,7 +99,7 @@ class BatchedConjugateGradient:
         self._launch(k.invert_diagonal, (self._size, lanes), slots, count, s)
         self._launch(k.start, (self._chunks, lanes), slots, count, s)
         self._launch(k.add_shares, (3, self._groups, lanes), slots, count, s.shares, s.sums)
-        self._launch(k.finish_start, lanes, slots, count, s, self._precision.scalar(self._tolerance))
+        self._launch(k.finish_start, (1, lanes), slots, count, s)
 
     def iterate(self, slots: wp.array, count: wp.array, linger: wp.array) -> None:
         """Go on with the systems of a list of slots until no more than `linger` (of one number) have not ended.
@@ -128,10 +128,10 @@ class BatchedConjugateGradient:
         active = self._active, self._count
         self._launch(k.product, chunks, *active, s)
         self._launch(k.add_shares, (1, self._groups, lanes), *active, s.shares, s.sums)
-        self._launch(k.finish_product, lanes, *active, s)
+        self._launch(k.finish_product, (1, lanes), *active, s)
         self._launch(k.advance, chunks, *active, s)
         self._launch(k.add_shares, (2, self._groups, lanes), *active, s.shares, s.sums)
-        self._launch(k.finish_advance, lanes, *active, s, self._max_iterations)
+        self._launch(k.finish_advance, (1, lanes), *active, s)
         self._launch(k.turn, chunks, *active, s)
 
     def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

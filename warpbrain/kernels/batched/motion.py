@@ -6,7 +6,7 @@ that share an element. Displacements are in double precision whatever the others
 no digits to lose to the strain of its elements.
 """
 
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 import warp as wp
@@ -14,6 +14,7 @@ import warp as wp
 from warpbrain.kernels.batched.layout import (
     ROWS,
     narrowed,
+    sample_kernel,
     samples_struct,
     store_block,
     store_vector,
@@ -31,6 +32,7 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
     kernels = KernelSet(f"motion_{precision.name}_batched")
     Samples: TypeAlias = samples_struct(precision)
     rows = wp.constant(ROWS)
+    of_samples = partial(sample_kernel, kernels, Samples)
 
     @kernels.add
     def restore(slots: wp.array[int], s: Samples):
@@ -50,13 +52,9 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         store_vector(s.v, i, slot, vec3())
         store_vector(s.dv, i, slot, vec3())
 
-    @kernels.add
-    def prescribe(slots: wp.array[int], count: wp.array[int], s: Samples):
+    @of_samples
+    def prescribe(i: int, slot: int, s: Samples):
         """Velocity of the constrained components that takes them to where they must be at the end of the step."""
-        i, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         goal = vec3()
         for shape in range(s.shapes.shape[0]):
             goal += s.amounts[shape, slot] * s.shapes[shape, i]
@@ -64,13 +62,9 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         way = narrowed(widened(goal) - vector_of(s.u, i, slot), s.prescribed)
         store_vector(s.prescribed, i, slot, wp.cw_mul(held, way / s.h[slot]))
 
-    @kernels.add
-    def begin(slots: wp.array[int], count: wp.array[int], s: Samples):
+    @of_samples
+    def begin(i: int, slot: int, s: Samples):
         """Keeps the state and writes the right-hand side `b = M v + h (f_ext - f_int)` on the free components."""
-        i, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         vi = vector_of(s.v, i, slot)
         store_vector(s.u_start, i, slot, vector_of(s.u, i, slot))
         store_vector(s.v_start, i, slot, vi)
@@ -80,13 +74,9 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         step = s.h[slot] * (external - vector_of(s.internal, i, slot))
         store_vector(s.b, i, slot, wp.cw_mul(s.free[i], s.mass[i] * vi + step))
 
-    @kernels.add
-    def update(slots: wp.array[int], count: wp.array[int], s: Samples):
+    @of_samples
+    def update(i: int, slot: int, s: Samples):
         """Velocity and displacement at the end of the step, of the samples whose linear solve has ended."""
-        i, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         if s.solving[slot] != 0:
             return
         prescribed = vector_of(s.prescribed, i, slot)
@@ -118,14 +108,10 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
         place, k = wp.tid()
         collected[place * nodes.shape[0] + k] = widened(vector_of(x, nodes[k], slots[place]))
 
-    @kernels.add
-    def gather_matrix(slots: wp.array[int], count: wp.array[int], s: Samples):
+    @of_samples
+    def gather_matrix(p: int, slot: int, s: Samples):
         """One thread for a pair of nodes and its block `A_ij = k K_ij + m M_ij`, with `k` and `m` of the sample and the
         rows and columns of constrained components replaced by those of the identity."""
-        p, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         K = mat33()
         for c in range(s.pair_first[p], s.pair_first[p + 1]):
             K += tangent_of(s.tangents, s.contributions[c] / 10, s.contributions[c] % 10, slot)
@@ -139,14 +125,10 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
                 A[c, c] += s.free[i][c] * inertia + (one - s.free[i][c])
         store_block(s.values, p, 0, slot, A)
 
-    @kernels.add
-    def gather_forces(slots: wp.array[int], count: wp.array[int], s: Samples):
+    @of_samples
+    def gather_forces(chunk: int, slot: int, s: Samples):
         """One thread for `ROWS` nodes: internal forces, and the shares of the squared norms of what is out of balance
         on the free components and of the internal forces."""
-        chunk, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         unbalanced = scalar(0.0)
         size = scalar(0.0)
         for i in range(chunk * rows, wp.min((chunk + 1) * rows, s.internal.shape[0])):
@@ -177,13 +159,9 @@ def batched_motion_kernels(precision: Precision) -> KernelSet:
                 low = value
         least[chunk, slot] = low
 
-    @kernels.add
-    def constrained_load(slots: wp.array[int], count: wp.array[int], s: Samples):
+    @of_samples
+    def constrained_load(i: int, slot: int, s: Samples):
         """One thread for a node: subtract `k K d`, of elements' forces `K d`, from the right-hand side."""
-        i, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         f = vec3()
         for c in range(s.corner_first[i], s.corner_first[i + 1]):
             f += vector_of(s.element_forces, s.corners[c], slot)

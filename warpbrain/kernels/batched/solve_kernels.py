@@ -1,6 +1,6 @@
 """Kernels of conjugate gradients for many systems of one pattern, each with scalars, sums and an end of its own."""
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import warp as wp
@@ -9,6 +9,7 @@ from warpbrain.kernels.batched.layout import (
     ROWS,
     SHARES,
     block_of,
+    sample_kernel,
     store_symmetric,
     store_vector,
     symmetric_of,
@@ -55,6 +56,10 @@ def batched_solve_kernels(precision: Precision) -> tuple[Any, KernelSet]:
         goal: wp.array[scalar]
         iterations: wp.array[int]
         solving: wp.array[int]
+        tolerance: scalar
+        max_iterations: int
+
+    of_samples = partial(sample_kernel, kernels, Systems)
 
     @wp.func
     def row_product(s: Systems, x: wp.array3d[scalar], i: int, slot: int):
@@ -68,23 +73,15 @@ def batched_solve_kernels(precision: Precision) -> tuple[Any, KernelSet]:
             y += A * vector_of(x, j, slot)
         return y
 
-    @kernels.add
-    def invert_diagonal(slots: wp.array[int], count: wp.array[int], s: Systems):
+    @of_samples
+    def invert_diagonal(i: int, slot: int, s: Systems):
         """One thread for a node: the inverse of its diagonal block."""
-        i, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         store_symmetric(s.inverse, i, 0, slot, wp.inverse(block_of(s.values, s.diagonal[i], 0, slot)))
 
-    @kernels.add
-    def start(slots: wp.array[int], count: wp.array[int], s: Systems):
+    @of_samples
+    def start(chunk: int, slot: int, s: Systems):
         """One thread for `ROWS` nodes: `b - A v` on free components, of `b` in the place of `r`, residual
         `r = b - A v - A x`, `z = D^-1 r`, `p = z`; shares of `|b - A v|^2`, `r . r` and `r . z`."""
-        chunk, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         bb = scalar(0.0)
         rr = scalar(0.0)
         rz = scalar(0.0)
@@ -103,13 +100,9 @@ def batched_solve_kernels(precision: Precision) -> tuple[Any, KernelSet]:
         s.shares[1, chunk, slot] = rr
         s.shares[2, chunk, slot] = rz
 
-    @kernels.add
-    def product(slots: wp.array[int], count: wp.array[int], s: Systems):
+    @of_samples
+    def product(chunk: int, slot: int, s: Systems):
         """Likewise: `q = A p`; shares of `p . q`."""
-        chunk, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         pq = scalar(0.0)
         for i in range(chunk * rows, wp.min((chunk + 1) * rows, s.p.shape[0])):
             qi = row_product(s, s.p, i, slot)
@@ -117,13 +110,9 @@ def batched_solve_kernels(precision: Precision) -> tuple[Any, KernelSet]:
             pq += wp.dot(vector_of(s.p, i, slot), qi)
         s.shares[0, chunk, slot] = pq
 
-    @kernels.add
-    def advance(slots: wp.array[int], count: wp.array[int], s: Systems):
+    @of_samples
+    def advance(chunk: int, slot: int, s: Systems):
         """Likewise: `x += alpha p`, `r -= alpha q`, `z = D^-1 r`; shares of `r . r` and `r . z`."""
-        chunk, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         a = s.alpha[slot]
         rr = scalar(0.0)
         rz = scalar(0.0)
@@ -138,13 +127,9 @@ def batched_solve_kernels(precision: Precision) -> tuple[Any, KernelSet]:
         s.shares[0, chunk, slot] = rr
         s.shares[1, chunk, slot] = rz
 
-    @kernels.add
-    def turn(slots: wp.array[int], count: wp.array[int], s: Systems):
+    @of_samples
+    def turn(chunk: int, slot: int, s: Systems):
         """Likewise: `p = z + beta p`."""
-        chunk, lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
         b = s.beta[slot]
         for i in range(chunk * rows, wp.min((chunk + 1) * rows, s.p.shape[0])):
             store_vector(s.p, i, slot, vector_of(s.z, i, slot) + b * vector_of(s.p, i, slot))
@@ -168,14 +153,10 @@ def batched_solve_kernels(precision: Precision) -> tuple[Any, KernelSet]:
             total += sums[quantity, group, slot]
         return total
 
-    @kernels.add
-    def finish_start(slots: wp.array[int], count: wp.array[int], s: Systems, tolerance: scalar):
+    @of_samples
+    def finish_start(i: int, slot: int, s: Systems):
         """Third stage, one thread for a sample: its scalars, and whether it goes on."""
-        lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
-        s.goal[slot] = tolerance * tolerance * total_of(s.sums, 0, slot)
+        s.goal[slot] = s.tolerance * s.tolerance * total_of(s.sums, 0, slot)
         s.rr[slot] = total_of(s.sums, 1, slot)
         s.rz[slot] = total_of(s.sums, 2, slot)
         s.iterations[slot] = 0
@@ -184,26 +165,18 @@ def batched_solve_kernels(precision: Precision) -> tuple[Any, KernelSet]:
         if s.rr[slot] > s.goal[slot]:
             s.solving[slot] = 1
 
-    @kernels.add
-    def finish_product(slots: wp.array[int], count: wp.array[int], s: Systems):
-        lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
+    @of_samples
+    def finish_product(i: int, slot: int, s: Systems):
         s.alpha[slot] = s.rz[slot] / total_of(s.sums, 0, slot)
 
-    @kernels.add
-    def finish_advance(slots: wp.array[int], count: wp.array[int], s: Systems, max_iterations: int):
-        lane = wp.tid()
-        if lane >= count[0]:
-            return
-        slot = slots[lane]
+    @of_samples
+    def finish_advance(i: int, slot: int, s: Systems):
         new = total_of(s.sums, 1, slot)
         s.beta[slot] = new / s.rz[slot]
         s.rz[slot] = new
         s.rr[slot] = total_of(s.sums, 0, slot)
         s.iterations[slot] = s.iterations[slot] + 1
-        if not (s.rr[slot] > s.goal[slot]) or s.iterations[slot] >= max_iterations:
+        if not (s.rr[slot] > s.goal[slot]) or s.iterations[slot] >= s.max_iterations:
             s.solving[slot] = 0
 
     @kernels.add
