@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +35,11 @@ class Precision:
     def epsilon(self) -> float:
         """Relative rounding error of one operation."""
         return float(np.finfo(self.numpy).eps)
+
+    @property
+    def native(self) -> str:
+        """Type of native code."""
+        return {"double": "double", "single": "float"}[self.name]
 
 
 DOUBLE = Precision("double", wp.float64, wp.vec3d, wp.mat33d, np.dtype(np.float64))
@@ -73,6 +79,13 @@ def compiled_module(name: str, unroll: int | None = None) -> Any:
     if unroll is not None:
         module.options["max_unroll"] = unroll
     return module
+
+
+def native_code(file: str, precision: Precision, **constants: float) -> str:
+    """Native code of a file of this floor, after the type `REAL` and constants that it takes for given."""
+    code = files("warpbrain.kernels").joinpath(file).read_text(encoding="utf-8")
+    given = "".join(f"constexpr auto {name} = {value};\n" for name, value in constants.items())
+    return f"using REAL = {precision.native};\n{given}{code}"
 
 
 def threads_of_block(device: wp.DeviceLike) -> int | None:

@@ -94,15 +94,12 @@ def _begin_pass(threads: int, sync: wp.uint64, go_on: bool):
     """Let the next pass begin, or end."""
 
 
-_NAMES = {4: "float", 8: "double"}
-
-
 def _rows(precision: Precision, stored: Precision) -> str:
     """Native code: `row(k, c)` is row `c` of block `k` of `values`, in lanes of a vector, one of which is not used."""
     return f"""
-        typedef {_NAMES[precision.numpy.itemsize]} number;
+        typedef {precision.native} number;
         typedef number lanes __attribute__((vector_size(4 * sizeof(number)), aligned(sizeof(number)), may_alias));
-        typedef {_NAMES[stored.numpy.itemsize]} stored;
+        typedef {stored.native} stored;
         typedef stored blocks __attribute__((vector_size(4 * sizeof(stored)), aligned(sizeof(stored)), may_alias));
         auto row = [&](int k, int c) {{
             const stored* A = &values.data[k].data[c][0];
@@ -149,7 +146,7 @@ def _coarse_functions(precision: Precision) -> tuple[Any, Any]:
 
     @wp.func_native(
         f"""
-        typedef {_NAMES[precision.numpy.itemsize]} number;
+        typedef {precision.native} number;
         typedef number lanes __attribute__((vector_size(4 * sizeof(number)), aligned(sizeof(number)), may_alias));
         const int columns = x.shape[0];
         const lanes *row = (const lanes*)(A.data + (size_t)i * columns), *v = (const lanes*)x.data;

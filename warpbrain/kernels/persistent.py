@@ -18,7 +18,6 @@ fence to multiply them meanwhile. A block that does not hear from another for tw
 
 import os
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from warp.sparse import BsrMatrix
 
 from warpbrain.arrays import Int32s
 from warpbrain.errors import SolveError
-from warpbrain.kernels.module import Precision, compiled_module
+from warpbrain.kernels.module import Precision, compiled_module, native_code
 
 #: Threads of a block that have rows, and how many of them may share one: the most with which all rows are under way at
 #: once. One more warp adds up the sums of all blocks.
@@ -46,20 +45,12 @@ _MOST_BLOCKS = 256
 _LEAST_ROWS = 32
 
 
-def native_code(precision: Precision, shared_bytes: int, lanes: int, messages: int) -> str:
-    """What the kernels consist of: `lanes` threads have a row, and a thread of the last warp has `messages`."""
-    real = {"double": "double", "single": "float"}[precision.name]
-    code = files("warpbrain.kernels").joinpath("persistent.cu").read_text(encoding="utf-8")
-    return (
-        f"using REAL = {real};\n"
-        f"constexpr int THREADS = {THREADS}, LANES = {lanes}, MESSAGES = {messages}, SHARED_BYTES = {shared_bytes};\n"
-        f"constexpr double ROUNDING = {precision.epsilon!r};\n"
-    ) + code
-
-
 @cache
 def persistent_kernel(precision: Precision, shared_bytes: int, lanes: int, messages: int) -> tuple[Any, Any]:
-    """Make (once) what the kernel of what `native_code` is for knows of a solve, and this kernel."""
+    """Make (once) what the kernel of a solve knows, and this kernel.
+
+    `lanes` threads have a row, and a thread of the last warp has `messages`.
+    """
     vec3, mat33 = precision.vec3, precision.mat33
     module = compiled_module(f"persistent_{precision.name}_{shared_bytes}_{lanes}_{messages}")
     module.options["block_dim"] = THREADS
@@ -82,7 +73,12 @@ def persistent_kernel(precision: Precision, shared_bytes: int, lanes: int, messa
         control: wp.array[int]
         outcome: wp.array[wp.float64]
 
-    @wp.func_native(native_code(precision, shared_bytes, lanes, messages))
+    code = native_code(
+        "persistent.cu", precision, THREADS=THREADS, LANES=lanes, MESSAGES=messages, SHARED_BYTES=shared_bytes,
+        ROUNDING=precision.epsilon,
+    )  # fmt: skip
+
+    @wp.func_native(code)
     def solve(given: Solve, tolerance: wp.float64): ...
 
     @wp.kernel(module=module, launch_bounds=(THREADS, 1), grid_stride=False)

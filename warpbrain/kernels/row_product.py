@@ -34,9 +34,8 @@ def row_product_kernel(precision: Precision) -> Any:
     """Make (once) the kernel of ``z = A x``, launched over `LANES` threads a row."""
     vec3, mat33 = precision.vec3, precision.mat33
     module = compiled_module(f"row_product_{precision.name}")
-    real = {"double": "double", "single": "float"}[precision.name]
 
-    @wp.func_native(f"using REAL = {real};\nconstexpr int LANES = {LANES};\n" + _CODE)
+    @wp.func_native(f"using REAL = {precision.native};\nconstexpr int LANES = {LANES};\n" + _CODE)
     def row_product(
         thread: int,
         offsets: wp.array[int],

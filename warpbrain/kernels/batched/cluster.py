@@ -13,14 +13,13 @@ depends on the pattern alone: so a system has the same bits alone and among othe
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from warpbrain.kernels.batched.parts import ENDS, Parts, Pattern, parts_of
-from warpbrain.kernels.module import Precision, compiled_module
+from warpbrain.kernels.module import Precision, compiled_module, native_code
 from warpbrain.kernels.persistent import blocks_stay, shared_memory
 
 #: Blocks of a cluster, of which the fewest that have room are taken; and threads of a block.
@@ -110,21 +109,9 @@ def fitting_parts(pattern: Pattern, real: int, device: wp.Device) -> Parts | Non
     return None
 
 
-def native_code(precision: Precision, sizes: Sizes) -> str:
-    """What the kernel consists of."""
-    real = {"double": "double", "single": "float"}[precision.name]
-    code = files("warpbrain.kernels.batched").joinpath("cluster.cu").read_text(encoding="utf-8")
-    return (
-        f"using REAL = {real};\n"
-        f"constexpr int THREADS = {THREADS}, CLUSTER = {sizes.cluster}, PLACES = {sizes.places}, "
-        f"IN_REGISTERS = {sizes.in_registers}, IN_SHARED = {sizes.in_shared}, ROWS = {sizes.rows}, "
-        f"OUTERS = {sizes.outers}, SEGMENTS = {sizes.segments};\n"
-    ) + code
-
-
 @cache
 def cluster_kernel(precision: Precision, sizes: Sizes) -> tuple[Any, Any]:
-    """Make (once) what the kernel of what `native_code` is for knows of systems, and this kernel."""
+    """Make (once) what the kernel knows of systems, and this kernel."""
     scalar, vec3 = precision.scalar, precision.vec3
     name = "_".join(str(size) for size in vars(sizes).values())
     module = compiled_module(f"cluster_{precision.name}_{name}")
@@ -145,7 +132,13 @@ def cluster_kernel(precision: Precision, sizes: Sizes) -> tuple[Any, Any]:
         max_iterations: int
         outcome: wp.array2d[wp.float64]
 
-    @wp.func_native(native_code(precision, sizes))
+    code = native_code(
+        "batched/cluster.cu", precision, THREADS=THREADS, CLUSTER=sizes.cluster, PLACES=sizes.places,
+        IN_REGISTERS=sizes.in_registers, IN_SHARED=sizes.in_shared, ROWS=sizes.rows, OUTERS=sizes.outers,
+        SEGMENTS=sizes.segments,
+    )  # fmt: skip
+
+    @wp.func_native(code)
     def solve(slots: wp.array[int], count: wp.array[int], given: Systems, tolerance: wp.float64): ...
 
     @wp.kernel(module=module, launch_bounds=(THREADS, 1), cluster_dim=sizes.cluster, grid_stride=False)

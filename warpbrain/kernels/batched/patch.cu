@@ -1,7 +1,6 @@
 // Native functions of the kernel that assembles a patch of a sample's mesh; patch_assembly.py says what they are for
 // and what their arguments are. REAL, THREADS, WIDTH, FIRST, BITS and SPOKES are put before each, and what all of them have:
 
-//// all
 constexpr int SECOND = 0x8000, AHEAD = 8;
 extern __shared__ char dynamic_smem_base[];
 // threads take some items at a time, so that what they wait for is on its way for all of these

@@ -11,7 +11,6 @@ logarithm of a determinant near 1 in them.
 
 from collections.abc import Sequence
 from functools import cache, partial
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.batched.cluster import on_device
 from warpbrain.kernels.batched.parts import Ints
 from warpbrain.kernels.batched.patches import FIRST, SPOKES, Patches, patches_of
-from warpbrain.kernels.module import DOUBLE, KernelSet, Precision, compiled_module
+from warpbrain.kernels.module import DOUBLE, KernelSet, Precision, compiled_module, native_code
 from warpbrain.kernels.tetrahedron import DeviceLaw
 
 #: Threads of a block, how many of these are at a round's elements, and blocks that share a multiprocessor: of these and
@@ -65,25 +64,19 @@ def fits(edges: int, nodes: int, real: int, room: int) -> bool:
     return 9 * real * (edges + 1) + 8 * max(3 * nodes, (2 * edges + 4 * nodes + 4) // 4) <= room
 
 
-def native_code(precision: Precision) -> dict[str, str]:
-    """What native functions consist of, by their names."""
-    real = {"double": "double", "single": "float"}[precision.name]
-    text = files("warpbrain.kernels.batched").joinpath("patch.cu").read_text(encoding="utf-8")
-    parts = dict(part.split("\n", 1) for part in text.split("//// ")[1:])
-    head = (
-        f"using REAL = {real};\nconstexpr int THREADS = {THREADS}, WIDTH = {WIDTH}, FIRST = {FIRST}, "
-        f"BITS = {BITS}, SPOKES = {SPOKES};\n"
-    )
-    return {name: head + parts["all"] + part for name, part in parts.items()}
-
-
 @cache
 def patch_kernel(law: DeviceLaw, precision: Precision, shared_bytes: int) -> tuple[Any, Any]:
     """Make (once) what the kernel of a law knows, and this kernel."""
     scalar = precision.scalar
     module = compiled_module(f"{law.key}_{precision.name}_patches_{shared_bytes}")
     module.options["block_dim"] = THREADS
-    tangents_of, native = law.kernels(DOUBLE).tangents, native_code(precision)
+    tangents_of = law.kernels(DOUBLE).tangents
+    code = native_code(
+        "batched/patch.cu", precision, THREADS=THREADS, WIDTH=WIDTH, FIRST=FIRST, BITS=BITS, SPOKES=SPOKES
+    )
+    # what all native functions begin with, then each with its name before it
+    head, *parts = code.split("//// ")
+    native = {name: head + part for name, part in (part.split("\n", 1) for part in parts)}
     numbers = wp.constant(block_bytes(shared_bytes) // 8)
 
     @wp.struct
