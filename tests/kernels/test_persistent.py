@@ -87,14 +87,12 @@ def test_a_guess_is_kept_if_it_will_do(cuda: str) -> None:
 
 def test_blocks_that_give_up_are_told(cuda: str) -> None:
     system = system_of(4, cuda)
-    solver = persistent.PersistentSolve(
-        system.matrix, system.diagonal, system.load, system.solution, DOUBLE,
-        max_iterations=1000, watch=False,
-    )  # fmt: skip
-    solver._solve.control.assign([0, 1])
-    solver.launch(1e-6)
+    cg = conjugate_gradient(system.matrix.device)(
+        system.matrix, system.diagonal, system.load, system.solution, DOUBLE, tolerance=1e-6, max_iterations=1000
+    )
+    cg._given.control.assign([0, 1])
+    cg.solve()
     with pytest.raises(SolveError, match="waited two seconds for each other"):
-        solver.outcome()
-    solver.launch(1e-6)
-    _, residual, goal, _ = solver.outcome()
-    assert residual <= goal
+        cg.result()
+    cg.solve()
+    assert cg.result().converged

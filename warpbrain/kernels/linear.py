@@ -24,11 +24,12 @@ from scipy.linalg import lapack
 from warp.sparse import BsrMatrix
 
 from warpbrain.arrays import Floats
+from warpbrain.errors import SolveError
+from warpbrain.kernels import persistent
 from warpbrain.kernels.assembly import assembly_kernels
 from warpbrain.kernels.module import KernelSet, Precision
 from warpbrain.kernels.multicore import Graph, give_way, launch, launch_together, team_kernels
-from warpbrain.kernels.multicore_gradients import CHUNK, gradients_kernels, sync_words
-from warpbrain.kernels.persistent import PersistentSolve, blocks_stay
+from warpbrain.kernels.multicore_gradients import CHUNK, coarse_space_struct, gradients_kernels, sync_words
 from warpbrain.kernels.row_product import LANES, row_product_kernel
 from warpbrain.threads import MOST, one_thread_of_blas
 
@@ -106,22 +107,13 @@ def loop_kernels(precision: Precision) -> KernelSet:
         return s
 
     @kernels.add
-    def subtract(start: int, b: wp.array[vec3], Ax: wp.array[vec3], r: wp.array[vec3]):
-        i = start + wp.tid()
-        r[i] = b[i] - Ax[i]
-
-    @kernels.add
     def begin(sums: wp.array2d[scalar], tolerance: wp.array[scalar], numbers: wp.array[scalar]):
-        """Before the first of all; of `b . b`."""
+        """Before the first of all; of `b . b`. Of `r = b`, `p = 0` and `A x` then `advance` makes the residual."""
         numbers[0] = scalar(-1.0)
         numbers[2] = tolerance[0] * tolerance[0] * total(sums, 0)
         numbers[3] = scalar(wp.inf)  # type: ignore[attr-defined]
         numbers[4] = scalar(wp.inf)  # type: ignore[attr-defined]
-
-    @kernels.add
-    def apply_blocks(start: int, inverse: wp.array[mat33], r: wp.array[vec3], z: wp.array[vec3]):
-        i = start + wp.tid()
-        z[i] = inverse[i] * r[i]
+        numbers[5] = scalar(1.0)
 
     @kernels.add
     def decide(
@@ -159,12 +151,16 @@ def loop_kernels(precision: Precision) -> KernelSet:
         numbers: wp.array[scalar],
         p: wp.array[vec3],
         Ap: wp.array[vec3],
+        inverse: wp.array[mat33],
         x: wp.array[vec3],
         r: wp.array[vec3],
+        z: wp.array[vec3],
     ):
         i = start + wp.tid()
         x[i] = x[i] + numbers[5] * p[i]
-        r[i] = r[i] - numbers[5] * Ap[i]
+        s = r[i] - numbers[5] * Ap[i]
+        r[i] = s
+        z[i] = inverse[i] * s
 
     return kernels
 
@@ -290,26 +286,51 @@ def conjugate_gradient(device: wp.Device, *, only_blocks: bool = True) -> type[C
     """
     if not only_blocks:
         return LoopGradient
-    return OneLaunchGradient if blocks_stay(device) else CoresGradient if device.is_cpu else LoopGradient
+    return OneLaunchGradient if persistent.blocks_stay(device) else CoresGradient if device.is_cpu else LoopGradient
 
 
 class OneLaunchGradient(ConjugateGradient):
     """On a GPU; see `warpbrain.kernels.persistent`."""
 
     def _begin(self) -> None:
-        self._persistent = PersistentSolve(
-            self._matrix, self._diagonal, self._b, self._x, self._precision,
-            max_iterations=self._max_iterations, watch=self._watch,
-        )  # fmt: skip
+        starts, lanes, messages = persistent.share_rows(self._matrix.offsets.numpy(), self._device.sm_count)
+        shared_bytes = persistent.shared_memory(self._device)
+        made, self._kernel = persistent.persistent_kernel(self._precision, shared_bytes, lanes, messages)
+        self._blocks, n = len(starts) - 1, self._size
+        self._given = s = made()
+        s.offsets, s.columns, s.values = self._matrix.offsets, self._matrix.columns, self._matrix.values
+        s.diagonal, s.b, s.x = self._diagonal, self._b, self._x
+        s.starts = wp.array(starts, dtype=int, device=self._device)
+        s.max_iterations, s.watch = self._max_iterations, int(self._watch)
+        # where blocks leave what others read: two places that take turns, and one for the solution, with four numbers a
+        # row; two places that take turns, with a message for each sum of a block
+        s.exchange = self._zeros(12 * n, wp.float64)
+        s.messages = self._zeros(4 * persistent.SUMS * self._blocks, wp.uint64)
+        # what has no room on the chip
+        s.scratch = self._zeros(persistent.NUMBERS * n, wp.float64)
+        # the number of the last meeting, and whether one failed
+        s.control = self._zeros(2, int)
+        s.outcome = self._zeros(4, wp.float64)
 
     def prepare(self) -> None:
         """Nothing: the launch inverts the diagonal blocks itself."""
 
     def _run(self, tolerance: float) -> None:
-        self._persistent.launch(tolerance)
+        inputs = [self._given, wp.float64(tolerance)]
+        threads = persistent.THREADS
+        wp.launch(self._kernel, dim=self._blocks * threads, inputs=inputs, device=self._device, block_dim=threads)
 
     def _ended(self) -> tuple[float, float, float, float]:
-        return self._persistent.outcome()
+        s = self._given
+        if s.control.numpy()[1]:
+            # the next solve may try again
+            for array in (s.control, s.messages, s.exchange):
+                array.zero_()
+            raise SolveError(
+                f"conjugate gradients on {self._device.name}: its blocks waited two seconds for each other, because "
+                "something else holds a part of it; with WARPBRAIN_PERSISTENT=0 in the environment they need not wait"
+            )
+        return tuple(s.outcome.numpy().tolist())
 
 
 #: Aggregates of the coarse space, and rows of a matrix from which on it pays: the inverse of its matrix takes as long
@@ -365,12 +386,6 @@ class CoresGradient(ConjugateGradient):
         self._partial = self._zeros((chunks, 4))
         self._sync = self._zeros(sync_words(MOST), wp.uint64)
         self._outcome = self._zeros(8)
-        self._aggregate = _chunks_of_aggregate(size)
-        self._no_copy = self._zeros(0, wp.mat33f)
-        self._no_space = [
-            *(self._zeros(0, vec3) for _ in range(2)), self._zeros((0, 0)),
-            *(self._zeros(0) for _ in range(2)), self._zeros((0, 0), vec3),
-        ]  # fmt: skip
         self._order: NDArray[np.intp] | None = None
         # values of the matrix changed since they were copied
         self._is_stale = True
@@ -398,31 +413,27 @@ class CoresGradient(ConjugateGradient):
         self._copied_inverse = wp.empty_like(self._inverse)
         self._left, self._correction, self._product_of = (self._zeros(size, vec3) for _ in range(3))
         chunks = self._partial.shape[0]
-        k = self._count = -(-chunks // self._aggregate)
-        self._free = wp.array(free.numpy()[order], dtype=vec3, device=self._device)
-        self._places = wp.array(self._affine(points[order]), dtype=vec3, device=self._device)
+        self._space = space = coarse_space_struct(self._precision)()
+        space.aggregate = _chunks_of_aggregate(size)
+        k = self._count = -(-chunks // space.aggregate)
+        space.free = wp.array(free.numpy()[order], dtype=vec3, device=self._device)
+        # from the middle of its aggregate, 1 at most
+        of = np.arange(size) // (CHUNK * space.aggregate)
+        middles = np.stack([np.bincount(of, along) for along in points[order].T], axis=1) / np.bincount(of)[:, None]
+        places = points[order] - middles[of]
+        space.places = wp.array(places / np.abs(places).max(), dtype=vec3, device=self._device)
         # of two aggregates, a mode and a component of the first, a mode and a component of the other, and an empty one
         self._coarse = self._zeros((k, 192 * k))
-        self._coarse_inverse = self._zeros((12 * k, 12 * k))
-        self._coarse_residual, self._coarse_solution = (self._zeros(12 * k) for _ in range(2))
-        self._restricted = self._zeros((chunks, 4), vec3)
+        space.inverse, space.restricted = self._zeros((12 * k, 12 * k)), self._zeros((chunks, 4), vec3)
+        space.residual, space.solution = self._zeros(12 * k), self._zeros(12 * k)
         return order
-
-    def _affine(self, points: Floats) -> Floats:
-        """Coordinates of each row from the middle of its aggregate, 1 at most."""
-        of = np.arange(len(points)) // (CHUNK * self._aggregate)
-        middles = np.stack([np.bincount(of, along) for along in points.T], axis=1) / np.bincount(of)[:, None]
-        places = points - middles[of]
-        result: Floats = places / np.abs(places).max()
-        return result
 
     def _renew(self) -> None:
         """Renew copy and coarse space after the values of the matrix changed; without one where it is not definite."""
-        launch(
-            self._on_cores.copy_blocks, len(self._copied), [self._copied, self._matrix.values, self._copy], self._device
-        )
+        inputs = [self._copied, self._matrix.values, self._copy]
+        launch(self._on_cores.copy_blocks, len(self._copied), inputs, self._device)
         self._invert(self._copied_diagonal, self._copied_inverse)
-        inputs = [self._offsets, self._columns, self._copy, self._aggregate, self._free, self._places, self._coarse]
+        inputs = [self._offsets, self._columns, self._copy, self._space, self._coarse]
         launch(self._on_cores.coarse_matrix, self._count, inputs, self._device, least=1)
         k = self._count
         blocks = self._coarse.numpy().astype(np.float64).reshape(k, k, 12, 4, 4)[..., :3]
@@ -433,7 +444,7 @@ class CoresGradient(ConjugateGradient):
         factor, failed = lapack.dpotrf(galerkin, lower=1)
         inverse = np.zeros_like(galerkin) if failed else lapack.dpotri(factor, lower=1)[0]
         np.copyto(inverse, inverse.T, where=np.tri(12 * k, k=-1, dtype=bool).T)
-        self._coarse_inverse.assign(inverse)
+        self._space.inverse.assign(inverse)
 
     def prepare(self) -> None:
         super().prepare()
@@ -447,16 +458,15 @@ class CoresGradient(ConjugateGradient):
                 self._refined = self._refine(tolerance, *self._nodes)
         if self._refined is None:
             A = self._matrix
-            rows = [A.offsets, A.columns, A.values, self._no_copy, self._inverse, self._b, self._x]
-            self._iterate(rows, tolerance, self._no_space)
+            rows = [A.offsets, A.columns, A.values, None, self._inverse, self._b, self._x]
+            self._iterate(rows, tolerance, coarse_space_struct(self._precision)())
 
-    def _iterate(self, rows: Sequence[wp.array], tolerance: float, space: Sequence[wp.array]) -> tuple[float, ...]:
+    def _iterate(self, rows: Sequence[wp.array | None], tolerance: float, space: Any) -> tuple[float, ...]:
         """Run the kernel; iterations, squares of residual and goal, and the least curvature."""
         self._sync.zero_()
         inputs = [
             self._sync.ptr, give_way(), *rows, *self._scratch, self._partial,
-            self._precision.scalar(tolerance), self._max_iterations, int(self._watch), self._outcome,
-            self._aggregate, *space,
+            self._precision.scalar(tolerance), self._max_iterations, int(self._watch), self._outcome, space,
         ]  # fmt: skip
         launch_together(self._on_cores.conjugate_gradients, self._size, inputs, self._device)
         return tuple(self._outcome.numpy()[:4].tolist())
@@ -472,10 +482,6 @@ class CoresGradient(ConjugateGradient):
         rows = [
             self._offsets, self._columns, self._matrix.values, self._copy, self._copied_inverse, self._left,
             self._correction,
-        ]  # fmt: skip
-        space = [
-            self._free, self._places, self._coarse_inverse, self._coarse_residual, self._coarse_solution,
-            self._restricted,
         ]  # fmt: skip
         # arrays of the CPU are seen by NumPy without a copy
         b, x, left, correction = (array.numpy() for array in (self._b, self._x, self._left, self._correction))
@@ -493,7 +499,7 @@ class CoresGradient(ConjugateGradient):
             left[:] = r[order]
             self._correction.zero_()
             wanted = max(_LEAST_OF_COPY, 0.9 * goal / length) if is_double else goal / length
-            taken, squared, goal_squared, curvature = self._iterate(rows, wanted, space)
+            taken, squared, goal_squared, curvature = self._iterate(rows, wanted, self._space)
             iterations, least = iterations + taken, min(least, curvature)
             if not (squared <= goal_squared and least > 0.0):
                 return None
@@ -545,29 +551,27 @@ class LoopGradient(ConjugateGradient):
         self._launch(self._kernels.add_shares, len(self._sums), self._shares, self._sums)
 
     def _record(self) -> None:
-        k, size = self._kernels, self._size
         self._sum(self._b, self._b, self._b, self._b)
-        self._launch(k.begin, 1, self._sums, self._wanted, self._numbers)
+        self._launch(self._kernels.begin, 1, self._sums, self._wanted, self._numbers)
         self._p.zero_()
+        wp.copy(self._r, self._b)
         self.multiply(self._x, self._Ap)
-        self._launch(k.subtract, size, self._b, self._Ap, self._r)
-        self._end_iteration()
+        self._advance()
         wp.capture_while(self._go_on, self._iterate)
 
-    def _end_iteration(self) -> None:
-        self._launch(self._kernels.apply_blocks, self._size, self._inverse, self._r, self._z)
+    def _iterate(self) -> None:
+        self._launch(self._kernels.turn, self._size, self._numbers, self._z, self._p)
+        self.multiply(self._p, self._Ap)
+        self._sum(self._p, self._Ap, self._p, self._p)
+        self._launch(self._kernels.measure, 1, self._sums, self._numbers)
+        self._advance()
+
+    def _advance(self) -> None:
+        vectors = [self._p, self._Ap, self._inverse, self._x, self._r, self._z]
+        self._launch(self._kernels.advance, self._size, self._numbers, *vectors)
         self._sum(self._r, self._z, self._r, self._r)
         watch = int(self._watch)
         self._launch(self._kernels.decide, 1, self._sums, self._max_iterations, watch, self._numbers, self._go_on)
-
-    def _iterate(self) -> None:
-        k, numbers, size = self._kernels, self._numbers, self._size
-        self._launch(k.turn, size, numbers, self._z, self._p)
-        self.multiply(self._p, self._Ap)
-        self._sum(self._p, self._Ap, self._p, self._p)
-        self._launch(k.measure, 1, self._sums, numbers)
-        self._launch(k.advance, size, numbers, self._p, self._Ap, self._x, self._r)
-        self._end_iteration()
 
     def _ended(self) -> tuple[float, float, float, float]:
         iterations, residual, goal, curvature = self._numbers.numpy()[:4].tolist()

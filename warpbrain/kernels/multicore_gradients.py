@@ -13,7 +13,7 @@ others have not come to. Whoever does the last share of a pass adds up and lets 
 """
 
 from functools import cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import warp as wp
 
@@ -202,6 +202,24 @@ def _coarse_functions(precision: Precision) -> tuple[Any, Any]:
 
 
 @cache
+def coarse_space_struct(precision: Precision) -> Any:
+    """Make (once) what the kernels of a precision know of a coarse space of `k` aggregates."""
+    scalar, vec3 = precision.scalar, precision.vec3
+
+    @wp.struct
+    class CoarseSpace:
+        aggregate: int  # chunks of rows
+        free: wp.array[vec3]  # 1 where a component is
+        places: wp.array[vec3]  # of nodes
+        inverse: wp.array2d[scalar]  # (12 k, 12 k)
+        residual: wp.array[scalar]  # (12 k,)
+        solution: wp.array[scalar]
+        restricted: wp.array2d[vec3]  # (chunks, 4), scratch
+
+    return CoarseSpace
+
+
+@cache
 def gradients_kernels(precision: Precision) -> KernelSet:
     """Make (once) the kernels of a precision: `conjugate_gradients`, `coarse_matrix` of the coarse space, `copy_blocks`
     at places in single precision, and `multiply`.
@@ -211,13 +229,12 @@ def gradients_kernels(precision: Precision) -> KernelSet:
     single precision if there is one; the `inverse` diagonal blocks; `b`; `x`, the first guess and the result; `r`, `p`
     and `Ap`, scratch like `x`; `partial` (chunks, 4), scratch; the relative `tolerance`; the most iterations; whether
     to end where the matrix is seen not to be positive definite; `outcome` (8,): iterations, squares of the norm of the
-    residual and of its goal, the least `p . A p / p . p`, and four numbers of the recurrences. Then of the coarse
-    space: how many chunks of rows are an `aggregate`; `free`, 1 where a component is; `places` of nodes; the
-    `coarse_inverse` (12 k, 12 k) of `k` aggregates, none if there is no such space; residual and solution in it
-    (12 k,); and `restricted` (chunks, 4), scratch.
+    residual and of its goal, the least `p . A p / p . p`, and four numbers of the recurrences; and the `CoarseSpace`,
+    without arrays if there is none.
     """
     scalar, vec3, mat33 = precision.scalar, precision.vec3, precision.mat33
     kernels = KernelSet(f"multicore_gradients_{precision.name}")
+    CoarseSpace: TypeAlias = coarse_space_struct(precision)
     chunk, shares = wp.constant(CHUNK), wp.constant(_SHARES)
     start, coarse, direction = wp.constant(_START), wp.constant(_COARSE), wp.constant(_DIRECTION)
     product = wp.constant(_PRODUCT)
@@ -232,21 +249,26 @@ def gradients_kernels(precision: Precision) -> KernelSet:
         return s
 
     @wp.func
-    def restrict(t: int, r: wp.array[vec3], free: wp.array[vec3], places: wp.array[vec3], restricted: wp.array2d[vec3]):
+    def vector_at(x: wp.array[scalar], i: int):
+        return vec3(x[i], x[i + 1], x[i + 2])
+
+    @wp.func
+    def restrict(t: int, r: wp.array[vec3], space: CoarseSpace):
         s = vec3()
         sx = vec3()
         sy = vec3()
         sz = vec3()
         for i in range(t * chunk, wp.min((t + 1) * chunk, r.shape[0])):
-            moved = wp.cw_mul(free[i], r[i])
+            moved = wp.cw_mul(space.free[i], r[i])
+            place = space.places[i]
             s += moved
-            sx += places[i][0] * moved
-            sy += places[i][1] * moved
-            sz += places[i][2] * moved
-        restricted[t, 0] = s
-        restricted[t, 1] = sx
-        restricted[t, 2] = sy
-        restricted[t, 3] = sz
+            sx += place[0] * moved
+            sy += place[1] * moved
+            sz += place[2] * moved
+        space.restricted[t, 0] = s
+        space.restricted[t, 1] = sx
+        space.restricted[t, 2] = sy
+        space.restricted[t, 3] = sz
 
     @kernels.add
     def conjugate_gradients(
@@ -269,16 +291,10 @@ def gradients_kernels(precision: Precision) -> KernelSet:
         max_iterations: int,
         watch_curvature: int,
         outcome: wp.array[scalar],
-        aggregate: int,
-        free: wp.array[vec3],
-        places: wp.array[vec3],
-        coarse_inverse: wp.array2d[scalar],
-        coarse_residual: wp.array[scalar],
-        coarse_solution: wp.array[scalar],
-        restricted: wp.array2d[vec3],
+        space: CoarseSpace,
     ):
         rows = b.shape[0]
-        modes = coarse_residual.shape[0]
+        modes = space.residual.shape[0]
         chunks = partial.shape[0]
         all_shares = threads * shares
         taken = _take(thread, threads, sync, give_way)
@@ -309,22 +325,23 @@ def gradients_kernels(precision: Precision) -> KernelSet:
                     partial[t, 2] = rr
                     partial[t, 3] = rz
                     if modes > 0:
-                        restrict(t, r, free, places, restricted)
+                        restrict(t, r, space)
             elif kind == coarse:
                 for m in range((modes * share) // all_shares, (modes * (share + 1)) // all_shares):
-                    coarse_solution[m] = full_row_product(coarse_inverse, coarse_residual, m)
+                    space.solution[m] = full_row_product(space.inverse, space.residual, m)
             elif kind == direction:
                 beta = outcome[6]
                 for t in range(first, last):
                     if modes > 0:
-                        m = 12 * (t // aggregate)
-                        shift = vec3(coarse_solution[m], coarse_solution[m + 1], coarse_solution[m + 2])
-                        by_x = vec3(coarse_solution[m + 3], coarse_solution[m + 4], coarse_solution[m + 5])
-                        by_y = vec3(coarse_solution[m + 6], coarse_solution[m + 7], coarse_solution[m + 8])
-                        by_z = vec3(coarse_solution[m + 9], coarse_solution[m + 10], coarse_solution[m + 11])
+                        m = 12 * (t // space.aggregate)
+                        shift = vector_at(space.solution, m)
+                        by_x = vector_at(space.solution, m + 3)
+                        by_y = vector_at(space.solution, m + 6)
+                        by_z = vector_at(space.solution, m + 9)
                         for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
-                            motion = shift + places[i][0] * by_x + places[i][1] * by_y + places[i][2] * by_z
-                            p[i] = Ap[i] + wp.cw_mul(free[i], motion) + beta * p[i]
+                            place = space.places[i]
+                            motion = shift + place[0] * by_x + place[1] * by_y + place[2] * by_z
+                            p[i] = Ap[i] + wp.cw_mul(space.free[i], motion) + beta * p[i]
                     else:
                         for i in range(t * chunk, wp.min((t + 1) * chunk, rows)):
                             p[i] = Ap[i] + beta * p[i]
@@ -360,7 +377,7 @@ def gradients_kernels(precision: Precision) -> KernelSet:
                     partial[t, 2] = rr
                     partial[t, 3] = rz
                     if modes > 0:
-                        restrict(t, r, free, places, restricted)
+                        restrict(t, r, space)
 
             if _is_last(threads, sync):
                 go_on = True
@@ -372,7 +389,7 @@ def gradients_kernels(precision: Precision) -> KernelSet:
                 elif kind == coarse:
                     rz = outcome[7]
                     for m in range(modes):
-                        rz += coarse_residual[m] * coarse_solution[m]
+                        rz += space.residual[m] * space.solution[m]
                     outcome[6] = scalar(0.0)
                     if outcome[0] > scalar(0.0):
                         outcome[6] = rz / outcome[4]
@@ -385,13 +402,13 @@ def gradients_kernels(precision: Precision) -> KernelSet:
                     outcome[1] = total(partial, 2)
                     outcome[7] = total(partial, 3)
                     for m in range(modes):
-                        coarse_residual[m] = scalar(0.0)
+                        space.residual[m] = scalar(0.0)
                     if modes > 0:
                         for t in range(chunks):
                             for d in range(4):
-                                m = 12 * (t // aggregate) + 3 * d
+                                m = 12 * (t // space.aggregate) + 3 * d
                                 for c in range(3):
-                                    coarse_residual[m + c] = coarse_residual[m + c] + restricted[t, d][c]
+                                    space.residual[m + c] = space.residual[m + c] + space.restricted[t, d][c]
                     # written so that a residual that is not a number ends the loop
                     go_on = outcome[1] > outcome[2] and outcome[0] < scalar(max_iterations)
                     # of a matrix that is not positive definite nothing is found, however long it goes on
@@ -406,17 +423,15 @@ def gradients_kernels(precision: Precision) -> KernelSet:
         offsets: wp.array[int],
         columns: wp.array[int],
         values: wp.array[wp.mat33f],
-        aggregate: int,
-        free: wp.array[vec3],
-        places: wp.array[vec3],
+        space: CoarseSpace,
         coarse: wp.array2d[scalar],
     ):
         g = start + wp.tid()
-        size = chunk * aggregate
+        size = chunk * space.aggregate
         for m in range(coarse.shape[1]):
             coarse[g, m] = scalar(0.0)
-        for i in range(g * size, wp.min((g + 1) * size, free.shape[0])):
-            add_to_coarse(offsets, columns, values, size, free, places, coarse, i)
+        for i in range(g * size, wp.min((g + 1) * size, space.free.shape[0])):
+            add_to_coarse(offsets, columns, values, size, space.free, space.places, coarse, i)
 
     @kernels.add
     def copy_blocks(start: int, places: wp.array[int], values: wp.array[mat33], copies: wp.array[wp.mat33f]):

@@ -13,7 +13,7 @@ to reach the tolerance in the end. Vectors and sums are double in either precisi
 block writes its sums, labelled with the number of the meeting, and one of its warps waits for those of all others and
 adds them in one order: the same bits every time. Numbers for neighbours are labelled, too: the other warps need no
 fence to multiply them meanwhile. A block that does not hear from another for two seconds gives up, then all do, and
-`PersistentSolve.outcome` raises: nothing hangs.
+`warpbrain.kernels.linear.OneLaunchGradient` raises: nothing hangs.
 """
 
 import os
@@ -22,10 +22,8 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from warp.sparse import BsrMatrix
 
 from warpbrain.arrays import Int32s
-from warpbrain.errors import SolveError
 from warpbrain.kernels.module import Precision, compiled_module, native_code
 
 #: Threads of a block that have rows, and how many of them may share one: the most with which all rows are under way at
@@ -36,9 +34,9 @@ THREADS = _WORKERS + 32
 #: What a kernel has of a multiprocessor's shared memory without asking for it [bytes].
 _RESERVED = 6 * 1024
 #: Numbers of a row beside the matrix: ten vectors of three components and half an inverse diagonal block.
-_NUMBERS = 36
+NUMBERS = 36
 #: Sums of a meeting; a message is one, and the number of the meeting.
-_SUMS = 4
+SUMS = 4
 #: Blocks that may meet.
 _MOST_BLOCKS = 256
 #: Rows that a block has at least, unless there are fewer: what more blocks say to each other takes longer than these.
@@ -103,73 +101,11 @@ def shared_memory(device: wp.Device) -> int:
     return int(device.max_shared_memory_per_block - _RESERVED) // 8 * 8
 
 
-def share_rows(offsets: Int32s, blocks: int) -> tuple[Int32s, int, int]:
+def share_rows(offsets: Int32s, multiprocessors: int) -> tuple[Int32s, int, int]:
     """First row of each block, by the entries (n + 1,) of rows; how many threads share a row; messages for a thread."""
+    blocks = max(1, min(multiprocessors, _MOST_BLOCKS, (len(offsets) - 1) // _LEAST_ROWS))
     starts = np.searchsorted(offsets, np.linspace(0, offsets[-1], blocks + 1)).astype(np.int32)
     starts[0], starts[-1] = 0, len(offsets) - 1
     rows = int(np.max(np.diff(starts)))
     lanes = next((lanes for lanes in _LANES if rows * lanes <= _WORKERS), _LANES[-1])
-    return starts, lanes, -(-blocks * _SUMS // 32)
-
-
-class PersistentSolve:
-    """Solves ``matrix x = b`` by one launch; its parameters are those of `warpbrain.kernels.linear.ConjugateGradient`.
-
-    `diagonal`, `b`, `x` (n,). `watch`: end where the smallest curvature is not positive.
-    """
-
-    def __init__(
-        self,
-        matrix: BsrMatrix,
-        diagonal: wp.array,
-        b: wp.array,
-        x: wp.array,
-        precision: Precision,
-        *,
-        max_iterations: int,
-        watch: bool,
-    ) -> None:
-        device, n = b.device, b.shape[0]
-        self._blocks = max(1, min(device.sm_count, _MOST_BLOCKS, n // _LEAST_ROWS))
-        starts, lanes, messages = share_rows(matrix.offsets.numpy(), self._blocks)
-        made, self._kernel = persistent_kernel(precision, shared_memory(device), lanes, messages)
-        self._solve = s = made()
-        s.offsets, s.columns, s.values, s.diagonal = matrix.offsets, matrix.columns, matrix.values, diagonal
-        s.starts, s.b, s.x = wp.array(starts, dtype=int, device=device), b, x
-        s.max_iterations, s.watch = max_iterations, int(watch)
-        # where blocks leave what others read: two places that take turns, and one for the solution, with four numbers a
-        # row; two places that take turns, with a message for each sum of a block
-        s.exchange = wp.zeros(12 * n, dtype=wp.float64, device=device)
-        s.messages = wp.zeros(4 * _SUMS * self._blocks, dtype=wp.uint64, device=device)
-        # what has no room on the chip
-        s.scratch = wp.zeros(_NUMBERS * n, dtype=wp.float64, device=device)
-        # the number of the last meeting, and whether one failed
-        s.control = wp.zeros(2, dtype=int, device=device)
-        s.outcome = wp.zeros(4, dtype=wp.float64, device=device)
-        self._device = device
-
-    def launch(self, tolerance: float) -> None:
-        """Solve from the present content of `x`, until ``|b - A x| <= tolerance |b|``."""
-        wp.launch(
-            self._kernel,
-            dim=self._blocks * THREADS,
-            inputs=[self._solve, wp.float64(tolerance)],
-            device=self._device,
-            block_dim=THREADS,
-        )
-
-    def outcome(self) -> tuple[int, float, float, float]:
-        """Iterations, residual, the norm that was to be reached and the smallest curvature of the last solve.
-
-        `SolveError` if a block did not hear from another; the next solve may then try again.
-        """
-        s = self._solve
-        if s.control.numpy()[1]:
-            for array in (s.control, s.messages, s.exchange):
-                array.zero_()
-            raise SolveError(
-                f"conjugate gradients on {self._device.name}: its blocks waited two seconds for each other, because "
-                "something else holds a part of it; with WARPBRAIN_PERSISTENT=0 in the environment they need not wait"
-            )
-        iterations, residual, goal, curvature = s.outcome.numpy()
-        return int(iterations), float(residual), float(goal), float(curvature)
+    return starts, lanes, -(-blocks * SUMS // 32)
