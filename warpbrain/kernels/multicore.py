@@ -21,7 +21,7 @@ import os
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache
 from itertools import pairwise
 from queue import SimpleQueue
@@ -177,17 +177,24 @@ class _Team:
             self._work.run()
 
     @contextmanager
-    def working(self) -> Iterator[None]:
-        """Let the other threads look for work while the body runs; nobody waits until they come or go."""
+    def working(self) -> Iterator[bool]:
+        """Let the other threads look for work while the body runs, unless they do already; nobody waits for them.
+
+        Whether they do for the body.
+        """
+        if not self.busy.acquire(blocking=False):
+            yield False
+            return
         self._words[_OPEN] = 1
         try:
             for calls in self._calls:
                 # who was called before and has not come yet comes now
                 if calls.empty():
                     calls.put(None)
-            yield
+            yield True
         finally:
             self._words[_OPEN] = 0
+            self.busy.release()
 
 
 @cache
@@ -258,14 +265,12 @@ def _run(
     if graph is not None:
         graph.keep(team, calls, table)
         wp.launch(share, dim=1, inputs=task, device=device)
-    elif team.busy.acquire(blocking=False):
-        try:
-            with team.working():
-                wp.launch(share, dim=1, inputs=task, device=device)
-        finally:
-            team.busy.release()
-    else:
-        calls.run()
+        return
+    with team.working() as together:
+        if together:
+            wp.launch(share, dim=1, inputs=task, device=device)
+        else:
+            calls.run()
 
 
 class Graph:
@@ -302,12 +307,5 @@ class Graph:
 
     def launch(self) -> None:
         """Run what was captured."""
-        team = self._team
-        if team is None or team is not _team() or not team.busy.acquire(blocking=False):
+        with self._team.working() if self._team is not None and self._team is _team() else nullcontext():
             wp.capture_launch(self._graph)
-            return
-        try:
-            with team.working():
-                wp.capture_launch(self._graph)
-        finally:
-            team.busy.release()

@@ -18,15 +18,13 @@ import warp as wp
 
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import KernelSet, Precision
-from warpbrain.kernels.ten_nodes import FAR, NEAR, POINTS, UNROLL, add_forces, gradient_at, shape_gradient
+from warpbrain.kernels.ten_nodes import POINTS, UNROLL, add_forces, coordinate, gradient_at, shape_gradient
 
 
 @wp.func
 def _weight(corner: int, point: int, w: Any):
     """`w L_a` of a corner at a quadrature point."""
-    if corner == point:
-        return type(w)(NEAR) * w
-    return type(w)(FAR) * w
+    return coordinate(corner, point, w) * w
 
 
 @wp.func

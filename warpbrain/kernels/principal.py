@@ -33,26 +33,21 @@ SWEEPS = wp.constant(6)
 
 
 @wp.func
-def _rotation(alpha: Any, beta: Any, gamma: Any):
-    """Cosine and sine of the rotation that makes two columns orthogonal (squared norms alpha, beta; product gamma)."""
-    one = type(gamma)(1.0)
-    zeta = (beta - alpha) / (type(gamma)(2.0) * gamma)
-    t = one / (wp.abs(zeta) + wp.sqrt(one + zeta * zeta))
-    if zeta < type(gamma)(0.0):
-        t = -t
-    c = one / wp.sqrt(one + t * t)
-    return c, c * t
-
-
-@wp.func
 def _orthogonalise(w0: Any, w1: Any, r0: Any, r1: Any, small: Any):
     """Rotate the rows `w0`, `w1` (and `r0`, `r1` with them) until `w0 . w1 = 0`; the last value says whether it did."""
+    one = type(small)(1.0)
     a = wp.dot(w0, w0)
     b = wp.dot(w1, w1)
     g = wp.dot(w0, w1)
     if g * g <= small * a * b:
         return w0, w1, r0, r1, 0
-    c, s = _rotation(a, b, g)
+    # tangent, cosine and sine of the angle
+    zeta = (b - a) / (type(small)(2.0) * g)
+    t = one / (wp.abs(zeta) + wp.sqrt(one + zeta * zeta))
+    if zeta < type(small)(0.0):
+        t = -t
+    c = one / wp.sqrt(one + t * t)
+    s = c * t
     return c * w0 - s * w1, s * w0 + c * w1, c * r0 - s * r1, s * r0 + c * r1, 1
 
 
@@ -87,13 +82,6 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
     small = wp.constant(scalar(precision.epsilon**2))
 
     @wp.func
-    def shear_moduli(l: vec3, T: vec3, m: vec3):
-        """`A_ijij` (first) and `A_ijji` (second) of the pairs (0, 1), (0, 2), (1, 2)."""
-        half = scalar(0.5)
-        p = vec3((T[0] + T[1]) / (l[0] + l[1]), (T[0] + T[2]) / (l[0] + l[2]), (T[1] + T[2]) / (l[1] + l[2]))
-        return half * (m + p), half * (m - p)
-
-    @wp.func
     def block(p: vec3, q: vec3, H: mat33, same: vec3, swap: vec3, U: mat33):
         """`a . dP/dF . b` for `p = V^T a`, `q = V^T b`."""
         M = mat33(
@@ -125,11 +113,13 @@ def principal_kernels(key: str, energy_density: Any, derivatives: Any, precision
         """`V P` and the tangent blocks of nodes 1 to 3, whose shape-function gradients are the rows of `G`."""
         U, l, V = singular_value_decomposition(F, small)
         T, H, m = derivatives(l, parameters, e)
-        same, swap = shear_moduli(l, T, m)
+        p = vec3((T[0] + T[1]) / (l[0] + l[1]), (T[0] + T[2]) / (l[0] + l[2]), (T[1] + T[2]) / (l[1] + l[2]))
         VP = volume * (U * wp.diag(T) * wp.transpose(V))
         H = volume * H
-        same = volume * same
-        swap = volume * swap
+        # `A_ijij` and `A_ijji` of the pairs (0, 1), (0, 2), (1, 2)
+        half = scalar(0.5)
+        same = volume * (half * (m + p))
+        swap = volume * (half * (m - p))
         # the rows of G V are V^T g_a
         GV = G * V
         p1, p2, p3 = GV[0], GV[1], GV[2]

@@ -28,7 +28,7 @@ UNROLL = 3
 
 
 @wp.func
-def _coordinate(c: int, point: int, like: Any):
+def coordinate(c: int, point: int, like: Any):
     """`L_c` at a quadrature point."""
     if c == point:
         return type(like)(NEAR)
@@ -46,7 +46,7 @@ def _slope(c: int, G: Any):
 @wp.func
 def _edge_gradient(c: int, d: int, point: int, G: Any):
     one = G.dtype(1.0)
-    return G.dtype(4.0) * (_coordinate(c, point, one) * _slope(d, G) + _coordinate(d, point, one) * _slope(c, G))
+    return G.dtype(4.0) * (coordinate(c, point, one) * _slope(d, G) + coordinate(d, point, one) * _slope(c, G))
 
 
 @wp.func
@@ -54,7 +54,7 @@ def shape_gradient(a: int, point: int, G: Any):
     """Gradient of the shape function of node a at a quadrature point."""
     one = G.dtype(1.0)
     if a < 4:
-        return (G.dtype(4.0) * _coordinate(a, point, one) - one) * _slope(a, G)
+        return (G.dtype(4.0) * coordinate(a, point, one) - one) * _slope(a, G)
     # edges 01, 02, 03, 12, 13, 23
     if a < 7:
         return _edge_gradient(0, a - 3, point, G)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpbrain.kernels.batched.cluster import ClusterSolve
+from warpbrain.kernels.batched.cluster import THREADS, Tables, cluster_kernel, on_device, sizes_of
 from warpbrain.kernels.batched.layout import stages
 from warpbrain.kernels.batched.parts import Parts, Pattern
 from warpbrain.kernels.batched.solve_kernels import batched_solve_kernels
@@ -63,14 +63,18 @@ class BatchedConjugateGradient:
         diagonal = wp.array(pattern.diagonal, dtype=int, device=device)
         self.right_hand_side = zeros(n, 3, slots)
         self.solving = zeros(slots, dtype=int)
-        self._cluster: ClusterSolve | None = None
+        self._cluster: Any = None
         self.side_by_side = parts is not None
         if parts is not None:
             self.values = zeros(slots, pattern.stored, 9).transpose((1, 2, 0))
-            self._cluster = ClusterSolve(
-                parts, diagonal, self.values, self.right_hand_side, v, free, x, precision, tolerance=tolerance,
-                max_iterations=max_iterations,
-            )  # fmt: skip
+            made, self._cluster = cluster_kernel(precision, sizes_of(parts, precision.numpy.itemsize))
+            self._systems = s = made()
+            s.ahead, s.parts = device.sm_count // parts.blocks, on_device(Tables, vars(parts), device)
+            s.diagonal, s.pair_count, s.values = diagonal, pattern.stored, self.values
+            s.b, s.v, s.free, s.x, s.max_iterations = self.right_hand_side, v, free, x, max_iterations
+            s.outcome = zeros(slots, 3, dtype=wp.float64)
+            self._host_outcome = wp.zeros((slots, 3), dtype=wp.float64, device="cpu", pinned=True)
+            self._threads, self._tolerance = slots * parts.blocks * THREADS, wp.float64(tolerance)
             return
         self.values = zeros(pattern.stored, 9, slots)
         made, self._kernels = batched_solve_kernels(precision)
@@ -107,7 +111,9 @@ class BatchedConjugateGradient:
         To be called while a graph is being captured, in which it becomes a loop on the device.
         """
         if self._cluster is not None:
-            self._cluster.solve(slots, count)
+            inputs = [slots, count, self._systems, self._tolerance]
+            wp.launch(self._cluster, dim=self._threads, inputs=inputs, device=self._device, block_dim=THREADS)
+            wp.copy(self._host_outcome, self._systems.outcome)
             return
 
         def look() -> None:
@@ -137,7 +143,8 @@ class BatchedConjugateGradient:
     def results(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Iterations, residual norms and goals of all slots, once the device has ended."""
         if self._cluster is not None:
-            return self._cluster.results()
+            iterations, residual, goal = self._host_outcome.numpy().T
+            return iterations.astype(np.int32), residual.copy(), goal.copy()
         s = self._systems
         with np.errstate(invalid="ignore"):
             residual, goal = (np.sqrt(squares.numpy().astype(np.float64)) for squares in (s.rr, s.goal))
