@@ -20,23 +20,9 @@ from warpbrain.kernels.module import Precision, compiled_module
 _ON_SIDE = 1e-6
 
 
-@wp.func
-def _feature(u: float, v: float, w: float):
-    """What of a triangle a point is on: 0 the inside, 1 to 3 edges ab, bc, ca, 4 to 6 corners."""
-    feature = 0
-    if w < _ON_SIDE:
-        feature = 1
-    if u < _ON_SIDE:
-        feature = 2
-    if v < _ON_SIDE:
-        feature = 3
-    if v < _ON_SIDE and w < _ON_SIDE:
-        feature = 4
-    if w < _ON_SIDE and u < _ON_SIDE:
-        feature = 5
-    if u < _ON_SIDE and v < _ON_SIDE:
-        feature = 6
-    return feature
+#: What of a triangle a point is on: 0 the inside, 1 to 3 edges ab, bc, ca, 4 to 6 corners; by which of its barycentric
+#: coordinates u, v and w are none, as bits.
+_FEATURES = wp.constant(wp.types.vector(8, int)(0, 2, 3, 6, 1, 5, 4, 6))
 
 
 @cache
@@ -139,7 +125,8 @@ def distance_kernels(precision: Precision) -> tuple[Any, Any]:
         u = scalar(query.u)
         v = scalar(query.v)
         p = u * points[c[0]] + v * points[c[1]] + (scalar(1.0) - u - v) * points[c[2]]
-        feature = _feature(query.u, query.v, 1.0 - query.u - query.v)
+        sides = int(query.u < _ON_SIDE) | int(query.v < _ON_SIDE) << 1 | int(1.0 - query.u - query.v < _ON_SIDE) << 2
+        feature = _FEATURES[sides]
         away = x - p
         along = wp.dot(away, normals[query.face, feature])
         # beyond a rim the wall goes on as the plane of its last triangle

@@ -47,7 +47,7 @@ def pressure_kernels(precision: Precision, nodes: int, rule: tuple[tuple[float, 
     Triangles: TypeAlias = triangles_struct(precision)
     points, last = len(rule), 2 * nodes - 1
     table = wp.types.matrix((points, nodes), scalar)
-    values, along_r, along_s = _linear(rule) if nodes == 3 else _quadratic(rule)
+    values, along_r, along_s = _shapes(rule, nodes)
     N = wp.constant(table(*values.ravel()))
     Nr = wp.constant(table(*along_r.ravel()))
     Ns = wp.constant(table(*along_s.ravel()))
@@ -100,22 +100,16 @@ def pressure_kernels(precision: Precision, nodes: int, rule: tuple[tuple[float, 
     return forces, tangents, energies
 
 
-#: Shape functions and their derivatives by `r = L_1` and `s = L_2` at each point.
-Tables = tuple[Floats, Floats, Floats]
+def _shapes(rule: tuple[tuple[float, ...], ...], nodes: int) -> tuple[Floats, Floats, Floats]:
+    """Shape functions at each point and their derivatives by `r = L_1` and `s = L_2`.
 
-
-def _linear(rule: tuple[tuple[float, ...], ...]) -> Tables:
-    """Of the corners 0, 1 and 2."""
-    count = (len(rule), 1)
-    return np.array(rule)[:, :3], np.tile([-1.0, 1.0, 0.0], count), np.tile([-1.0, 0.0, 1.0], count)
-
-
-def _quadratic(rule: tuple[tuple[float, ...], ...]) -> Tables:
-    """Of the corners 0, 1, 2 and the middles of 01, 02 and 12."""
-    L0, L1, L2 = np.array(rule)[:, :3].T
-    zero = np.zeros(len(rule))
-    corners = [L * (2.0 * L - 1.0) for L in (L0, L1, L2)]
-    values = [*corners, 4.0 * L0 * L1, 4.0 * L0 * L2, 4.0 * L1 * L2]
+    Of the corners 0, 1, 2, and of six nodes the middles of 01, 02 and 12.
+    """
+    L0, L1, L2 = L = np.array(rule)[:, :3].T
+    zero, one = np.zeros(len(rule)), np.ones(len(rule))
+    if nodes == 3:
+        return L.T, np.stack([-one, one, zero], 1), np.stack([-one, zero, one], 1)
+    values = [*(L * (2.0 * L - 1.0)), 4.0 * L0 * L1, 4.0 * L0 * L2, 4.0 * L1 * L2]
     along_r = [1.0 - 4.0 * L0, 4.0 * L1 - 1.0, zero, 4.0 * (L0 - L1), -4.0 * L2, 4.0 * L2]
     along_s = [1.0 - 4.0 * L0, zero, 4.0 * L2 - 1.0, -4.0 * L1, 4.0 * (L0 - L2), 4.0 * L1]
     return np.stack(values, 1), np.stack(along_r, 1), np.stack(along_s, 1)

@@ -60,24 +60,15 @@ def _integers(values: ArrayLike, what: str) -> Int32s:
     return whole
 
 
-def _sets(given: Mapping[str, ArrayLike], length: int, what: str) -> Mapping[str, Bools]:
-    checked = {}
+def _by_name(given: Mapping[str, ArrayLike], what: str, shape: tuple[int, ...]) -> Mapping[str, Any]:
+    """Sets, which are booleans, or vectors, each of a shape."""
+    checked, is_set = {}, len(shape) == 1
     for name, values in given.items():
-        array = np.asarray(values)
-        if array.dtype != bool:
-            raise MeshError(f"{what} set '{name}' must be a boolean array, found {array.dtype}")
-        if array.shape != (length,):
-            raise MeshError(f"{what} set '{name}' has shape {array.shape}, expected ({length},)")
-        checked[name] = _frozen(array)
-    return MappingProxyType(checked)
-
-
-def _vectors(given: Mapping[str, ArrayLike], length: int) -> Mapping[str, Floats]:
-    checked = {}
-    for name, values in given.items():
-        array = np.asarray(values, dtype=np.float64)
-        if array.shape != (length, 3):
-            raise MeshError(f"element vectors '{name}' have shape {array.shape}, expected ({length}, 3)")
+        array = np.asarray(values, dtype=None if is_set else np.float64)
+        if is_set and array.dtype != bool:
+            raise MeshError(f"{what} '{name}' must be a boolean array, found {array.dtype}")
+        if array.shape != shape:
+            raise MeshError(f"{what} '{name}' {'has' if is_set else 'have'} shape {array.shape}, expected {shape}")
         checked[name] = _frozen(array)
     return MappingProxyType(checked)
 
@@ -145,12 +136,16 @@ class TetMesh:
             raise MeshError(f"tissue has shape {tissue.shape}, expected one label a tetrahedron: ({count},)")
         if defects := _defects(points, tetrahedra):
             raise MeshError(*defects)
-        for name, value in (("points", points), ("tetrahedra", tetrahedra), ("tissue", tissue)):
-            object.__setattr__(self, name, _frozen(value))
-        object.__setattr__(self, "node_sets", _sets(self.node_sets, len(points), "node"))
-        object.__setattr__(self, "element_sets", _sets(self.element_sets, count, "element"))
-        object.__setattr__(self, "element_vectors", _vectors(self.element_vectors, count))
-        object.__setattr__(self, "cut", _frozen(_integers(self.cut, "triangles of a cut")))
+        for name, value in {
+            "points": _frozen(points),
+            "tetrahedra": _frozen(tetrahedra),
+            "tissue": _frozen(tissue),
+            "node_sets": _by_name(self.node_sets, "node set", (len(points),)),
+            "element_sets": _by_name(self.element_sets, "element set", (count,)),
+            "element_vectors": _by_name(self.element_vectors, "element vectors", (count, 3)),
+            "cut": _frozen(_integers(self.cut, "triangles of a cut")),
+        }.items():
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         labels = ", ".join(map(str, self.labels))
@@ -210,7 +205,7 @@ class TetMesh:
         MeshError
             If a set is not a boolean array of one value a node.
         """
-        checked = _sets(sets, len(self.points), "node")
+        checked = _by_name(sets, "node set", (len(self.points),))
         other: TetMesh = object.__new__(TetMesh)
         other.__dict__.update({"shared": self.shared, **vars(self)}, node_sets=checked)
         return other

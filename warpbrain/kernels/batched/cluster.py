@@ -132,11 +132,8 @@ def cluster_kernel(precision: Precision, sizes: Sizes) -> tuple[Any, Any]:
         max_iterations: int
         outcome: wp.array2d[wp.float64]
 
-    code = native_code(
-        "batched/cluster.cu", precision, THREADS=THREADS, CLUSTER=sizes.cluster, PLACES=sizes.places,
-        IN_REGISTERS=sizes.in_registers, IN_SHARED=sizes.in_shared, ROWS=sizes.rows, OUTERS=sizes.outers,
-        SEGMENTS=sizes.segments,
-    )  # fmt: skip
+    constants = {name.upper(): size for name, size in vars(sizes).items()}
+    code = native_code("batched/cluster.cu", precision, THREADS=THREADS, IN_SHARED=sizes.in_shared, **constants)
 
     @wp.func_native(code)
     def solve(slots: wp.array[int], count: wp.array[int], given: Systems, tolerance: wp.float64): ...
