@@ -103,60 +103,40 @@ def patches_of(
     rounds of `width` elements, of which so many are `together`. `free` (n, 3) are the components that are.
     """
     keys = pairs[:, 0].astype(np.int64) * len(points) + pairs[:, 1]
-
-    def pairs_of(i: NDArray[np.int64], j: NDArray[np.int64]) -> Ints:
-        return integers(np.searchsorted(keys, i * len(points) + j))
-
-    ends = np.array(EDGES)
-    of_edges = pairs_of(tetrahedra[:, ends[:, 0]].astype(np.int64), tetrahedra[:, ends[:, 1]].astype(np.int64))
-    every = np.arange(len(points), dtype=np.int64)
-    of_nodes = pairs_of(every, every)
-    parted = [
-        _parted(points[tetrahedra[group]].mean(axis=1), tetrahedra[group], of_edges[group], fits) for group in groups
-    ]
+    first, second = tetrahedra[:, np.array(EDGES)].astype(np.int64).transpose(2, 0, 1)
+    of_edges = integers(np.searchsorted(keys, first * len(points) + second))
+    is_diagonal = pairs[:, 0] == pairs[:, 1]
+    of_nodes = np.flatnonzero(is_diagonal)
+    parted = [_parted(points, tetrahedra, of_edges, group, fits) for group in groups]
     # of each patch, one group after the other: its edges and nodes, as pairs
-    listed = [
-        np.concatenate([np.unique(of_edges[group[piece]]), of_nodes[np.unique(tetrahedra[group[piece]])]])
-        for group, pieces in zip(groups, parted, strict=True)
+    of_patches = [
+        np.concatenate([np.unique(of_edges[piece]), of_nodes[np.unique(tetrahedra[piece])]])
+        for pieces in parted
         for piece in pieces
     ]
-    rows, firsts, sums = _rows_of(np.concatenate(listed), len(pairs))
+    listed = np.concatenate(of_patches)
+    rows, firsts, sums = _rows_of(listed, len(pairs))
     bits = free[pairs[:, 0]][:, :, None] & free[pairs[:, 1]][:, None, :]
-    kept = bits.reshape(-1, 9) @ (1 << np.arange(9))
-    starts = np.cumsum([0, *map(len, listed)])
-    made, number = [], 0
-    for group, pieces in zip(groups, parted, strict=True):
-        mine = slice(number, number + len(pieces))
-        number += len(pieces)
-        span = slice(starts[mine.start], starts[mine.stop])
-        both = pairs[np.concatenate(listed[mine])]
-        of_group = kept[np.concatenate(listed[mine])] + FIRST * (firsts[span] & (both[:, 0] == both[:, 1]))
-        pieces = [group[piece] for piece in pieces]
-        made.append(
-            _tables(
-                pieces,
-                tetrahedra,
-                of_edges,
-                pairs,
-                width,
-                together,
-                starts[mine.start : mine.stop + 1],
-                rows[span],
-                of_group,
-            )
-        )
+    kept = (bits.reshape(-1, 9) @ (1 << np.arange(9)))[listed] + FIRST * (firsts & is_diagonal[listed])
+    starts = np.cumsum([0, *map(len, of_patches)])
+    made = []
+    for pieces in parted:
+        mine, starts = starts[: len(pieces) + 1], starts[len(pieces) :]
+        span = slice(mine[0], mine[-1])
+        made.append(_tables(pieces, tetrahedra, of_edges, pairs, width, together, mine, rows[span], kept[span]))
     return made, sums
 
 
-def _parted(centres: Floats, tetrahedra: Ints, edges: Ints, fits: Callable[[int, int], bool]) -> list[NDArray[np.intp]]:
+def _parted(
+    points: Floats, tetrahedra: Ints, edges: Ints, group: NDArray[np.intp], fits: Callable[[int, int], bool]
+) -> list[NDArray[np.intp]]:
     """The elements of each patch: the fewest, of a power of two, that all have room; `InputError` if not one has."""
     if not fits(len(EDGES), 4):
         raise InputError("device: a block of its threads has no room for one element: expected another GPU, or the CPU")
-    parts = 1
+    parts, centres = 1, points[tetrahedra[group]].mean(axis=1)
     while True:
-        part = bisected(centres, np.ones(len(centres), dtype=np.int32), parts)
-        pieces = [np.flatnonzero(part == number) for number in range(parts)]
-        pieces = [piece for piece in pieces if len(piece)]
+        part = bisected(centres, np.ones(len(group), dtype=np.int32), parts)
+        pieces = [group[part == number] for number in range(parts) if np.any(part == number)]
         if all(fits(len(np.unique(edges[piece])), len(np.unique(tetrahedra[piece]))) for piece in pieces):
             return pieces
         parts *= 2
