@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.errors import InputError
-from warpbrain.mesh.surface import closed_surfaces, face_vectors, in_rows, interface_faces, node_vectors, nodes_of
+from warpbrain.mesh.surface import closed_surfaces, face_vectors, in_rows, interface_faces, node_vectors, nodes_of, unit
 from warpbrain.mesh.tet_mesh import TetMesh
 
 #: The outside of a body, the wall of a void within it, and what was inside until tetrahedra were taken out.
@@ -132,6 +132,4 @@ def wall_nodes(mesh: TetMesh, elements: str) -> Bools:
 
 def vertex_normals(mesh: TetMesh) -> Floats:
     """Outward unit normals (n, 3) at the nodes of the boundary, means over their faces; zero at all other nodes."""
-    normals = node_vectors(mesh.points, mesh.boundary)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0))
+    return unit(node_vectors(mesh.points, mesh.boundary))

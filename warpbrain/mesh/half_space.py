@@ -23,10 +23,10 @@ from warpbrain.mesh.tet_mesh import TetMesh
 #: Barycentric points of a rule of degree 2 on a tetrahedron, of equal weights (Keast 1986); exact for quadratic shapes.
 _ALPHA = (5.0 - np.sqrt(5.0)) / 20.0
 _RULE = np.full((4, 4), _ALPHA) + (1.0 - 4.0 * _ALPHA) * np.eye(4)
-#: Corners of three tetrahedra that fill a wedge with the triangles 0 1 2 and 3 4 5, and of two triangles that fill the
-#: quadrilateral 0 1 2 3.
+#: Corners of three tetrahedra that fill a wedge with the triangles 0 1 2 and 3 4 5, and of two triangles that fill its
+#: side 1 2 5 4.
 _WEDGE = ((0, 1, 2, 3), (1, 2, 3, 4), (2, 3, 4, 5))
-_QUADRILATERAL = ((0, 1, 2), (0, 2, 3))
+_QUADRILATERAL = ((1, 2, 5), (1, 5, 4))
 
 
 def integrals_of_shapes(mesh: TetMesh | QuadraticMesh) -> Floats:
@@ -103,35 +103,28 @@ class _Cut:
         self.count = (self._heights > 0.0).sum(axis=1)
         # the highest first: those above the plane come before those below it
         self._order = np.argsort(-self._heights, axis=1, kind="stable")
+        alone_above, alone_below, self._half = (np.flatnonzero(self.count == count) for count in (1, 3, 2))
+        self._tips = [
+            (alone_above, self._around(alone_above, 0, (1, 2, 3)), 1.0),
+            (alone_below, self._around(alone_below, 3, (0, 1, 2)), -1.0),
+        ]
+        self._wedge = np.concatenate([self._around(self._half, tip, (2, 3)) for tip in (0, 1)], axis=1)
+
+    def _around(self, elements: Ints, tip: int, others: tuple[int, ...]) -> Floats:
+        """The corner of a rank in height, and where the plane cuts the edges from it to others: (k, 1 + others, 4)."""
+        order = self._order[elements]
+        corners, heights = np.eye(4)[order], np.take_along_axis(self._heights[elements], order, axis=1)
+        points = [corners[:, tip]]
+        for other in others:
+            share = (heights[:, tip] / (heights[:, tip] - heights[:, other]))[:, None]
+            points.append((1.0 - share) * corners[:, tip] + share * corners[:, other])
+        return np.stack(points, axis=1)
 
     def solids(self) -> list[tuple[Ints, Floats, float]]:
         """Ids (k,) of tetrahedra, corners (k, 4, 4) of a part of each in barycentric coordinates, and its sign."""
-        alone_above, alone_below, half = (np.flatnonzero(self.count == count) for count in (1, 3, 2))
-        at_corner = [
-            (ids, np.stack([self._corner(ids, tip), *(self._between(ids, tip, other) for other in others)], 1), sign)
-            for ids, tip, others, sign in ((alone_above, 0, (1, 2, 3), 1.0), (alone_below, 3, (0, 1, 2), -1.0))
-        ]
-        sides = [[self._corner(half, tip), *(self._between(half, tip, other) for other in (2, 3))] for tip in (0, 1)]
-        wedge = np.stack(sides[0] + sides[1], axis=1)
-        return at_corner + [(half, wedge[:, part], 1.0) for part in _WEDGE]
+        return self._tips + [(self._half, self._wedge[:, part], 1.0) for part in _WEDGE]
 
     def sections(self) -> list[tuple[Ints, Floats]]:
         """Ids (k,) of tetrahedra, and corners (k, 3, 4) of triangles of the plane in them."""
-        alone_above, alone_below, half = (np.flatnonzero(self.count == count) for count in (1, 3, 2))
-        triangles = [
-            (ids, np.stack([self._between(ids, tip, other) for other in others], axis=1))
-            for ids, tip, others in ((alone_above, 0, (1, 2, 3)), (alone_below, 3, (0, 1, 2)))
-        ]
-        around = np.stack([self._between(half, a, b) for a, b in ((0, 2), (0, 3), (1, 3), (1, 2))], axis=1)
-        return triangles + [(half, around[:, part]) for part in _QUADRILATERAL]
-
-    def _corner(self, elements: Ints, rank: int) -> Floats:
-        """Barycentric coordinates (k, 4) of the corner of a rank in height."""
-        return np.eye(4)[self._order[elements, rank]]
-
-    def _between(self, elements: Ints, one: int, other: int) -> Floats:
-        """Where the plane cuts the edge between the corners of two ranks, (k, 4)."""
-        rows = np.arange(len(elements))
-        first, second = (self._heights[elements][rows, self._order[elements, rank]] for rank in (one, other))
-        share = (first / (first - second))[:, None]
-        return (1.0 - share) * self._corner(elements, one) + share * self._corner(elements, other)
+        triangles = [(elements, corners[:, 1:]) for elements, corners, _ in self._tips]
+        return triangles + [(self._half, self._wedge[:, part]) for part in _QUADRILATERAL]

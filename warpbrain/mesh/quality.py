@@ -48,9 +48,7 @@ def components(tetrahedra: ArrayLike, tissue: ArrayLike | None = None) -> Int32s
         pair = pair[labels[pair[:, 0]] == labels[pair[:, 1]]]
     numbers = connected(pair, len(tets))
     first = np.unique(numbers, return_index=True)[1]
-    rank = np.empty(len(first), dtype=np.int32)
-    rank[np.argsort(first)] = np.arange(len(first), dtype=np.int32)
-    return rank[numbers]
+    return np.argsort(np.argsort(first)).astype(np.int32)[numbers]
 
 
 @dataclass(frozen=True)

@@ -87,11 +87,7 @@ def inherited(members: Bools, ends: Int32s, surface: Bools) -> Bools:
     """A set of nodes once there are midpoints.
 
     A midpoint is in it if both ends of its edge are; of a set of nodes of the surface only if the edge lies on the
-    surface too.
-
-    `members` (n,).
-    `ends` (n', 2): the two nodes between which each node lies in the middle.
-    `surface` (n',): nodes, midpoints among them, that are of the boundary.
+    surface too. `members` (n,), `ends` (n', 2) as of `refined`, `surface` (n',): nodes and midpoints of the boundary.
     """
     both = members[ends].all(axis=1)
     inside = members & ~surface[: len(members)]

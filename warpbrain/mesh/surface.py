@@ -210,7 +210,7 @@ def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats,
     `(x - p) . n > 0` with the normal of the feature that `p` is on.
     """
     normals = np.empty((len(faces), 7, 3))
-    normals[:, 0] = _unit(face_vectors(points, faces))
+    normals[:, 0] = unit(face_vectors(points, faces))
     on_rim = np.zeros((len(faces), 7), dtype=bool)
 
     edges = edges_of(faces)
@@ -218,22 +218,21 @@ def feature_normals(points: Floats, faces: NDArray[np.integer]) -> tuple[Floats,
     edge = edge.reshape(-1, 3)
     sums = np.zeros((len(count), 3))
     np.add.at(sums, edge.ravel(), np.repeat(normals[:, 0], 3, axis=0))
-    normals[:, 1:4] = _unit(sums)[edge]
+    normals[:, 1:4] = unit(sums)[edge]
     on_rim[:, 1:4] = (count == 1)[edge]
 
     sums = np.zeros_like(points)
     for i in range(3):
         here, ahead, behind = (points[faces[:, (i + k) % 3]] for k in range(3))
-        cosine = np.einsum("kj,kj->k", _unit(ahead - here), _unit(behind - here))
+        cosine = np.einsum("kj,kj->k", unit(ahead - here), unit(behind - here))
         np.add.at(sums, faces[:, i], np.arccos(np.clip(cosine, -1.0, 1.0))[:, None] * normals[:, 0])
-    normals[:, 4:] = _unit(sums)[faces]
-    rim = np.zeros(len(points), dtype=bool)
-    rim[edges[(count == 1)[edge.ravel()]].ravel()] = True
-    on_rim[:, 4:] = rim[faces]
+    normals[:, 4:] = unit(sums)[faces]
+    on_rim[:, 4:] = nodes_of(edges[(count == 1)[edge.ravel()]], len(points))[faces]
 
     return np.where(on_rim[:, :, None], normals[:, :1], normals), on_rim
 
 
-def _unit(vectors: Floats) -> Floats:
+def unit(vectors: Floats) -> Floats:
+    """Vectors (..., 3) of length 1 along others; zero where these are."""
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(lengths > 0.0, lengths, 1.0)

@@ -24,10 +24,7 @@ LARGEST = 1e12
 class MeshError(InputError):
     """A mesh that cannot be computed with; the message is one line that says what is wrong and where.
 
-    Attributes
-    ----------
-    messages : tuple of str
-        Everything that is wrong, of which the message is the first.
+    `messages` are everything that is wrong, of which it is the first.
     """
 
     def __init__(self, *messages: str) -> None:
@@ -200,10 +197,7 @@ class TetMesh:
     def with_node_sets(self, sets: Mapping[str, ArrayLike]) -> TetMesh:
         """The same mesh with other sets of nodes: only these are checked, and nothing that is known is made again.
 
-        Raises
-        ------
-        MeshError
-            If a set is not a boolean array of one value a node.
+        `MeshError` if a set is not a boolean array of one value a node.
         """
         checked = _by_name(sets, "node set", (len(self.points),))
         other: TetMesh = object.__new__(TetMesh)
@@ -243,22 +237,11 @@ class TetMesh:
         return lumped.astype(np.float64)
 
     def without(self, elements: ArrayLike) -> tuple[TetMesh, Int32s, Int32s]:
-        """The mesh that is left when some tetrahedra are removed.
+        """The mesh that is left when some tetrahedra are removed, (m,) of bool.
 
-        Parameters
-        ----------
-        elements : (m,) bool array
-            True for the tetrahedra to remove.
-
-        Returns
-        -------
-        mesh : TetMesh
-            What remains; nodes that belonged to removed tetrahedra only are gone; sets and vectors are restricted. The
-            faces that it shared with what was removed are its `cut`, with those of an earlier one that are left.
-        node_ids : (n',) int32 array
-            Id in this mesh of every node of the new one.
-        element_ids : (m',) int32 array
-            Id in this mesh of every tetrahedron of the new one.
+        Nodes that belonged to these only are gone; sets and vectors are restricted. The faces that it shared with what
+        was removed are its `cut`, with those of an earlier one that are left. Returns it, and the id in this mesh of
+        each of its nodes (n',) and tetrahedra (m',). `MeshError` if nothing is left, or `elements` are no such array.
         """
         removed = np.asarray(elements)
         if removed.dtype != bool or removed.shape != (len(self.tetrahedra),):
@@ -297,13 +280,8 @@ class TetMesh:
         gone = self.tetrahedra[~kept][:, FACES].reshape(-1, 3)
         earlier = self.cut[~in_rows(self.cut, gone)]
         cut = new_id[np.concatenate([interface_faces(self.tetrahedra, ~kept), earlier])]
-        mesh = TetMesh(
-            self.points[node_ids],
-            new_id[tetrahedra],
-            self.tissue[element_ids],
-            *self._named(node_ids, element_ids),
-            cut,
-        )
+        named = self._named(node_ids, element_ids)
+        mesh = TetMesh(self.points[node_ids], new_id[tetrahedra], self.tissue[element_ids], *named, cut)
         # of all who ask
         node_ids.setflags(write=False)
         element_ids.setflags(write=False)
