@@ -166,13 +166,6 @@ def element_kernels(
         scale: wp.array[scalar]
 
     @wp.func
-    def row_of(group: Group, t: int):
-        row = t
-        if wp.static(not of_term):
-            row = group.elements[t]
-        return row
-
-    @wp.func
     def weight_of(group: Group, row: int):
         """Volume of a quadrature point."""
         weight = share * group.volume[row]
@@ -184,7 +177,7 @@ def element_kernels(
     def forces(start: int, group: Group, u: wp.array[vec3], element_forces: wp.array2d[vec3]):
         t = start + wp.tid()
         e = group.elements[t]
-        row = row_of(group, t)
+        row = wp.where(wp.static(of_term), t, e)
         G = group.inverse_edges[e]
         for point in range(points):
             F = gradient_at(u, group.nodes, e, point, G)
@@ -197,7 +190,7 @@ def element_kernels(
     ):
         t = start + wp.tid()
         e = group.elements[t]
-        row = row_of(group, t)
+        row = wp.where(wp.static(of_term), t, e)
         G = group.inverse_edges[e]
         D = directions_of(G)
         for point in range(points):
@@ -216,7 +209,7 @@ def element_kernels(
     ):
         t = start + wp.tid()
         e = group.elements[t]
-        row = row_of(group, t)
+        row = wp.where(wp.static(of_term), t, e)
         stored = scalar(0.0)
         smallest = scalar(0.0)
         for point in range(points):

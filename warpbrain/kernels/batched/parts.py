@@ -154,8 +154,7 @@ def parts_of(pattern: Pattern, blocks: int, threads: int, banks: int) -> Parts:
         entries = entries[counted[entries]]
         here, size = columns[entries], len(entries)
         outer.append(np.unique(here[part[here] != block]))
-        place = np.zeros(n, dtype=int)
-        place[nodes] = np.arange(len(nodes))
+        place = row_of.copy()
         place[outer[-1]] = len(nodes) + np.arange(len(outer[-1]))
         row_ends = np.cumsum(lengths[nodes]) - 1
         ends = np.zeros(threads * places, dtype=bool)
