@@ -181,8 +181,7 @@ def output_folder(path: Path) -> Path:
     with _input_errors(path, "cannot be made a folder for output"):
         path.mkdir(parents=True, exist_ok=True)
     # known now, not only when there is something to write
-    if not os.access(path, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: cannot be written to")
+    _check_folder(path)
     return path
 
 

@@ -13,6 +13,7 @@ import platform
 import re
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,8 @@ def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, An
     for device in devices:
         on_test(device["alias"])
         tests.append(self_test(device["alias"]))
+    cache = Path(wp.config.kernel_cache_dir)
+    size = sum(file.stat().st_size for file in cache.rglob("*") if file.is_file())
     return {
         "warpbrain": {"version": __version__, "folder": str(Path(__file__).parents[1])},
         "python": platform.python_version(),
@@ -58,7 +61,7 @@ def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, An
         "packages": _packages(),
         "devices": devices,
         "cuda": {"driver": _joined(wp.get_cuda_driver_version), "toolkit": _joined(wp.get_cuda_toolkit_version)},
-        "kernels": _kernels(Path(wp.config.kernel_cache_dir)),
+        "kernels": {"folder": str(cache), "size_GiB": size / _GIB, "writable": os.access(cache, os.W_OK)},
         "pictures": _pictures(),
         "self_test": tests,
     }
@@ -66,11 +69,10 @@ def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, An
 
 def _joined(ask: Callable[[], Any]) -> str | None:
     """A version of CUDA as text; None where there is no driver."""
-    try:
-        version = ask()
-    except RuntimeError:
-        return None
-    return ".".join(map(str, version)) if version and any(version) else None
+    with suppress(RuntimeError):
+        if (version := ask()) and any(version):
+            return ".".join(map(str, version))
+    return None
 
 
 def _memory(name: str) -> float | None:
@@ -88,18 +90,11 @@ def _packages() -> dict[str, str | None]:
     for line in declared:
         if re.search(r"extra == .(test|docs).", line):
             continue
-        match = re.match(r"[\w.-]+", line)
-        assert match is not None
-        try:
-            versions[match[0]] = version(match[0])
-        except PackageNotFoundError:
-            versions[match[0]] = None
+        [name] = re.findall(r"^[\w.-]+", line)
+        versions[name] = None
+        with suppress(PackageNotFoundError):
+            versions[name] = version(name)
     return versions
-
-
-def _kernels(folder: Path) -> dict[str, Any]:
-    size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()) if folder.is_dir() else 0
-    return {"folder": str(folder), "size_GiB": size / _GIB, "writable": os.access(folder, os.W_OK)}
 
 
 def _pictures() -> str | None:
@@ -107,11 +102,9 @@ def _pictures() -> str | None:
     if platform.system() != "Linux":
         return None
     for library in ("libEGL.so.1", "libOSMesa.so.8"):
-        try:
+        with suppress(OSError):
             ctypes.CDLL(library)
-        except OSError:
-            continue
-        return None
+            return None
     return "there is no OpenGL library: on Debian and Ubuntu, apt-get install libegl1"
 
 

@@ -1,21 +1,10 @@
 """Measures one row: pre-processing, the phases of a step one by one, and the step as users get it.
 
-Table 3 times everything from a mesh in memory to the first step. Here much of that is kept once it is made, because a
-diagnosis asks for the same mesh thousands of times; a second system of a mesh is then several times cheaper than the
-first. What is kept, and for how long:
-
-- as long as a `TetMesh` lives: its cached properties (labels, volumes, centres, boundary, node volumes), meshes made of
-  it (`shared`: refined, without a resection), which `with_node_sets` passes on; what a device was told of it, the
-  elements by device and precision, patterns and patches by what they are of (`warpbrain.simulation.assembly`);
-- by mesh, the latest ones: connected parts (`simulation.held`), balls (`physics.regions`), patches of a traction
-  (`physics.mechanisms.traction`), and what estimation and diagnosis ask of a mesh;
-- by bytes of coordinates: sites of a diagnosis (`diagnosis.sensors`);
-- as long as a `Case` or a `Model` lives: what is left of a resection, midside nodes, unit forces of the loads;
-- as long as the process lives: kernels, compiled and loaded, and memory that a GPU's pool keeps. Only these are warm
-  here: that is paid once on a machine or in a process, not for a mesh.
-
-A fresh mesh is therefore another object, and differs in content from every other: no cache by identity or by bytes,
-those above or those to come, can answer for it.
+Table 3 times everything from a mesh in memory to the first step. Here much of that is kept once it is made, with a
+`TetMesh`, a `Case` or a `Model`, by mesh or by bytes of coordinates, because a diagnosis asks for the same mesh
+thousands of times. A fresh mesh is therefore another object, and differs in content from every other: no cache by
+identity or by bytes can answer for it. Warm are only kernels, compiled and loaded, and memory that a GPU's pool keeps:
+that is paid once on a machine or in a process, not for a mesh.
 """
 
 from __future__ import annotations

@@ -7,13 +7,12 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from warpbrain.atomic import safe_name
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.cli.log import note_case
-from warpbrain.ensemble.results import EnsembleResult, results_of
+from warpbrain.ensemble.results import results_of
 from warpbrain.ensemble.run import SAMPLES, chosen_samples, chosen_workers, compute_missing, overloaded
 from warpbrain.ensemble.sample import Sample
 from warpbrain.ensemble.store import Store, discard
@@ -24,7 +23,6 @@ from warpbrain.report import ensemble as report
 from warpbrain.report import summary as tables
 from warpbrain.report.files import fingerprints, write_body, write_summary
 from warpbrain.report.page import lines
-from warpbrain.simulation.model import Model
 from warpbrain.simulation.of_case import model_of
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.quiet import start_warp_quietly
@@ -52,7 +50,10 @@ def ensemble(options: argparse.Namespace) -> None:
     left_out, how = tables.left_out(model, "an ensemble has no others"), f"{chosen}; {course}, {options.precision}"
     say(*lines("ensemble.txt", "opening", described, left_out, len(samples), how), sep="\n")
     if options.steps is None:
-        _warn(model, samples, options, say)
+        # what is likely to fail, before it is computed
+        load = overloaded(model, samples, None if options.dask is not None else options.device)
+        if load.numbers:
+            say(*lines("ensemble.txt", "overloaded", load, len(samples), _NAMED), sep="\n")
     # the same command goes on with what is there, so its folder is that of before
     out = options.out or Path(f"warpbrain-ensemble-{safe_name(case.name)}-{options.tissue}")
     earlier = ("ensemble.json", "summary.json") if (out / "ensemble.json").exists() else ()
@@ -86,24 +87,15 @@ def ensemble(options: argparse.Namespace) -> None:
         "versions": tables.machine(),
     }
     with results_in(out, record, options.overwrite):
-        record.files += _write(out, result, summary, f"{course}: {chosen}", case.title, len(samples))
+        record.files += [*report.write_table(out, report.table_of(result)), "summary.json"]
+        if (fields := result.fields) is not None:
+            write_body(out / "fields.vtu", report.file_of_fields(fields))
+            subtitle = f"{fields.count} of {len(samples)} samples, {course}: {chosen}"
+            report.write_spread_picture(out / "spread.png", fields, case.title, subtitle)
+            record.files += ["fields.vtu", "spread.png"]
+        write_summary(out / "summary.json", summary)
     if result.fields is None:
         raise SolveError(f"no sample of {len(samples)} has an answer; the reasons are in {out / 'samples.csv'}")
-
-
-def _write(
-    out: Path, result: EnsembleResult, summary: dict[str, Any], chosen: str, title: str, count: int
-) -> list[str]:
-    """Write what an ensemble gave; returns the names of the files."""
-    files = [*report.write_table(out, report.table_of(result)), "summary.json"]
-    if result.fields is not None:
-        write_body(out / "fields.vtu", report.file_of_fields(result.fields))
-        report.write_spread_picture(
-            out / "spread.png", result.fields, title, f"{result.fields.count} of {count} samples, {chosen}"
-        )
-        files += ["fields.vtu", "spread.png"]
-    write_summary(out / "summary.json", summary)
-    return files
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -143,13 +135,6 @@ def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str
     with Progress("drawing", options.quiet) as progress:
         samples = chosen_samples(case, count, seed, process, lambda n: progress.show(n / count))
     return samples, f"draws 0 to {count - 1} of seed {seed} by {by}"
-
-
-def _warn(model: Model, samples: list[Sample], options: argparse.Namespace, say: Callable[..., None]) -> None:
-    """Say what is likely to fail before it is computed."""
-    load = overloaded(model, samples, None if options.dask is not None else options.device)
-    if load.numbers:
-        say(*lines("ensemble.txt", "overloaded", load, len(samples), _NAMED), sep="\n")
 
 
 def _compute(

@@ -29,21 +29,13 @@ from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
 from warpbrain.gp.trained import find_model
 from warpbrain.kernels.module import find_device
 from warpbrain.recordings.base import Registration
+from warpbrain.report import sweep as table
 from warpbrain.report import views
 from warpbrain.report.estimate import describe_estimate, estimate_lines, write_estimated_state, write_predictions
 from warpbrain.report.estimate_page import agreement_figure, densities_figure, residuals_figure, write_estimate_page
 from warpbrain.report.files import fingerprint_of, read_state, write_summary
 from warpbrain.report.page import lines
 from warpbrain.report.rendering import ready_to_render
-from warpbrain.report.sweep import (
-    TABLE,
-    columns,
-    estimated_in,
-    read_sweep,
-    sweep_lines,
-    write_sweep,
-    write_sweep_picture,
-)
 from warpbrain.report.warped import WarpRequest
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.quiet import start_warp_quietly
@@ -59,7 +51,19 @@ _LARGEST = 20_000
 
 def estimate(options: argparse.Namespace) -> None:
     """Estimate the tissue of a case, by a posterior or by a sweep."""
-    settings, registration = _options(options), _registration(options)
+    settings = EstimationOptions(
+        Likelihood(None) if math.isinf(options.nu) else Likelihood(),
+        None if options.no_discretisation else Discretisation(),
+        not options.no_registration,
+        samples=options.samples,
+        seed=options.seed,
+    )
+    registration = None
+    if options.registration is not None and not options.no_registration:
+        shift, turn = options.registration
+        if not (shift > 0.0 and turn > 0.0 and math.isfinite(shift + turn)):
+            raise InputError(f"--registration {shift:g} {turn:g}: expected two positive numbers [mm] and [degrees]")
+        registration = Registration(0.001 * shift, math.radians(turn))
     record: Record = options.record
     say = record.say
 
@@ -90,31 +94,9 @@ def estimate(options: argparse.Namespace) -> None:
         _posterior(options, settings, case, images, out)
 
 
-def _registration(options: argparse.Namespace) -> Registration | None:
-    """The accuracy that is asked for in the place of the case's."""
-    if options.registration is None or options.no_registration:
-        return None
-    shift, turn = options.registration
-    if not (shift > 0.0 and turn > 0.0 and math.isfinite(shift + turn)):
-        raise InputError(f"--registration {shift:g} {turn:g}: expected two positive numbers [mm] and [degrees]")
-    return Registration(0.001 * shift, math.radians(turn))
-
-
-def _options(options: argparse.Namespace) -> EstimationOptions:
-    """What is asked for; refuses bad numbers before anything is computed."""
-    return EstimationOptions(
-        Likelihood(None) if math.isinf(options.nu) else Likelihood(),
-        None if options.no_discretisation else Discretisation(),
-        not options.no_registration,
-        samples=options.samples,
-        seed=options.seed,
-    )
-
-
 def _posterior(
     options: argparse.Namespace, settings: EstimationOptions, case: Case, images: WarpRequest | None, out: Path
 ) -> None:
-
     record: Record = options.record
     say = record.say
 
@@ -143,8 +125,14 @@ def _posterior(
         views.save(agreement_figure(posterior, narrow=False), out / "predicted.png", case.title, 10.0)
         views.save(residuals_figure(posterior), out / "residuals.png", case.title)
         write_summary(out / "estimate.json", described)
-        record.files += ["estimate.json", "predictions.csv", "state.vtu"]
-        record.files += ["posterior.png", "predicted.png", "residuals.png"]
+        record.files += [
+            "estimate.json",
+            "predictions.csv",
+            "state.vtu",
+            "posterior.png",
+            "predicted.png",
+            "residuals.png",
+        ]
         with ready_to_render():
             record.files += drawn(write_estimate_page(out, described, posterior), say)
         if images is not None:
@@ -172,12 +160,12 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     # the paper's process on the paper's data
     model = find_model(options.gp or "coregionalised", "corrected" if options.gp else "as_published")
     parameters = Parameters.of(case)
-    header = columns(parameters, fingerprint_of(case, model.name, model.variant))
-    path = out / TABLE
-    estimated = estimated_in(out / "estimate.json")
+    header = table.columns(parameters, fingerprint_of(case, model.name, model.variant))
+    path = out / table.TABLE
+    estimated = table.estimated_in(out / "estimate.json")
     if options.overwrite:
         path.unlink(missing_ok=True)
-    known, damaged = read_sweep(path, header, len(parameters.tissues))
+    known, damaged = table.read_sweep(path, header, len(parameters.tissues))
     total = len(VALUES) ** len(parameters.tissues)
     say(f"sweep of {total} equilibria" + (f", {len(known)} of which are there already" if known else ""))
     if damaged:
@@ -187,13 +175,13 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     def on_point(point: SweepPoint) -> None:
         points[point.k] = point
         output_folder(out)
-        write_sweep(path, header, points.values())
+        table.write_sweep(path, header, points.values())
         progress.show(len(points) / total, ", ".join(f"k = {k:+.2f}" for k in point.k))
 
     with Progress("sweep", options.quiet) as progress:
         finished = sweep(case, model, VALUES, known, options.device, on_point)
-    say(*sweep_lines(finished), sep="\n")
+    say(*table.sweep_lines(finished), sep="\n")
     # beside an estimate, and of points that were there before
     with results_in(out, record, replace=False):
-        write_sweep_picture(out / "sweep.png", finished, case.title, estimated)
-        record.files += [TABLE, "sweep.png"]
+        table.write_sweep_picture(out / "sweep.png", finished, case.title, estimated)
+        record.files += [table.TABLE, "sweep.png"]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from warpbrain.atomic import safe_name
@@ -28,14 +27,12 @@ from warpbrain.report.files import read_state, write_result, write_summary
 from warpbrain.report.page import lines
 from warpbrain.report.rendering import render_nothing
 from warpbrain.report.run_page import write_run_page
-from warpbrain.report.summary import describe_prior
-from warpbrain.report.warped import WarpRequest
 from warpbrain.simulation.equilibrium import NewtonStep
 from warpbrain.simulation.mesh_error import MeshError, mesh_error, observe_without
-from warpbrain.simulation.observation import Observed, observe
+from warpbrain.simulation.observation import observe
 from warpbrain.simulation.relaxation import RelaxationStep
-from warpbrain.simulation.result import Result, nodal_state_of
-from warpbrain.simulation.run import Course, Running, Watching
+from warpbrain.simulation.result import nodal_state_of
+from warpbrain.simulation.run import Course, Run, Running, Watching
 from warpbrain.simulation.system import System
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.record import Record
@@ -51,33 +48,23 @@ def run_case(options: argparse.Namespace) -> None:
     case, drawn_laws = _case(options)
     warp.check_place(to_warp, case)
     out = choose_folder(options.out, f"warpbrain-{safe_name(case.name)}-{options.tissue}", options.overwrite)
-    prior = None if drawn_laws is None else describe_prior(drawn_laws)
+    prior = None if drawn_laws is None else tables.describe_prior(drawn_laws)
     if case.specimen is not None:
         render_nothing()
         run_specimen.run(options, case, out, prior)
         return
-    _run_body(options, case, out, prior, to_warp)
 
-
-def _run_body(
-    options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any] | None, to_warp: WarpRequest | None
-) -> None:
     record: Record = options.record
     say = record.say
+    course = Course(options.steps, options.to_rest, options.until, options.tolerance, options.time_step)
     needed_by = () if options.mesh_error is None else ("--mesh-error",)
-    about_elements = options.elements is None and options.mesh_error == "elements"
-    running = Running(
-        case,
-        Course(options.steps, options.to_rest, options.until, options.tolerance, options.time_step),
-        "tet4" if about_elements else options.elements,
-        options.device,
-        options.precision,
-        needed_by,
-    )
-    model, system = running.model, running.system
+    elements, why = options.elements, None
+    if elements is None and options.mesh_error == "elements":
+        elements, why = "tet4", "--mesh-error elements is about them"
+    running = Running(case, course, elements, options.device, options.precision, needed_by)
+    system = running.system
     system.begin_loading_kernels()
-    chosen = "--mesh-error elements is about them" if about_elements else running.chosen
-    described = tables.describe_case(case, model, chosen)
+    described = tables.describe_case(case, running.model, why or running.chosen)
     say(*lines("run.txt", "case", described, prior, tables.STAND_IN), sep="\n")
     note_device(record, case, system, options.precision)
 
@@ -88,38 +75,36 @@ def _run_body(
         loaded = system.load_kernels()
     with watching(options, say) as watched:
         done = running.run(watched)
-    for line in lines("run.txt", "ending", done.followed.solution):
+    followed = done.followed
+    for line in lines("run.txt", "ending", followed.solution):
         say(line)
-    outcome, counts = done.followed.solution, done.followed.calls
-    first_step = done.followed.begun - record.clock
-    seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **done.followed.seconds}
-    result, observed = done.result, done.observed
-    displacements = tables.describe_result(result)
-    compared = describe_comparisons(observed)
+    first_step = followed.begun - record.clock
+    seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **followed.seconds}
+    displacements, compared = tables.describe_result(done.result), describe_comparisons(done.observed)
     say(*lines("run.txt", "displacement", displacements, tables.displacement_rows(displacements)), sep="\n")
     for line in lines("run.txt", "recordings", compared, recorded_rows(compared["compared"]), options.legacy_rmse):
         say(line)
-    estimated, doubt = _mesh_error(options, case, system, result, observed, outcome)
+    estimated, doubt = (None, None) if options.mesh_error is None else _mesh_error(options, system, done)
     if doubt is not None:
         say("", *lines("run.txt", "mesh_error", doubt), sep="\n")
-    say(*lines("run.txt", "times", seconds, counts), sep="\n")
+    say(*lines("run.txt", "times", seconds, followed.calls), sep="\n")
 
     summary = {
         **tables.describe_opening(case, described, prior, system, options.precision),
-        "solution": outcome,
+        "solution": followed.solution,
         "result": displacements,
         "recordings": compared,
         **({} if doubt is None else {"mesh_error": doubt}),
         "seconds_by_phase": seconds,
-        "calls_by_phase": counts,
+        "calls_by_phase": followed.calls,
         "seconds_to_first_step": first_step,
         "versions": tables.machine(),
     }
     with results_in(out, record, options.overwrite):
-        write_result(out / "result.vtu", result, None if estimated is None else estimated.u)
+        write_result(out / "result.vtu", done.result, None if estimated is None else estimated.u)
         record.files += ["result.vtu", "summary.json", *drawn(write_run_page(out, summary, done), say)]
-        if observed.comparisons:
-            write_comparisons(out / "comparison.csv", case, observed)
+        if done.observed.comparisons:
+            write_comparisons(out / "comparison.csv", case, done.observed)
             record.files.append("comparison.csv")
         # after all that it speaks of: whoever finds it finds the others
         write_summary(out / "summary.json", summary)
@@ -138,9 +123,16 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
         case = replace(case, poisson=options.poisson)
     for text in options.assumed:
         case = assume(case, text)
-    prior = _from_prior(options, case)
-    if prior is not None:
+    prior = None
+    if options.sample is not None or any(tissue.law is None for tissue in case.tissues.values()):
+        model = find_model(options.gp or "hierarchical")
+        if options.sample is None:
+            prior = with_prior_middle(case, model)
+        else:
+            prior = with_prior_draw(case, options.sample, options.seed or 0, model)
         case = prior.case
+    elif options.gp is not None:
+        raise InputError(f'--gp {options.gp}: means nothing without --sample or a tissue of mu = "prior"')
     if not options.allow_unstable:
         for label, tissue in sorted(case.tissues.items()):
             try:
@@ -152,51 +144,20 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     return case, prior
 
 
-def _from_prior(options: argparse.Namespace, case: Case) -> FromPrior | None:
-    """The case with the laws that the generative model is to give; None if it is to give none."""
-    if options.sample is None and all(tissue.law is not None for tissue in case.tissues.values()):
-        if options.gp is not None:
-            raise InputError(f'--gp {options.gp}: means nothing without --sample or a tissue of mu = "prior"')
-        return None
-
-    model = find_model(options.gp or "hierarchical")
-    if options.sample is None:
-        return with_prior_middle(case, model)
-    return with_prior_draw(case, options.sample, options.seed or 0, model)
-
-
-def _mesh_error(
-    options: argparse.Namespace,
-    case: Case,
-    system: System,
-    result: Result,
-    observed: Observed,
-    outcome: Mapping[str, Any],
-) -> tuple[MeshError | None, dict[str, Any] | None]:
-    """The error of the mesh and what is to be said of it; nothing, if it was not asked for, no error if not found."""
-    if options.mesh_error is None:
-        return None, None
-
-    smaller = options.mesh_error == "size"
+def _mesh_error(options: argparse.Namespace, system: System, done: Run) -> tuple[MeshError | None, dict[str, Any]]:
+    """The error of the mesh, if it can be estimated, and what is to be said of it."""
+    settings = {"smaller": options.mesh_error == "size", "steps": options.steps, "device": options.device}
     try:
         with Progress("mesh error", options.quiet) as progress:
-            estimated_error = mesh_error(
-                case,
-                system.model,
-                result,
-                smaller=smaller,
-                steps=options.steps,
-                device=options.device,
-                on_share=progress.show,
-            )
+            estimated = mesh_error(done.case, system.model, done.result, **settings, on_share=progress.show)
     except SolveError as error:
         # the run itself is sound
         return None, {"unknown": str(error)}
-    time = outcome.get("time_s")
-    without = observe_without(case, result, estimated_error, time)
+    time = done.followed.solution.get("time_s")
+    without = observe_without(done.case, done.result, estimated, time)
     # of a motion the error is that of its end
-    at_end = observed if time is None else observe(case, nodal_state_of(system, time), time)
-    return estimated_error, describe_mesh_error(estimated_error, system.model.elements, at_end, without)
+    at_end = done.observed if time is None else observe(done.case, nodal_state_of(system, time), time)
+    return estimated, describe_mesh_error(estimated, system.model.elements, at_end, without)
 
 
 @contextmanager

@@ -14,7 +14,6 @@ from warpbrain.report.comparison import describe_comparisons
 from warpbrain.report.files import write_summary
 from warpbrain.report.page import lines
 from warpbrain.report.run_page import write_specimen_page
-from warpbrain.report.specimen import write_tests_picture
 from warpbrain.report.summary import describe_opening, machine
 from warpbrain.simulation.observation import Observed
 from warpbrain.simulation.specimen import SHOWN, SpecimenRunning
@@ -23,7 +22,7 @@ from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import results_in
 
 
-def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any] | None = None) -> None:
+def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any] | None) -> None:
     """Simulate every test of a case with a specimen, as the options of `warpbrain run` change it; `prior` is what is to
     be said of laws that the generative model gave."""
     _check(options, case)
@@ -55,7 +54,7 @@ def run(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any
         "versions": machine(),
     }
     with results_in(out, record, options.overwrite):
-        write_tests_picture(out / "tests.png", done, case.title, subtitle)
+        text.write_tests_picture(out / "tests.png", done, case.title, subtitle)
         text.write_tests(out / "comparison.csv", done)
         write_summary(out / "summary.json", summary)
         write_specimen_page(out / "report.html", summary, done)
@@ -68,13 +67,11 @@ def _check(options: argparse.Namespace, case: Case) -> None:
         raise InputError(
             f"--mesh-error: {case.path} has a [specimen], which has no one state: compare --elements tet4-averaged"
         )
-    motions = {"--steps": options.steps is not None, "--to-rest": options.to_rest, "--until": options.until is not None}
-    for option, asked_of in motions.items():
+    for option, asked_of in (("--steps", options.steps), ("--to-rest", options.to_rest), ("--until", options.until)):
         if asked_of:
             raise InputError(
                 f"{option}: {case.path} has a [specimen], whose tests are quasi-static: there is no motion"
             )
     if options.elements in ("tet10", "tet10-mixed"):
-        raise InputError(
-            f"--elements {options.elements}: {case.path} has a [specimen], whose tests have linear elements only"
-        )
+        tests = "whose tests have linear elements only"
+        raise InputError(f"--elements {options.elements}: {case.path} has a [specimen], {tests}")

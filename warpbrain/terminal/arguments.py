@@ -9,10 +9,10 @@ extra `completion` (argcomplete).
 from __future__ import annotations
 
 import argparse
+import operator
 import os
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
@@ -20,31 +20,9 @@ from typing import Any
 
 from warpbrain.errors import InputError
 
+#: Types of arguments and comparisons of their numbers with limits, by their names in a table.
 _TYPES = {"path": Path, "int": int, "float": float}
-
-
-@dataclass(frozen=True)
-class _Range:
-    """What the number of an argument can be, which is refused before anything is imported for it."""
-
-    argument: argparse.Action
-    least: float | None = None
-    above: float | None = None
-    below: float | None = None
-    expected: str = ""
-
-    def require(self, options: argparse.Namespace) -> None:
-        """`InputError` if a number is given that is outside."""
-        value = getattr(options, self.argument.dest)
-        inside = value is None or (
-            (self.least is None or value >= self.least)
-            and (self.above is None or value > self.above)
-            and (self.below is None or value < self.below)
-        )
-        if not inside:
-            shown = f"{value:g}" if isinstance(value, float) else value
-            expected = self.expected or f"a whole number of at least {self.least}"
-            raise InputError(f"{self.argument.option_strings[0]} {shown}: expected {expected}")
+_LIMITS = {"least": operator.ge, "above": operator.gt, "below": operator.lt}
 
 
 def described_in(package: str) -> dict[str, Any]:
@@ -53,9 +31,14 @@ def described_in(package: str) -> dict[str, Any]:
 
 
 def call(options: argparse.Namespace, package: str) -> None:
-    """Run what was asked for, by a module of a package; `InputError` if a number is out of its range."""
-    for number in options.ranges:
-        number.require(options)
+    """Run what was asked for, by a module of a package; `InputError`, before that is imported, if a number is out
+    of its range."""
+    for argument, limits in options.ranges:
+        value = getattr(options, argument.dest)
+        if value is not None and not all(_LIMITS[name](value, limits[name]) for name in _LIMITS if name in limits):
+            shown = f"{value:g}" if isinstance(value, float) else value
+            expected = limits.get("expected") or f"a whole number of at least {limits['least']}"
+            raise InputError(f"{argument.option_strings[0]} {shown}: expected {expected}")
     module, _, function = options.call.partition(":")
     getattr(import_module(f"{package}.{module}"), function)(options)
 
@@ -70,7 +53,7 @@ def add_commands(
 
 def fill(parser: argparse.ArgumentParser, command: Mapping[str, Any], shared: Mapping[str, Any]) -> None:
     """Give a parser the arguments and actions of a command."""
-    ranges: list[_Range] = []
+    ranges: list[tuple[argparse.Action, dict[str, Any]]] = []
     parser.set_defaults(call=command.get("call"), ranges=ranges, program=parser.prog)
     # sections of the help and exclusive groups, by their name
     places: dict[str, argparse._ActionsContainer] = {"": parser}
@@ -78,28 +61,26 @@ def fill(parser: argparse.ArgumentParser, command: Mapping[str, Any], shared: Ma
         settings = dict(changed) if changed.get("apart") else {**shared.get(flags, {}), **changed}
         settings.pop("apart", None)
         section, group = settings.pop("under", ""), settings.pop("one_of", "")
-        required = settings.pop("required", False) if group else False
         if section not in places:
             places[section] = parser.add_argument_group(section)
         if group not in places:
-            places[group] = parser.add_mutually_exclusive_group(required=required)
-        limits = {key: settings.pop(key) for key in ("least", "above", "below", "expected") if key in settings}
-        argument = _add_argument(places[group or section], flags.split(), settings)
-        ranges += [_Range(argument, **limits)] if limits else []
+            places[group] = parser.add_mutually_exclusive_group(required=settings.get("required", False))
+        if group:
+            settings.pop("required", None)
+        limits = {key: settings.pop(key) for key in (*_LIMITS, "expected") if key in settings}
+        if "type" in settings:
+            settings["type"] = _TYPES[settings["type"]]
+        if settings.get("action") == "boolean":
+            settings["action"] = argparse.BooleanOptionalAction
+        if isinstance(settings.get("metavar"), list):
+            settings["metavar"] = tuple(settings["metavar"])
+        argument = places[group or section].add_argument(*flags.split(), **settings)
+        if limits:
+            ranges.append((argument, limits))
     if "actions" in command:
         # without an action a command that can be called is
         actions = parser.add_subparsers(dest="action", required="call" not in command, metavar="ACTION")
         add_commands(actions, command["actions"], shared)
-
-
-def _add_argument(place: argparse._ActionsContainer, flags: Sequence[str], settings: dict[str, Any]) -> argparse.Action:
-    if "type" in settings:
-        settings["type"] = _TYPES[settings["type"]]
-    if settings.get("action") == "boolean":
-        settings["action"] = argparse.BooleanOptionalAction
-    if isinstance(settings.get("metavar"), list):
-        settings["metavar"] = tuple(settings["metavar"])
-    return place.add_argument(*flags, **settings)
 
 
 def complete(parser: argparse.ArgumentParser) -> None:

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -83,7 +84,7 @@ def exit_status(program: str, call: Callable[[], None], record: Record | None = 
         return 130
     except Exception as error:
         arguments, doing = ((), "") if record is None else (record.arguments, record.doing)
-        path = _write_report(error, arguments, doing)
+        path = _report(error, arguments, doing)
         saved = "its report could not be saved" if path is None else f"please send {path} to its developers"
         print(
             f"{program}: a defect of {program}, not of your files: {type(error).__name__} in {_where(error)}"
@@ -95,29 +96,13 @@ def exit_status(program: str, call: Callable[[], None], record: Record | None = 
     return 0
 
 
-def _write_report(error: BaseException, arguments: Sequence[str], doing: str) -> Path | None:
-    """Write what happened to the working folder, or where it cannot be written to that for temporary files; None if it
-    can be written nowhere. `doing` is what was said last of what is done."""
-    text = _report_of(error, arguments, doing)
-    name = f"warpbrain-crash-{datetime.now(UTC):%Y%m%d-%H%M%S}-{os.getpid()}.txt"
-    for folder in (Path.cwd, lambda: Path(tempfile.gettempdir())):
-        try:
-            path = folder() / name
-            path.write_text(text, encoding="utf-8", errors="replace")
-        except OSError:
-            continue
-        return path
-    return None
-
-
-def _report_of(error: BaseException, arguments: Sequence[str], doing: str) -> str:
-    """Versions, arguments and traceback; no values of variables, and no line that is long."""
+def _report(error: BaseException, arguments: Sequence[str], doing: str) -> Path | None:
+    """Write versions, arguments and traceback, no values of variables and no line that is long, to the working folder,
+    or to that for temporary files; None if it can be written nowhere. `doing` is what was said last of what is done."""
     versions = {"warpbrain": __version__, "python": platform.python_version(), "platform": platform.platform()}
     for name in _PACKAGES:
-        try:
+        with suppress(PackageNotFoundError):
             versions[name] = version(name)
-        except PackageNotFoundError:
-            continue
     lines = [
         "A defect of warpbrain. Please send this file to its developers; look through it first: it holds the command",
         "with its file names, versions and where the program was, and no data.",
@@ -129,16 +114,20 @@ def _report_of(error: BaseException, arguments: Sequence[str], doing: str) -> st
         "",
         *"".join(traceback.format_exception(error)).splitlines(),
     ]
-    return "\n".join(line if len(line) <= _WIDTH else f"{line[:_WIDTH]}..." for line in lines) + "\n"
+    text = "\n".join(line if len(line) <= _WIDTH else f"{line[:_WIDTH]}..." for line in lines) + "\n"
+    name = f"warpbrain-crash-{datetime.now(UTC):%Y%m%d-%H%M%S}-{os.getpid()}.txt"
+    for folder in (Path.cwd, lambda: Path(tempfile.gettempdir())):
+        with suppress(OSError):
+            path = folder() / name
+            path.write_text(text, encoding="utf-8", errors="replace")
+            return path
+    return None
 
 
 def _where(error: BaseException) -> str:
     """The file and line of ours that the exception came through last."""
-    places = [
-        frame for frame in traceback.extract_tb(error.__traceback__) if "warpbrain" in Path(frame.filename).parts[:-1]
-    ]
-    if not places:
-        return "outside of warpbrain"
-    last = places[-1]
-    parts = Path(last.filename).parts
-    return f"{'/'.join(parts[len(parts) - parts[::-1].index('warpbrain') :])}, line {last.lineno}"
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        _, package, place = f"/{Path(frame.filename).as_posix()}".rpartition("/warpbrain/")
+        if package:
+            return f"{place}, line {frame.lineno}"
+    return "outside of warpbrain"

@@ -9,8 +9,9 @@ such locks (Windows, some file systems of networks) nothing is claimed.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 from types import ModuleType
 
@@ -98,7 +99,7 @@ def _remove_empty(folders: list[Path]) -> None:
 MARKS = ("summary.json", "estimate.json", "diagnosis.json", "ensemble.json", "sweep.csv")
 
 
-def choose_folder(requested: Path | None, usual: str, overwrite: bool, allowed_marks: Iterable[str] = ()) -> Path:
+def choose_folder(requested: Path | None, usual: str, overwrite: bool, allowed_marks: Collection[str] = ()) -> Path:
     """Where results are to be written, known before anything is computed; this process alone has it until it ends.
 
     A folder that was made for nothing goes again when the command ends (`release`).
@@ -108,31 +109,25 @@ def choose_folder(requested: Path | None, usual: str, overwrite: bool, allowed_m
     what the command reads or goes on with. `InputError` if the folder that was asked for has results and may not be
     overwritten, belongs to another process, cannot be one or be written to.
     """
-    if requested is None and not overwrite:
-        return _next_free(usual, tuple(allowed_marks))
+
+    def results_of(folder: Path) -> list[str]:
+        return [name for name in MARKS if name not in allowed_marks and (folder / name).exists()]
+
     folder = requested or Path(usual)
-    claim(folder)
-    if not overwrite and (marks := _has_results(folder, allowed_marks)):
-        raise InputError(f"{folder}: has results already ({', '.join(marks)}): --overwrite replaces them")
-    return folder
-
-
-def _next_free(usual: str, allowed_marks: Iterable[str]) -> Path:
-    folder, number = Path(usual), 1
-    while True:
-        if not _has_results(folder, allowed_marks):
+    if requested is not None or overwrite:
+        claim(folder)
+        if not overwrite and (marks := results_of(folder)):
+            raise InputError(f"{folder}: has results already ({', '.join(marks)}): --overwrite replaces them")
+        return folder
+    for number in count(2):
+        if not results_of(folder):
             with suppress(TakenError):
                 claim(folder)
                 # known for sure only now that nobody else can write some
-                if not _has_results(folder, allowed_marks):
-                    return folder
-        number += 1
+                if not results_of(folder):
+                    break
         folder = Path(f"{usual}-{number}")
-
-
-def _has_results(folder: Path, allowed_marks: Iterable[str]) -> list[str]:
-    allowed = set(allowed_marks)
-    return [name for name in MARKS if name not in allowed and (folder / name).exists()]
+    return folder
 
 
 @contextmanager
@@ -150,8 +145,7 @@ def results_in(path: Path, record: Record, replace: bool) -> Iterator[None]:
     earlier = files_of(path)
     if replace and (path / LOG).exists():
         record.write(path, "not yet: its results are being written, or were when it was killed", replace=False)
-        for name in set(MARKS) & set(earlier):
-            _remove(path, name)
+        _remove(path, set(MARKS) & set(earlier))
     try:
         yield
     except BaseException as error:
@@ -163,13 +157,13 @@ def results_in(path: Path, record: Record, replace: bool) -> Iterator[None]:
                 path.rmdir()
         raise
     if replace:
-        for name in set(earlier) - set(record.files):
-            _remove(path, name)
+        _remove(path, set(earlier) - set(record.files))
     record.say("", f"written to {path}: {', '.join(record.files)}", sep="\n")
     record.write(path, "done", replace)
 
 
-def _remove(folder: Path, name: str) -> None:
-    """Take a file or folder of results away, if it is in the folder of results itself."""
-    if Path(name).name == name and name not in ("", ".", ".."):
-        remove(folder / name)
+def _remove(folder: Path, names: Iterable[str]) -> None:
+    """Take files or folders of results away that are in the folder of results itself."""
+    for name in names:
+        if Path(name).name == name and name not in ("", ".", ".."):
+            remove(folder / name)
