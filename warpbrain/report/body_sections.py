@@ -18,7 +18,7 @@ from warpbrain.report.files import LEFT, MILLIMETRES, TRUST, UNSEEN, SavedState
 from warpbrain.report.page import Section, Top, document, part
 from warpbrain.report.page.figures import TEXT, colour_bar, data, inlined, panels
 from warpbrain.report.page.scene import Arrows, Field, View, viewer
-from warpbrain.report.picture import Moved, Pictures, annotations_of, arrow_colours, heading, round_factor, scene_of
+from warpbrain.report.picture import Moved, Pictures, arrow_colours, heading, notes_on, round_factor, scene_of
 from warpbrain.report.slices import cut
 from warpbrain.report.views import BLUE, QUIET, VERMILLION
 
@@ -34,15 +34,15 @@ def before_and_after(pictures: Pictures | str) -> Markup:
     scene = pictures.scene
     stops = ", ".join(f"rgb({r} {g} {b})" for r, g, b in scene.table[[*range(0, 256, 32), 255]].tolist())
     legend = [*views.tissue_legend(pictures.names, pictures.whole, pictures.resected), *arrow_colours(scene).items()]
-    drawn = [_panel(pictures, name) for name in pictures.images]
+    drawn = [_panel(pictures, name, image) for name, image in pictures.images.items()]
     return part("pictures", drawn, f"{scene.top:.3g}", stops, legend, len(scene.where))
 
 
-def _panel(pictures: Pictures, name: str) -> dict[str, Any]:
+def _panel(pictures: Pictures, name: str, image: Any) -> dict[str, Any]:
     """A picture with what is written on it, as a drawing that has any size."""
     from PIL import Image
 
-    notes, image = annotations_of(pictures, name), pictures.images[name]
+    notes = notes_on(pictures.cameras[name], image.shape, pictures.whole)
     height, width = image.shape[:2]
     scale = width / (2.0 * notes.across)
 

@@ -6,23 +6,20 @@ Three cuts as a radiologist holds them, and the body from outside with a corner 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
-from warpbrain.mesh import TetMesh, face_vectors
-from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
+from warpbrain.mesh import face_vectors
+from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.picture import Moved, cameras_of, notes_on, scene_of, show
-from warpbrain.report.rendering import BEFORE, Camera, RenderingError, render
+from warpbrain.report.rendering import BEFORE, RenderingError, render
 from warpbrain.report.slices import cut
 from warpbrain.report.summary import SET_TITLES
 from warpbrain.report.views import View
@@ -55,79 +52,39 @@ _LABEL = 30  # characters of a name in the legend
 _LISTED = 12  # tissues, and recordings, in the legend
 
 
-@dataclass(frozen=True)
 class _Scene:
     """A case as all panels draw it."""
 
-    case: Case
-
-    @property
-    def mesh(self) -> TetMesh:
-        return self.case.mesh
-
-    @cached_property
-    def resected(self) -> Bools:
-        resection = self.case.resection
-        return views.resected_elements(self.mesh, *([] if resection is None else [resection.elements]))
-
-    @cached_property
-    def names(self) -> dict[int, str]:
-        """Of the tissues, by label."""
-        return {label: tissue.name for label, tissue in self.case.tissues.items()}
-
-    @cached_property
-    def colours(self) -> NDArray[np.str_]:
-        return views.element_colours(self.mesh, self.resected, self.names)
-
-    @cached_property
-    def extent(self) -> float:
-        """Largest side of the box around the body [m]."""
-        return float(np.ptp(self.mesh.points, axis=0).max())
-
-    @cached_property
-    def near(self) -> float:
-        """How far from a cut a node is still shown in it [m]: about half an element."""
-        edges = self.mesh.points[self.mesh.tetrahedra[:, [0, 0, 0, 1, 1, 2]]]
-        edges = edges - self.mesh.points[self.mesh.tetrahedra[:, [1, 2, 3, 2, 3, 3]]]
-        edge = float(np.median(np.linalg.norm(edges, axis=-1)))
-        # of a flat body, not from one side to the other
-        return min(max(0.02 * self.extent, 0.4 * edge), 0.4 * float(np.ptp(self.mesh.points, axis=0).min()))
-
-    @property
-    def near_recorded(self) -> float:
-        """The same of what was recorded: farther, as it is sparser and is not on the outline."""
-        return 2.0 * self.near
-
-    @cached_property
-    def node_sets(self) -> list[tuple[str, Bools]]:
-        """The node sets that are drawn, the largest first, so that the small ones lie on top."""
-        ordered = sorted(self.mesh.node_sets.items(), key=lambda item: -int(item[1].sum()))
-        # beyond what can be told apart, the smaller ones say more
-        return ordered[-len(_SET_STYLES) :]
-
-    @cached_property
-    def tracked(self) -> list[PointsRecording]:
-        return [r for r in self.case.recordings if isinstance(r, PointsRecording)]
-
-    @cached_property
-    def surfaces(self) -> list[SurfaceRecording]:
-        return [r for r in self.case.recordings if isinstance(r, SurfaceRecording)]
-
-    @property
-    def arrows(self) -> int:
-        """How many there are."""
-        return sum(recording.count for recording in self.tracked)
-
-    @cached_property
-    def enlarged(self) -> float:
-        """Factor of the arrows: 1 if the longer ones can be seen at their true length."""
-        sizes = [np.linalg.norm(r.displacement, axis=1) for r in self.tracked]
-        longest = float(np.percentile(np.concatenate(sizes), 95)) if sizes and sum(map(len, sizes)) else 0.0
-        wanted = 0.04 * self.extent
-        if longest == 0.0 or longest >= wanted:
-            return 1.0
-        decade = 10.0 ** np.floor(np.log10(wanted / longest))
-        return float(next(s * decade for s in (1.0, 2.0, 5.0, 10.0, 20.0) if s * decade * longest >= wanted))
+    def __init__(self, case: Case) -> None:
+        mesh, resection = case.mesh, case.resection
+        self.case, self.mesh = case, mesh
+        self.resected = views.resected_elements(mesh, *([] if resection is None else [resection.elements]))
+        #: Of the tissues, by label.
+        self.names = {label: tissue.name for label, tissue in case.tissues.items()}
+        self.colours = views.element_colours(mesh, self.resected, self.names)
+        #: Sides of the box around the body [m].
+        self.box = np.ptp(mesh.points, axis=0)
+        extent = float(self.box.max())
+        edges = mesh.points[mesh.tetrahedra[:, [0, 0, 0, 1, 1, 2]]]
+        edge = float(np.median(np.linalg.norm(edges - mesh.points[mesh.tetrahedra[:, [1, 2, 3, 2, 3, 3]]], axis=-1)))
+        #: How far from a cut a node is still shown in it [m]: about half an element; of a flat body, not from one side
+        #: to the other. And the same of what was recorded: farther, as it is sparser and is not on the outline.
+        self.near = min(max(0.02 * extent, 0.4 * edge), 0.4 * float(self.box.min()))
+        self.near_recorded = 2.0 * self.near
+        #: The node sets that are drawn, the largest first, so that the small ones lie on top; beyond what can be told
+        #: apart, the smaller ones say more.
+        self.node_sets = sorted(mesh.node_sets.items(), key=lambda item: -int(item[1].sum()))[-len(_SET_STYLES) :]
+        self.tracked = [r for r in case.recordings if isinstance(r, PointsRecording)]
+        self.surfaces = [r for r in case.recordings if isinstance(r, SurfaceRecording)]
+        #: How many arrows there are, and their factor: 1 if the longer ones can be seen at their true length.
+        self.arrows = sum(recording.count for recording in self.tracked)
+        self.enlarged = 1.0
+        sizes = np.concatenate([np.zeros(0), *(np.linalg.norm(r.displacement, axis=1) for r in self.tracked)])
+        longest, wanted = float(np.percentile(sizes, 95)) if len(sizes) else 0.0, 0.04 * extent
+        if 0.0 < longest < wanted:
+            decade = 10.0 ** np.floor(np.log10(wanted / longest))
+            steps = (step * decade for step in (1.0, 2.0, 5.0, 10.0, 20.0))
+            self.enlarged = float(next(factor for factor in steps if factor * longest >= wanted))
 
 
 def write_case_picture(path: Path, case: Case) -> str:
@@ -151,13 +108,10 @@ def _headline(case: Case) -> str:
     size = f"{len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra, {1e6 * mesh.volume:.4g} cm3"
     recorded = ", ".join(f"{r.name} ({r.kind}, {r.count})" for r in case.recordings) or "nothing"
     title, recordings = (
-        "\n".join(textwrap.wrap(text, _CHARACTERS, max_lines=2, placeholder=" ..."))
+        textwrap.fill(text, _CHARACTERS, max_lines=2, placeholder=" ...")
         for text in (case.title, f"recorded: {recorded}")
     )
     return "\n".join((title, f"{origin}; {size}", recordings))
-
-
-# the cuts ----------------------------------------------------------------------------------------------------------
 
 
 def _draw_cut(axes: Any, scene: _Scene, view: View, place: float) -> None:
@@ -179,7 +133,7 @@ def _draw_cut(axes: Any, scene: _Scene, view: View, place: float) -> None:
         _arrows(axes, views.in_view(start), views.in_view(along), number)
         shown += int(close.sum())
     # room for letters and a scale bar beside a body with corners
-    views.frame(axes, mesh, view, 0.085 * MILLIMETRES * scene.extent)
+    views.frame(axes, mesh, view, 0.085 * MILLIMETRES * float(scene.box.max()))
     counted = f"   ({shown} of {scene.arrows} arrows)" if scene.arrows else ""
     axes.set_title(views.heading(mesh, view, place) + counted, fontsize=11)
 
@@ -198,23 +152,10 @@ def _arrows(axes: Any, start: Floats, along: Floats, number: int) -> None:
     from matplotlib.patheffects import withStroke
 
     axes.quiver(
-        *start.T,
-        *along.T,
-        angles="xy",
-        scale_units="xy",
-        scale=1.0,
-        units="inches",
-        width=0.022,
-        headwidth=3.6,
-        headlength=4.0,
-        headaxislength=3.6,
-        color=_ARROWS[number % len(_ARROWS)],
+        *start.T, *along.T, angles="xy", scale_units="xy", scale=1.0, units="inches", width=0.022, headwidth=3.6,
+        headlength=4.0, headaxislength=3.6, color=_ARROWS[number % len(_ARROWS)], zorder=5,
         path_effects=[withStroke(linewidth=1.3, foreground="white")],
-        zorder=5,
-    )
-
-
-# the body cut open -------------------------------------------------------------------------------------------------
+    )  # fmt: skip
 
 
 def _draw_open(axes: Any, scene: _Scene) -> str:
@@ -223,8 +164,15 @@ def _draw_open(axes: Any, scene: _Scene) -> str:
 
     arrows = f"; all {scene.arrows} arrows, seen through the tissue" if scene.arrows else ""
     axes.set_title(f"a corner cut out{arrows}", fontsize=11)
+    # the anatomy, and what is taken out of it in red, seen from where there is most to see
+    left = scene.mesh.without(scene.resected)[0] if scene.resected.any() else scene.mesh
+    recorded: list[PointsRecording | SurfaceRecording] = [*scene.tracked, *scene.surfaces]
+    where = np.concatenate([np.zeros((0, 3)), *(recording.points for recording in recorded)])
+    still = Moved(where, *np.zeros((2, *where.shape)))
+    drawn = scene_of(scene.mesh, left, np.zeros_like(left.points), scene.names, still)
+    camera = cameras_of(drawn)[BEFORE]
     try:
-        image, camera = _render(scene)
+        image = render(drawn, {BEFORE: camera}, _SIZE)[BEFORE]
     except RenderingError as error:
         views.bare(axes)
         axes.text(0.5, 0.5, textwrap.fill(str(error), 50), ha="center", va="center", transform=axes.transAxes)
@@ -245,21 +193,6 @@ def _draw_open(axes: Any, scene: _Scene) -> str:
         start, end = at(tracked.points), at(tracked.points + scene.enlarged * tracked.displacement)
         _arrows(axes, start, end - start, number)
     return ""
-
-
-def _render(scene: _Scene) -> tuple[Any, Camera]:
-    """The anatomy, and what is taken out of it in red, seen from where there is most to see; and from where that is."""
-    whole = scene.mesh
-    left = whole.without(scene.resected)[0] if scene.resected.any() else whole
-    recorded: list[PointsRecording | SurfaceRecording] = [*scene.tracked, *scene.surfaces]
-    where = np.concatenate([np.zeros((0, 3)), *(recording.points for recording in recorded)])
-    still = np.zeros_like(where)
-    drawn = scene_of(whole, left, np.zeros_like(left.points), scene.names, Moved(where, still, still))
-    camera = cameras_of(drawn)[BEFORE]
-    return render(drawn, {BEFORE: camera}, _SIZE)[BEFORE], camera
-
-
-# the legend --------------------------------------------------------------------------------------------------------
 
 
 def _draw_legend(figure: Any, scene: _Scene) -> None:
@@ -297,13 +230,9 @@ def _sets(scene: _Scene) -> list[tuple[Any, str]]:
 def _recordings(scene: _Scene) -> list[tuple[Any, str]]:
     arrow = {"marker": ">", "linestyle": "-", "linewidth": 1.8, "markersize": 6.0}
     cross = {"marker": "x", "markersize": 5.0}
-    kinds: tuple[tuple[Sequence[Recording], Any, tuple[str, ...]], ...]
-    kinds = ((scene.tracked, arrow, _ARROWS), (scene.surfaces, cross, _CROSSES))
-    entries = [
-        (_mark(color=colours[number % len(colours)], **style), f"{_short(recording.name)}: {recording.count}")
-        for recordings, style, colours in kinds
-        for number, recording in enumerate(recordings)
-    ]
+    styles = [(r, arrow, colour) for r, colour in zip(scene.tracked, cycle(_ARROWS), strict=False)]
+    styles += [(r, cross, colour) for r, colour in zip(scene.surfaces, cycle(_CROSSES), strict=False)]
+    entries = [(_mark(color=colour, **style), f"{_short(r.name)}: {r.count}") for r, style, colour in styles]
     length = "true length" if scene.enlarged == 1.0 else f"drawn {scene.enlarged:g} times as long"
     return _first(entries) + ([(_mark(), f"arrows: {length}")] if scene.tracked else [])
 

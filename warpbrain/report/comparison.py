@@ -4,7 +4,7 @@ them better than nothing at all would, and what of the errors is likely to be th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,9 +33,6 @@ WORSE, IN_PART, NO_NEARER, NEARER, UNKNOWN = (
 def error_text(value: float, unit: str) -> str:
     """An error as people read it: micrometres of lengths, three digits of what has any size."""
     return tabled(value) if unit == "mm" else f"{value:.3g}"
-
-
-# errors at recordings -------------------------------------------------------------------------------------------------
 
 
 def describe_comparisons(observed: Observed) -> dict[str, Any]:
@@ -96,12 +93,8 @@ def recorded_rows(compared: Sequence[Mapping[str, Any]]) -> list[list[Any]]:
 
 def write_comparisons(path: Path, case: Case, observed: Observed) -> None:
     """Write every compared row: what was recorded, what was computed and the difference, in mm or N, axes RAS."""
-    write_csv(path, _rows(case, observed))
-
-
-def _rows(case: Case, observed: Observed) -> Iterator[list[Any]]:
     vectors = [f"{quantity}_{axis}" for quantity in ("recorded", "computed", "difference") for axis in "xyz"]
-    yield ["recording", "kind", "unit", "row", "id", "x_mm", "y_mm", "z_mm", *vectors]
+    rows = [["recording", "kind", "unit", "row", "id", "x_mm", "y_mm", "z_mm", *vectors]]
     recordings = {recording.name: recording for recording in case.recordings}
     for comparison in observed.comparisons:
         factor, unit = SHOWN[comparison.unit]
@@ -116,14 +109,13 @@ def _rows(case: Case, observed: Observed) -> Iterator[list[Any]]:
                 # unpaired: only the distance to the surface means something
                 recorded = np.full(3, np.nan)
             numbers = [*_numbers(recorded), *_numbers(recorded - difference), *_numbers(difference)]
-            yield [comparison.name, comparison.kind, unit, row, "" if ids is None else ids[row], *place, *numbers]
+            head = [comparison.name, comparison.kind, unit, row, "" if ids is None else ids[row]]
+            rows.append([*head, *place, *numbers])
+    write_csv(path, rows)
 
 
 def _numbers(values: Any) -> list[str]:
     return ["" if np.isnan(value) else f"{value:.6g}" for value in values]
-
-
-# better or worse than nothing at all ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -139,14 +131,9 @@ class Explained:
     sentences: tuple[str, ...]
 
 
-def explained_of(compared: Sequence[Mapping[str, Any]]) -> Explained:
+def explained_of(compared: Sequence[dict[str, Any]]) -> Explained:
     """Whether a simulation explains what `describe_comparisons` compared it with."""
-    return explained(
-        [
-            {**entry, "before": entry["before"]["root_mean_square"], "after": entry["after"]["root_mean_square"]}
-            for entry in compared
-        ]
-    )
+    return explained([each | {key: each[key]["root_mean_square"] for key in ("before", "after")} for each in compared])
 
 
 def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation") -> Explained:
@@ -171,9 +158,6 @@ def explained(entries: Sequence[Mapping[str, Any]], what: str = "this simulation
     return Explained(verdict, before, after, (*lines("run.txt", "explained", what, before, after, gone), *sentences))
 
 
-# the error of the mesh ------------------------------------------------------------------------------------------------
-
-
 def describe_mesh_error(error: MeshError, elements: str, observed: Observed, without: Observed) -> dict[str, Any]:
     """The estimate with units, for elements of a run.
 
@@ -186,18 +170,16 @@ def describe_mesh_error(error: MeshError, elements: str, observed: Observed, wit
         references.append(
             "such elements of half the size, whose difference is taken for three quarters of what is left"
         )
-    recordings = []
-    for here, there in zip(observed.comparisons, without.comparisons, strict=True):
-        factor, unit = SHOWN[here.unit]
-        recordings.append(
-            {
-                "name": here.name,
-                "unit": unit,
-                **_sizes(np.nan_to_num(there.residuals_after - here.residuals_after), factor),
-                "root_mean_square_after": factor * here.after.root_mean_square,
-                "root_mean_square_without_it": factor * there.after.root_mean_square,
-            }
-        )
+    recordings = [
+        {
+            "name": here.name,
+            "unit": SHOWN[here.unit][1],
+            **_sizes(np.nan_to_num(there.residuals_after - here.residuals_after), SHOWN[here.unit][0]),
+            "root_mean_square_after": SHOWN[here.unit][0] * here.after.root_mean_square,
+            "root_mean_square_without_it": SHOWN[here.unit][0] * there.after.root_mean_square,
+        }
+        for here, there in zip(observed.comparisons, without.comparisons, strict=True)
+    ]
     return {
         "how": f"compared with {' and '.join(references)}",
         "displacement_mm": _sizes(error.u, MILLIMETRES),

@@ -12,7 +12,7 @@ import numpy as np
 from warpbrain.atomic import write_csv
 from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.estimation.parameters import Parameter, Parameters
-from warpbrain.estimation.posterior import INTERVALS, Marginal, OverallErrors, Posterior, Prediction
+from warpbrain.estimation.posterior import INTERVALS, Marginal, Posterior, Prediction
 from warpbrain.estimation.registration import registration_of
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report.comparison import SHOWN, error_text
@@ -36,10 +36,10 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
         {"gain": gain, "variance_left": 1.0 / (1.0 + gain), "told": constrained, "undone": undone}
         for gain, constrained, undone in each
     ]
-    drawn = None
-    if chain is not None:
-        numbers = picked(chain, equilibria="solves", accepted="accepted", effective_draws="effective")
-        drawn = {"draws": len(chain.theta), **numbers}
+    drawn = chain and {"draws": len(chain.theta)} | picked(
+        chain, equilibria="solves", accepted="accepted", effective_draws="effective"
+    )
+    errors_mm = {f"root_mean_square_{key}_mm": key for key in ("before", "after", "of_run")}
     return {
         "case": picked(case, "name", "title", "origin", "assumptions"),
         "inputs_sha256": fingerprints(case),
@@ -65,7 +65,11 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             for mode, probability in zip(posterior.modes, posterior.mode_probabilities, strict=True)
         ],
         "predictions": [_describe_prediction(prediction) for prediction in posterior.predictions],
-        "all_recordings": [picked(errors, "role", "count") | _errors_mm(errors) for errors in posterior.overall_errors],
+        "all_recordings": [
+            picked(errors, "role", "count")
+            | {name: MILLIMETRES * getattr(errors, key) for name, key in errors_mm.items()}
+            for errors in posterior.overall_errors
+        ],
         "likelihood": {
             "density": "normal, shared by neighbours" + ("" if noise.outliers is None else ", with gross errors"),
             "degrees_of_freedom": None,
@@ -82,17 +86,22 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
             **picked(prior, seed="seed", rejection_rate="rejection_rate", distance_from_gaussian="distances"),
         },
         "gauss_newton": {"converged": best.converged, "history": [vars(step) for step in best.history]},
-        "remarks": remarks_of(posterior),
+        "remarks": [
+            *posterior.remarks,
+            # what a user must know of recordings that no parameters explain
+            *(
+                f"{int(each.gross.sum())} of {len(each.rows)} rows of '{each.name}' are gross errors, farther from the "
+                "prediction than its noise allows: what moved them is not in this case"
+                for each in posterior.predictions
+                if each.gross.mean() > _UNEXPLAINED
+            ),
+        ],
         "equilibria": dict(posterior.solves),
         "seconds": dict(posterior.seconds),
         "seed": options.seed,
         "device": device,
         "versions": machine(),
     }
-
-
-def _errors_mm(errors: OverallErrors) -> dict[str, float]:
-    return {f"root_mean_square_{key}_mm": MILLIMETRES * getattr(errors, key) for key in ("before", "after", "of_run")}
 
 
 def _describe(marginal: Marginal, posterior: Posterior) -> dict[str, Any]:
@@ -124,13 +133,9 @@ def _parameter(parameter: Parameter, parameters: Parameters) -> dict[str, Any]:
         "labels": list(parameters.labels[tissue]),
         "group": parameters.groups[tissue],
         "law": parameters.laws_of[tissue],
-        "name": _name(parameter),
+        "name": "shear modulus" if parameter.is_modulus else parameter.coordinate.name,
         "unit": "Pa" if parameter.is_modulus else "1",
     }
-
-
-def _name(parameter: Parameter) -> str:
-    return "shear modulus" if parameter.is_modulus else parameter.coordinate.name
 
 
 def _shown(parameter: Parameter) -> Callable[[float], float]:
@@ -164,7 +169,10 @@ def describe_nothing_else(averaged: AveragedTissue) -> dict[str, Any]:
 
 def _describe_prediction(prediction: Prediction) -> dict[str, Any]:
     factor, unit = SHOWN[prediction.unit]
-    sigma = None if prediction.sigma is None else factor * float(np.sqrt(np.mean(prediction.sigma**2)))
+    sigma = left = None
+    if prediction.sigma is not None:
+        variance = float(np.mean(prediction.sigma**2))
+        sigma, left = factor * math.sqrt(variance), factor * math.sqrt(prediction.after.shape[1] * variance)
     return {
         **picked(prediction, "name", "kind", "role"),
         "unit": unit,
@@ -173,21 +181,12 @@ def _describe_prediction(prediction: Prediction) -> dict[str, Any]:
         "root_mean_square_after": factor * prediction.error_after,
         "root_mean_square_of_run": factor * prediction.run.after.root_mean_square,
         "noise_sigma": sigma,
-        "noise_root_mean_square": noise_of(prediction),
+        "noise_root_mean_square": left,
         "prediction_standard_deviation": factor * float(np.sqrt(np.mean(prediction.deviation**2))),
         "gross_errors": prediction.rows[prediction.gross],
-        "coverage": None
-        if prediction.coverage is None
-        else {f"{100 * p:g} %": part for p, part in zip(INTERVALS, prediction.coverage, strict=True)},
+        "coverage": prediction.coverage
+        and {f"{100 * p:g} %": part for p, part in zip(INTERVALS, prediction.coverage, strict=True)},
     }
-
-
-def noise_of(prediction: Prediction) -> float | None:
-    """Root mean square [mm or N] that independent noise alone would leave."""
-    if prediction.sigma is None:
-        return None
-    size = prediction.after.shape[1]
-    return SHOWN[prediction.unit][0] * math.sqrt(size * float(np.mean(prediction.sigma**2)))
 
 
 def describe_discretisation(posterior: Posterior) -> dict[str, Any] | None:
@@ -220,16 +219,6 @@ def describe_registration(posterior: Posterior) -> dict[str, Any] | None:
         "turn_degrees": [math.degrees(value) for _, value, _ in registration[3:]],
         "turn_standard_deviation_degrees": [math.degrees(deviation) for _, _, deviation in registration[3:]],
     }
-
-
-def remarks_of(posterior: Posterior) -> list[str]:
-    """With what a user must know of recordings that no parameters explain."""
-    return list(posterior.remarks) + [
-        f"{int(prediction.gross.sum())} of {len(prediction.rows)} rows of '{prediction.name}' are gross errors, "
-        "farther from the prediction than its noise allows: what moved them is not in this case"
-        for prediction in posterior.predictions
-        if prediction.gross.mean() > _UNEXPLAINED
-    ]
 
 
 # as printed and on the page -------------------------------------------------------------------------------------------

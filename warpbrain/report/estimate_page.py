@@ -16,11 +16,11 @@ from warpbrain.inference.calibration import percent
 from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view, fields_of, known_displacement
-from warpbrain.report.comparison import SHOWN, Explained, explained
+from warpbrain.report.comparison import SHOWN, explained
 from warpbrain.report.estimate import averaged_row, parameter_row, prediction_row
 from warpbrain.report.files import MILLIMETRES, read_state
 from warpbrain.report.page import Top, document, sections_of
-from warpbrain.report.page.figures import NARROW, inlined
+from warpbrain.report.page.figures import inlined, side_by_side
 from warpbrain.report.picture import Moved, Pictures, begin_pictures, draw
 from warpbrain.report.run_page import BADGES
 from warpbrain.report.summary import left_out
@@ -31,21 +31,20 @@ from warpbrain.simulation.of_case import model_of
 _LIKELY = 0.01
 
 
-def judged_of(summary: Mapping[str, Any]) -> Explained:
-    """Whether an estimate explains its recordings better than no motion at all."""
-    entries = [
-        {**prediction, "before": prediction["root_mean_square_before"], "after": prediction["root_mean_square_after"]}
-        for prediction in summary["predictions"]
-    ]
-    return explained(entries, "this estimate")
-
-
 def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Posterior) -> Pictures | str:
     """Write `deformation.png` and `report.html` beside `state.vtu`; `summary` is what `estimate.json` holds.
 
     Returns the pictures, or why there are none.
     """
-    case, judged, nothing = summary["case"], judged_of(summary), summary["nothing_else"]
+    case, nothing = summary["case"], summary["nothing_else"]
+    # whether the estimate explains its recordings better than no motion at all
+    judged = explained(
+        [
+            each | {key: each[f"root_mean_square_{key}"] for key in ("before", "after")}
+            for each in summary["predictions"]
+        ],
+        "this estimate",
+    )
     whole, state = posterior.case.mesh, read_state(folder / "state.vtu")
     # where the estimate, with its nuisances, has points that were recorded
     moved = Moved.of(posterior.case.recordings, ((p.name, p.rows, p.before, p.after) for p in posterior.predictions))
@@ -53,7 +52,6 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     subtitles = ["the most probable state of the estimate", *judged.sentences]
     begun = begin_pictures(whole, state.mesh, state.u, titles, moved)
     places = views.places(whole)
-    tissue = [parameter_row(parameter) for parameter in summary["parameters"]]
     agreement = None
     if any(prediction.kind != "surface" for prediction in posterior.predictions):
         agreement = inlined(lambda narrow: agreement_figure(posterior, narrow))
@@ -61,7 +59,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     pictures = draw(folder / "deformation.png", begun, case["title"], subtitles)
     sections, facts = sections_of(
         "estimate.html", summary=summary, judged=judged, agreement=agreement,
-        tissue=tissue,
+        tissue=[parameter_row(parameter) for parameter in summary["parameters"]],
         densities=inlined(lambda narrow: densities_figure(posterior, narrow)),
         causes=[[cause["name"], percent(cause["probability"])] for cause in causes],
         averaged=[] if nothing is None else [
@@ -89,17 +87,12 @@ _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 def densities_figure(posterior: Posterior, narrow: bool) -> Any:
     """The density of each parameter before and after, one below the other for a narrow window."""
     count = len(posterior.marginals)
-    figure, axes = _side_by_side(count, narrow, 3.0, (max(4.6 * count, 6.4), 3.8))
+    figure, axes = side_by_side(count, narrow, 3.0, (max(4.6 * count, 6.4), 3.8))
     for column, marginal in enumerate(posterior.marginals):
         draws = None if posterior.chain is None else posterior.chain.theta[:, column]
         _draw_marginal(axes[column], marginal, posterior.prior.theta[:, column], draws)
     axes[0].legend(fontsize=9, frameon=False)
     return figure
-
-
-def _side_by_side(count: int, narrow: bool, height: float, size: tuple[float, float]) -> tuple[Any, list[Any]]:
-    """Panels, one below the other on a narrow window, each of that height [inch]."""
-    return views.panels(count, 1, (NARROW, height * count)) if narrow else views.panels(1, count, size)
 
 
 def _draw_marginal(axes: Any, marginal: Marginal, prior: Floats, draws: Floats | None) -> None:
@@ -133,11 +126,9 @@ def agreement_figure(posterior: Posterior, narrow: bool) -> Any:
     # a distance to a surface has no sign that was recorded: before, after is all there is to compare
     shown = [prediction for prediction in posterior.predictions if prediction.kind != "surface"]
     units = list(dict.fromkeys(prediction.unit for prediction in shown)) or ["m"]
-    figure, axes = _side_by_side(len(units), narrow, 5.0, (5.4 * len(units), 6.2))
-    for column, unit in enumerate(units):
-        _draw_pairs(
-            axes[column], [prediction for prediction in shown if prediction.unit == unit], unit, 1 if narrow else 2
-        )
+    figure, axes = side_by_side(len(units), narrow, 5.0, (5.4 * len(units), 6.2))
+    for panel, unit in zip(axes, units, strict=True):
+        _draw_pairs(panel, [prediction for prediction in shown if prediction.unit == unit], unit, 1 if narrow else 2)
     return figure
 
 
@@ -147,15 +138,12 @@ def _draw_pairs(axes: Any, predictions: Sequence[Prediction], unit: str, columns
     for number, prediction in enumerate(predictions):
         observed, predicted = factor * prediction.before, factor * (prediction.before - prediction.after)
         ends += [float(observed.min()), float(observed.max()), float(predicted.min()), float(predicted.max())]
-        label = f"{prediction.name} ({prediction.role})"
+        label, gross = f"{prediction.name} ({prediction.role})", prediction.gross
         style = {"s": 12, "marker": _MARKERS[number % 6], "linewidths": 0.6}
-        good, gross = ~prediction.gross, f"{label}: gross errors"
         hollow = {"facecolors": "none", "edgecolors": _COLOURS[number % 6]}
-        axes.scatter(predicted[good], observed[good], label=label, **hollow, **style)
-        if prediction.gross.any():
-            axes.scatter(
-                predicted[prediction.gross], observed[prediction.gross], color=VERMILLION, label=gross, **style
-            )
+        axes.scatter(predicted[~gross], observed[~gross], label=label, **hollow, **style)
+        if gross.any():
+            axes.scatter(predicted[gross], observed[gross], color=VERMILLION, label=f"{label}: gross errors", **style)
     margin = 0.05 * (max(ends) - min(ends) or 1.0)
     ends = [min(ends) - margin, max(ends) + margin]
     axes.plot(ends, ends, color="0.4", linewidth=0.8)

@@ -89,9 +89,10 @@ def plain(value: Any) -> Any:
     return value
 
 
-def picked(instance: Any, *names: str, **renamed: str) -> dict[str, Any]:
-    """Attributes of an object for JSON, some by other names than their own."""
-    return {key: getattr(instance, name) for key, name in ({name: name for name in names} | renamed).items()}
+def picked(instance: Any, *names: str, **renamed: str) -> Any:
+    """Attributes of an object for JSON, a dictionary, some by other names than their own; None of None."""
+    keys = dict(zip(names, names, strict=True)) | renamed
+    return None if instance is None else {key: getattr(instance, name) for key, name in keys.items()}
 
 
 def fingerprints(case: Case) -> dict[str, str]:

@@ -64,12 +64,12 @@ def draw_studies(model: Process, group: str | None = None) -> Any:
         studies = _studies_of(model, name)
         if group is not None:
             names = [_cut(s.name if s.number is None else f"{s.number}  {s.name}", _LONG) for s in studies]
-            _draw_studies(axes, studies, _limits(studies), names, _TEXT)
+            _draw_studies(axes, studies, studies, names, _TEXT)
             return
         # one scale a row, so that its groups can be compared
         row = [study for study in model.studies if study.group.split("/")[0] == name.split("/")[0]]
         names = [_cut(s.name, _SHORT) if s.number is None else str(s.number) for s in studies]
-        _draw_studies(axes, studies, _limits(row), names, _SMALL - 1.0)
+        _draw_studies(axes, studies, row, names, _SMALL - 1.0)
 
     figure = _groups(model, group, 6.8, draw, [_ENERGY])
     if group is None:
@@ -85,7 +85,8 @@ def draw_extrapolation(model: Process, other: Process, group: str | None = None)
         return list(np.exp(np.clip(process.curve(name, _STRETCHES, (-MOST, 0.0, MOST)), -500.0, 500.0)))
 
     def draw(name: str, axes: Any) -> None:
-        axes.axvspan(*_stretches_of(model, name), color=_GROUND, linewidth=0.0, zorder=0)
+        studies = _studies_of(model, name)
+        axes.axvspan(*_stretches_of(studies), color=_GROUND, linewidth=0.0, zorder=0)
         if name in other.groups:
             low, mean, high = curves(other, name)
             axes.fill_between(_STRETCHES, low, high, zorder=1, **_OTHER_BAND)
@@ -95,7 +96,7 @@ def draw_extrapolation(model: Process, other: Process, group: str | None = None)
         low, mean, high = curves(model, name)
         axes.fill_between(_STRETCHES, low, high, zorder=3, **_BAND)
         axes.plot(_STRETCHES, mean, zorder=5, **_MEAN)
-        for study in _studies_of(model, name):
+        for study in studies:
             at = np.linspace(*study.stretch, 101)
             axes.plot(at, study.energy(at) + OFFSET, zorder=6, **_THIN)
         axes.set_xlim(_STRETCHES[0], _STRETCHES[-1])
@@ -125,7 +126,8 @@ def draw_draws(model: Process, group: str | None = None, seed: int = 0) -> Any:
         return np.where(energy > 0.0, energy, np.nan)
 
     def draw(name: str, energy: Any, modulus: Any) -> None:
-        low, high = _stretches_of(model, name)
+        studies = _studies_of(model, name)
+        low, high = _stretches_of(studies)
         l = _sides(low, high, _STEPS)
         bands = list(energies(model.curve(name, l, (-MOST, -HALF, 0.0, HALF, MOST))))
         draws = [energies(model.draw([name], l, number, seed)[0]) for number in range(_DRAWS)]
@@ -137,7 +139,7 @@ def draw_draws(model: Process, group: str | None = None, seed: int = 0) -> Any:
             least, less, mean, more, most = curves[:5]
             axes.fill_between(l, least, most, **_95)
             axes.fill_between(l, less, more, **_50)
-            for study in _studies_of(model, name):
+            for study in studies:
                 inside = np.where((l >= study.stretch[0]) & (l <= study.stretch[1]), scale, np.nan)
                 curves.append(inside * study.energy(l))
                 axes.plot(l, curves[-1], **_STUDY)
@@ -210,21 +212,23 @@ def _groups(
     return figure
 
 
-def _studies_of(model: Process, group: str) -> tuple[Study, ...]:
-    return tuple(study for study in model.studies if study.group == group)
+def _studies_of(model: Process, group: str) -> list[Study]:
+    return [study for study in model.studies if study.group == group]
 
 
-def _stretches_of(model: Process, group: str) -> tuple[float, float]:
-    """The stretches (low, high) that the studies of a group speak for, all together."""
-    ranges = [study.stretch for study in _studies_of(model, group)]
-    return min(low for low, _ in ranges), max(high for _, high in ranges)
+def _stretches_of(studies: Sequence[Study]) -> tuple[float, float]:
+    """The stretches (low, high) that studies speak for, all together."""
+    return min(study.stretch[0] for study in studies), max(study.stretch[1] for study in studies)
 
 
 def _draw_studies(
-    axes: Any, studies: Sequence[Study], limits: tuple[float, float], names: Sequence[str], size: float
+    axes: Any, studies: Sequence[Study], scale_of: Sequence[Study], names: Sequence[str], size: float
 ) -> None:
-    low = min(study.stretch[0] for study in studies)
-    high = max(study.stretch[1] for study in studies)
+    """Energies of studies with their names beside them, on the scale on which others are shown, too."""
+    low, high = _stretches_of(studies)
+    shown = [(study, np.array(study.stretch)) for study in scale_of]
+    nearest = min(float(study.energy(1.0 + _SHOWN * (end - 1.0)).min()) for study, end in shown)
+    limits = 0.7 * nearest, 1.6 * max(float(study.energy(end).max()) for study, end in shown)
     ends = []
     for index, (study, name) in enumerate(zip(studies, names, strict=True)):
         l = _sides(*study.stretch, 150)
@@ -258,13 +262,6 @@ def _moved_apart(places: Floats, apart: float) -> Floats:
         moved[1:] += 0.5 * lack
         moved = np.clip(moved, 0.5 * apart, 1.0 - 0.5 * apart)
     return moved
-
-
-def _limits(studies: Sequence[Study]) -> tuple[float, float]:
-    """Energies (low, high) [Pa] that are shown of studies."""
-    ends = [(study, np.array(study.stretch)) for study in studies]
-    nearest = min(float(study.energy(1.0 + _SHOWN * (end - 1.0)).min()) for study, end in ends)
-    return 0.7 * nearest, 1.6 * max(float(study.energy(end).max()) for study, end in ends)
 
 
 def _cut(text: str, length: int) -> str:

@@ -22,10 +22,7 @@ def asymmetry_lines(asymmetries: Sequence[Asymmetry], papers: Mapping[str, tuple
 def moduli_lines(moduli: Sequence[Moduli]) -> list[str]:
     """A line for each group and law; a modulus in brackets is that of a curve whose law is unstable."""
     middle = CURVES.index(0.0)
-    rows = [
-        (tissue, list(zip(tissue.fits, tissue.unstable, strict=True)), _law_text(tissue.fits[middle]))
-        for tissue in moduli
-    ]
+    rows = [(each, list(zip(each.fits, each.unstable, strict=True)), _law_text(each.fits[middle])) for each in moduli]
     return lines("gp.txt", "moduli", rows, max(len(tissue.group) for tissue in moduli), CURVES)
 
 
@@ -90,24 +87,20 @@ def write_laws(path: Path, first: Sequence[str], groups: Sequence[str], rows: Se
 
 def law_lines(first: Sequence[str], groups: Sequence[str], rows: Sequence[LawRow]) -> list[str]:
     """The table for the terminal: parameters and shear modulus of each group."""
-    head, over = list(first), [""] * len(first)
-    for group, fitted in zip(groups, rows[0].fits, strict=True):
-        names = _parameters(fitted)
-        head += names
-        over += [group, *[""] * (len(names) - 1)]
-    body = [
+    head, columns = list(first), []
+    for fitted in rows[0].fits:
+        columns.append(len(head))
+        head += _parameters(fitted)
+    table = [head] + [
         [*row.labels, *(f"{value:.5g}" for fitted in row.fits for value in (*fitted.values, fitted.shear_modulus))]
         for row in rows
     ]
-    widths = [max(10, *(len(line[i]) for line in [head, *body])) + 2 for i in range(len(head))]
+    widths = [max(10, *map(len, column)) + 2 for column in zip(*table, strict=True)]
     # a group stands above the first of its columns and may be longer than it
     above = ""
-    for place, name in enumerate(over):
-        start = sum(widths[: place + 1]) - len(head[place])
-        if name:
-            above = f"{above:<{start}}{name}"
-    lines = ("".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)) for line in [head, *body])
-    return [above, *lines]
+    for column, group in zip(columns, groups, strict=True):
+        above = f"{above:<{sum(widths[: column + 1]) - len(head[column])}}{group}"
+    return [above, *("".join(map(str.rjust, line, widths)) for line in table)]
 
 
 def redrawn_lines(draws: Sequence[DrawnLaws]) -> list[str]:

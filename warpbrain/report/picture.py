@@ -142,7 +142,8 @@ def cameras_of(scene: rendering.Scene) -> dict[str, rendering.Camera]:
     moved = scene.points + scene.exaggeration * scene.u
     everything = np.concatenate([scene.points, moved[np.unique(scene.tetrahedra[~scene.removed])]])
     tips = np.concatenate([everything, scene.where + scene.arrows * scene.recorded])
-    cameras = {}
+    x, y, z = np.eye(3)
+    directions = []
     for name, towards, points in (
         (rendering.BEFORE, [0.80, 0.85, 0.62], everything),
         (rendering.AFTER, [0.80, 0.85, 0.62], everything),
@@ -150,28 +151,23 @@ def cameras_of(scene: rendering.Scene) -> dict[str, rendering.Camera]:
     ):
         # what is above is above
         to_viewer = scene.side * towards
-        right = np.cross([0.0, 0.0, 1.0], to_viewer)
+        right = np.cross(z, to_viewer)
         right /= np.linalg.norm(right)
-        cameras[name] = _fitted(points, right, np.cross(to_viewer / np.linalg.norm(to_viewer), right))
-    x, y, z = np.eye(3)
-    for name, (right, up) in {
-        rendering.AXIAL: (-x, y),
-        rendering.CORONAL: (-x, z),
-        rendering.SAGITTAL: (-y, z),
-    }.items():
-        cameras[name] = _fitted(everything, right, up)
+        directions.append((name, points, right, np.cross(to_viewer / np.linalg.norm(to_viewer), right)))
+    directions.append((rendering.AXIAL, everything, -x, y))
+    directions.append((rendering.CORONAL, everything, -x, z))
+    directions.append((rendering.SAGITTAL, everything, -y, z))
+    cameras = {}
+    for name, points, right, up in directions:
+        flat, depth = points @ np.column_stack([right, up]), points @ np.cross(right, up)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        axes = np.column_stack([right, up, np.cross(right, up)])
+        centre = axes @ [*(0.5 * (low + high)), 0.5 * (depth.min() + depth.max())]
+        half_width, half_height = 0.5 * (high - low)
+        # room for letters and a scale bar
+        half_height = 1.14 * float(max(half_height, half_width * _SIZE[1] / _SIZE[0], 1e-3))
+        cameras[name] = rendering.Camera(right, up, centre, half_height)
     return cameras
-
-
-def _fitted(points: Floats, right: Floats, up: Floats) -> rendering.Camera:
-    flat = points @ np.column_stack([right, up])
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    towards = np.cross(right, up)
-    depth = points @ towards
-    centre = np.column_stack([right, up, towards]) @ [*(0.5 * (low + high)), 0.5 * (depth.min() + depth.max())]
-    across, high_ = 0.5 * (high - low)
-    # room for letters and a scale bar
-    return rendering.Camera(right, up, centre, 1.14 * float(max(high_, across * _SIZE[1] / _SIZE[0], 1e-3)))
 
 
 def draw(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -> Pictures | str:
@@ -190,7 +186,8 @@ def draw(path: Path, pictures: Pictures, title: str, subtitles: Sequence[str]) -
     scene = pictures.scene
     shown = {}
     for panel, name in zip(axes, pictures.cameras, strict=True):
-        shown[name] = show(panel, np.full((*_SIZE[::-1], 3), 255, np.uint8), annotations_of(pictures, name))
+        notes = notes_on(pictures.cameras[name], _SIZE[::-1], pictures.whole)
+        shown[name] = show(panel, np.full((*_SIZE[::-1], 3), 255, np.uint8), notes)
         panel.set_title(heading(pictures, name), fontsize=10)
     shades = ScalarMappable(cmap="viridis")
     shades.set_clim(0.0, scene.top)
@@ -226,10 +223,9 @@ def heading(pictures: Pictures, name: str) -> str:
         return "before\n"
     if name == rendering.AFTER:
         above = "after"
-    elif name == rendering.MOTION and len(scene.where):
-        above, factor = "recorded and computed", scene.arrows
     elif name == rendering.MOTION:
-        above = "how the surface moves"
+        above = "recorded and computed" if len(scene.where) else "how the surface moves"
+        factor = scene.arrows if len(scene.where) else factor
     else:
         view = next(view for view in views.VIEWS if view.axis == rendering.CUTS[name])
         above = views.heading(pictures.whole, view, float(scene.places[view.axis]) / MILLIMETRES)
@@ -249,11 +245,6 @@ class Annotations:
     lines: tuple[tuple[float, float, float, float], ...]
     #: Left end and height of the scale bar, its length, and the words.
     bar: tuple[float, float, float, str]
-
-
-def annotations_of(pictures: Pictures, name: str) -> Annotations:
-    """What is written on a picture."""
-    return notes_on(pictures.cameras[name], _SIZE[::-1], pictures.whole)
 
 
 def notes_on(

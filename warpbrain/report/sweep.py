@@ -10,7 +10,7 @@ import csv
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,8 @@ from warpbrain.report.views import BLACK, BLUE, VERMILLION
 
 #: Name of the file.
 TABLE = "sweep.csv"
+#: Of a tissue: estimate of its shear modulus, lower and upper end of its interval [Pa].
+Estimated = tuple[float, float, float]
 
 
 def columns(parameters: Parameters, fingerprint: str) -> list[str]:
@@ -82,10 +84,6 @@ def sweep_lines(sweep: Sweep) -> list[str]:
     return lines("estimate.txt", "sweep", len(sweep.points), factor * (best.error or 0.0), unit, list(laws), failed)
 
 
-#: Of a tissue: estimate of its shear modulus, lower and upper end of its interval [Pa].
-Estimated = tuple[float, float, float]
-
-
 def estimated_in(path: Path) -> dict[str, Estimated]:
     """Shear moduli of tissues, by name, that an `estimate.json` says; none if there is no such file.
 
@@ -123,19 +121,17 @@ def write_sweep_picture(path: Path, sweep: Sweep, title: str, estimated: Mapping
     views.save(figure, path)
 
 
-def _moduli(sweep: Sweep) -> Floats:
-    """Shear moduli [Pa] of every point, shape (n, tissues)."""
-    return np.array([[law.shear_modulus for law in sweep.parameters.laws(point.theta)] for point in sweep.points])
-
-
-def _errors(sweep: Sweep) -> Floats:
-    """Of every point (n,) in the unit that is shown; NaN without an equilibrium."""
+def _moduli_and_errors(sweep: Sweep, points: Sequence[SweepPoint]) -> tuple[Floats, Floats]:
+    """Shear moduli [Pa] of points (n, tissues), and their errors (n,) in the unit that is shown; NaN without an
+    equilibrium."""
+    moduli = [[law.shear_modulus for law in sweep.parameters.laws(point.theta)] for point in points]
     factor = SHOWN[sweep.unit][0]
-    return np.array([np.nan if point.error is None else factor * point.error for point in sweep.points])
+    return np.array(moduli), np.array([np.nan if point.error is None else factor * point.error for point in points])
 
 
 def _draw_curve(axes: Any, sweep: Sweep, estimated: Mapping[str, Estimated]) -> None:
-    moduli, errors = _moduli(sweep)[:, 0], _errors(sweep)
+    moduli, errors = _moduli_and_errors(sweep, sweep.points)
+    moduli = moduli[:, 0]
     order = np.argsort(moduli)
     axes.plot(moduli[order], errors[order], "o-", color=BLUE, markersize=5, label="sweep")
     best = int(np.nanargmin(errors))
@@ -151,33 +147,27 @@ def _draw_curve(axes: Any, sweep: Sweep, estimated: Mapping[str, Estimated]) -> 
 
 def _draw_surface(figure: Any, axes: Any, sweep: Sweep, estimated: Mapping[str, Estimated]) -> None:
     # of more than two tissues: the plane through the best point
-    inside = [point for point in sweep.points if point.k[2:] == sweep.best.k[2:]]
-    plane = Sweep(sweep.parameters, sweep.unit, tuple(sorted(inside, key=lambda point: point.k)))
-    size = len({point.k[0] for point in plane.points})
-    moduli = _moduli(plane)[:, :2].reshape(size, -1, 2)
-    errors = _errors(plane)
-    values = np.ma.masked_invalid(errors.reshape(size, -1))
+    plane = sorted((p for p in sweep.points if p.k[2:] == sweep.best.k[2:]), key=lambda point: point.k)
+    flat, errors = _moduli_and_errors(sweep, plane)
+    moduli = flat[:, :2].reshape(len({point.k[0] for point in plane}), -1, 2)
+    values = np.ma.masked_invalid(errors.reshape(len(moduli), -1))
     # far from the best the error says no more than that it is far
     top = min(float(values.max()), 3.0 * float(values.min()) + 1e-9)
     levels = np.linspace(float(values.min()), top, 13)
     filled = axes.contourf(moduli[..., 0], moduli[..., 1], values, levels=levels, cmap="viridis_r", extend="max")
     axes.contour(moduli[..., 0], moduli[..., 1], values, levels=levels[::2], colors="white", linewidths=0.5)
     solved = ~np.isnan(errors)
-    flat = moduli.reshape(-1, 2)
     axes.scatter(flat[solved, 0], flat[solved, 1], s=3, color="0.3", linewidths=0, label="sweep")
     if not solved.all():
         axes.scatter(flat[~solved, 0], flat[~solved, 1], s=14, marker="x", color="0.3", label="no equilibrium")
-    best = _moduli(Sweep(sweep.parameters, sweep.unit, (sweep.best,)))[0]
-    axes.plot(
-        best[0], best[1], "s", color=VERMILLION, markeredgecolor="white", markersize=10, label="best of the sweep"
-    )
+    best = flat[plane.index(sweep.best)]
+    axes.plot(*best[:2], "s", color=VERMILLION, markeredgecolor="white", markersize=10, label="best of the sweep")
     along, upwards = (estimated.get(tissue) for tissue in sweep.parameters.tissues[:2])
     if along is not None and upwards is not None:
-        (x, *ends_x), (y, *ends_y) = along, upwards
-        across = [[x - ends_x[0]], [ends_x[1] - x]], [[y - ends_y[0]], [ends_y[1] - y]]
+        (x, left, right), (y, low, high) = along, upwards
         axes.errorbar(
-            [x], [y], xerr=across[0], yerr=across[1], fmt="o", color=BLACK, markeredgecolor="white", capsize=4,
-            markersize=8, label="estimate, 95 % intervals",
+            [x], [y], xerr=[[x - left], [right - x]], yerr=[[y - low], [high - y]], fmt="o", color=BLACK,
+            markeredgecolor="white", capsize=4, markersize=8, label="estimate, 95 % intervals",
         )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("log")

@@ -223,11 +223,8 @@ def draw_part(axes: Any, section: Cut, part: Bools, **style: Any) -> None:
     from matplotlib.path import Path as Shape
 
     if part.any():
-        chosen = [polygon for polygon, here in zip(section.polygons, part, strict=True) if here]
-        corners = np.cumsum([0, *map(len, chosen)])
-        codes = np.full(corners[-1], Shape.LINETO)
-        codes[corners[:-1]] = Shape.MOVETO
-        axes.add_artist(PathPatch(Shape(in_view(np.concatenate(chosen)), codes), **style))
+        chosen = (Shape(in_view(polygon)) for polygon, here in zip(section.polygons, part, strict=True) if here)
+        axes.add_artist(PathPatch(Shape.make_compound_path(*chosen), **style))
 
 
 def draw_hatching(axes: Any, section: Cut, mesh: TetMesh, nodes: Any, hatch: str, colour: str) -> None:
@@ -252,9 +249,10 @@ def frame(axes: Any, mesh: TetMesh, view: View, margin: float | None = None) -> 
     low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     bare(axes)
-    sides = ((0.01, 0.5, "left", "center"), (0.99, 0.5, "right", "center"))
-    for letter, (x, y, ha, va) in zip(
-        view.letters, (*sides, (0.5, 0.0, "center", "bottom"), (0.5, 1.0, "center", "top")), strict=True
+    left, right, bottom, top = view.letters
+    for letter, x, y, ha, va in (
+        *((left, 0.01, 0.5, "left", "center"), (right, 0.99, 0.5, "right", "center")),
+        *((bottom, 0.5, 0.0, "center", "bottom"), (top, 0.5, 1.0, "center", "top")),
     ):
         axes.text(x, y, letter, ha=ha, va=va, fontsize=11, color="#7a7a7a", transform=axes.transAxes)
     start, height = low + 0.2 * length

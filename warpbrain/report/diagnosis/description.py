@@ -54,13 +54,8 @@ def describe(diagnosis: Diagnosis | SpecimenDiagnosis, options: DiagnosisOptions
     )
 
 
-def _picked(instance: Any, *names: str, **renamed: str) -> Any:
-    """Attributes as of `picked`; None of none."""
-    return None if instance is None else picked(instance, *names, **renamed)
-
-
 def _values(values: Sequence[Value]) -> dict[str, Any]:
-    return {value.name: _picked(value, "value", "sd", "unit") for value in values}
+    return {value.name: picked(value, "value", "sd", "unit") for value in values}
 
 
 def _smallest(kind: str, smallest: Smallest) -> dict[str, Any]:
@@ -78,12 +73,12 @@ def _improvement(improvement: tuple[float, float, float] | None) -> dict[str, An
 
 def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
     where, onset, best = diagnosis.map, diagnosis.when, diagnosis.named[0] if diagnosis.named else None
-    place = _place(best) or (_picked(where, centre_m="centre", radius_m="radius") if where.significant else None)
+    place = _place(best) or (picked(where, centre_m="centre", radius_m="radius") if where.significant else None)
     ranking = [
         _cause(
             ranked.kind,
             _words(diagnosis, ranked),
-            _picked(ranked, "physics", "heldout_rmse_change", "rejected_because"),
+            picked(ranked, "physics", "heldout_rmse_change", "rejected_because"),
             ranked,
         )
         | {"where": _place(ranked)}
@@ -101,7 +96,7 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
             "parameters": _values(ranked.values),
             "where": _place(ranked),
         }
-        | _picked(ranked, "probability", "region")
+        | picked(ranked, "probability", "region")
         for ranked in diagnosis.named
     ]
     return {
@@ -109,15 +104,15 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
             asdict(combination) | {"kinds": [kind.value for kind in combination.kinds]}
             for combination in diagnosis.combinations
         ],
-        "by_posterior": _picked(diagnosis.by_posterior, "verdict", "causes"),
+        "by_posterior": picked(diagnosis.by_posterior, "verdict", "causes"),
         "where": place and place | {"region": best.region if best is not None else ""}
         | {"local_p": where.local_p, "global_p": where.global_p},
         "mechanisms": named,
-        "unknown": diagnosis.unknown and _picked(
+        "unknown": diagnosis.unknown and picked(
             diagnosis.unknown, "turning", net_force_n="force", net_force_sd_n="force_sd", net_moment_nm="moment",
             net_moment_sd_nm="moment_sd", from_outside="outside", net_force_hidden="hidden",
             surface_over_depth_nats="surface_nats", centre_m="centre", resistance_in_time="resistance",
-        ) | {"source": _picked(
+        ) | {"source": picked(
             diagnosis.unknown.source, "turns", centre_m="centre", length_m="length", of_stress="is_stress",
             net_force_n="force", net_force_sd_n="force_sd", heldout_rmse_without_m="without", heldout_rmse_m="error",
         )},
@@ -136,7 +131,7 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
         "confusion": {"says": confusion_sentences(diagnosis.confusion), "rows": diagnosis.confusion.rows},
         "fit": _fit(diagnosis),
         "map": {"largest": where.scores.max(), "places": len(where.sites)}
-        | _picked(where, "threshold", "significant", patch_m="length", blind_above_n="blind_above"),
+        | picked(where, "threshold", "significant", patch_m="length", blind_above_n="blind_above"),
         "equilibria": diagnosis.base.states.solves,
     }  # fmt: skip
 
@@ -147,14 +142,14 @@ def _words(diagnosis: Diagnosis, ranked: Ranked) -> str:
 
 def _cause(name: str, words: str, known: Mapping[str, Any], ranked: Ranked | None = None) -> dict[str, Any]:
     """A row of a ranking; of a cause that was not tried there are no numbers."""
-    numbers = _picked(ranked, "log_evidence", "probability", "detectability", "region")
+    numbers = picked(ranked, "log_evidence", "probability", "detectability", "region")
     nothing = {"log_evidence": None, "probability": 0.0, "detectability": None, "region": ""}
     estimate = {} if ranked is None else _values(ranked.values)
     return {"mechanism": name, "says": words, "estimate": estimate, **(numbers or nothing), **known}
 
 
 def _place(ranked: Ranked | None) -> dict[str, Any] | None:
-    return None if ranked is None or ranked.centre is None else _picked(ranked, centre_m="centre", radius_m="radius")
+    return None if ranked is None or ranked.centre is None else picked(ranked, centre_m="centre", radius_m="radius")
 
 
 def _fit(diagnosis: Diagnosis) -> dict[str, Any]:
@@ -190,19 +185,19 @@ def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
             "heldout_gain": _improvement(confirmation.gain),
             "why_not": confirmation.why_not(alpha),
         }
-        | _picked(confirmation, "log_evidence", "heldout_log_density", "placebo_p")
+        | picked(confirmation, "log_evidence", "heldout_log_density", "placebo_p")
         for confirmation in diagnosis.confirmations
     ]
     return {
         "mechanisms": [_ranked_of_specimen(ranked) for ranked in diagnosis.named],
-        "where": _picked(where, "test", "mode", "segment", "strain"),
+        "where": picked(where, "test", "mode", "segment", "strain"),
         "when": {"seconds": where.time} if where is not None and where.time is not None else None,
         "ranking": [_ranked_of_specimen(ranked) for ranked in diagnosis.ranking] + rejected,
         "combinations": [
-            _picked(combination, "causes", "log_evidence", "probability", "fitted")
+            picked(combination, "causes", "log_evidence", "probability", "fitted")
             for combination in diagnosis.combinations
         ],
-        "before_checks": _picked(diagnosis.by_posterior, "verdict", "causes"),
+        "before_checks": picked(diagnosis.by_posterior, "verdict", "causes"),
         "smallest_detectable": {name: _smallest(name, smallest) for name, smallest in diagnosis.smallest.items()},
         "fit": {
             "rmse_pa": {name: score and score.fitted for name, score in scores.items()},
@@ -215,12 +210,12 @@ def _of_specimen(diagnosis: SpecimenDiagnosis, alpha: float) -> dict[str, Any]:
         },
         "tests": [
             {"role": "fit" if test.fitted else "check", "rows": len(test.strain)}
-            | _picked(test, "name", "mode", "specimen", largest_stress_pa="peak", pa_per_unit="unit")
+            | picked(test, "name", "mode", "specimen", largest_stress_pa="peak", pa_per_unit="unit")
             for test in diagnosis.protocol.tests
         ],
     }
 
 
 def _ranked_of_specimen(ranked: Ranked) -> dict[str, Any]:
-    known = _picked(ranked, "physics", "rejected_because", heldout_rmse_change_pa="heldout_rmse_change")
+    known = picked(ranked, "physics", "rejected_because", heldout_rmse_change_pa="heldout_rmse_change")
     return _cause(ranked.kind, specimen_effect_sentence(ranked), known, ranked)

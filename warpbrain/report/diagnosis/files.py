@@ -95,14 +95,11 @@ class Vectors:
     aside: Bools
 
 
-@dataclass(frozen=True, eq=False)
-class Recorded:
+class Recorded(dict[str, Any]):
     """Numbers that were recorded: components of points, distances to surfaces, components of forces.
 
-    They are columns (n,) as `points.csv` has them; NaN where it has nothing.
+    They are columns (n,) by the names that `points.csv` has for them; NaN where it has nothing.
     """
-
-    columns: Mapping[str, Any]
 
     @classmethod
     def of(cls, diagnosis: Diagnosis) -> Recorded:
@@ -136,9 +133,6 @@ class Recorded:
                 "set_aside": diagnosis.gross.astype(int),
             }
         )
-
-    def __getitem__(self, name: str) -> Any:
-        return self.columns[name]
 
     @property
     def states(self) -> list[str]:
@@ -182,7 +176,7 @@ class Recorded:
 
 def write_points(path: Path, diagnosis: Diagnosis) -> None:
     """Write `Recorded`, one row for each number; what does not apply is empty."""
-    _write_columns(path, Recorded.of(diagnosis).columns, "{:.6g}")
+    _write_columns(path, Recorded.of(diagnosis), "{:.6g}")
 
 
 def write_curves(path: Path, diagnosis: SpecimenDiagnosis) -> None:

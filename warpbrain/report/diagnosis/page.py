@@ -44,12 +44,11 @@ def page_of(
         anatomy = pictures.Anatomy(diagnosis, summary)
         places = [float(anatomy.centre[view.axis]) for view in VIEWS]
         drawn = {**drawn, "known": known_displacement(state, anatomy.mesh, places)}
-    shown = text.shown_of(summary)
     sections, facts = sections_of(
         "diagnosis.html",
         summary=summary,
         pictures=defaultdict(str, drawn),
-        shown=shown,
+        shown=text.shown_of(summary),
         aside=[] if recorded is None else recorded.aside,
         chances={candidate["mechanism"]: candidate["probability"] for candidate in summary["ranking"]},
     )

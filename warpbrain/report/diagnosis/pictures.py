@@ -41,33 +41,21 @@ class Anatomy:
 
     def __init__(self, diagnosis: Diagnosis, summary: dict[str, Any]) -> None:
         self.mesh, self.summary, self._diagnosis = diagnosis.base.at.system.model.mesh, summary, diagnosis
-        self.threshold = summary["map"]["threshold"]
+        self.threshold, where, points = summary["map"]["threshold"], summary["where"], self.mesh.points
+        #: Centre (3,) and radius of what was located [m], if anything was.
+        self.ball = None if where is None else (np.array(where["centre_m"]), float(where["radius_m"]))
+        # beside the midline, where a hemisphere is; elsewhere off planes that nodes of a regular mesh lie in
+        off = np.array([0.12, 0.003, 0.003]) * np.ptp(points, axis=0)
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0)) + off
+        #: Where to cut (3,) [m]: through what was located, else through the middle of the body.
+        self.centre: Floats = middle if self.ball is None else self.ball[0]
+        #: Room around the body [mm] for letters, a scale bar and the key of arrows.
+        self.margin = 0.7 * scale_length(self.mesh)
 
     @cached_property
     def fields(self) -> dict[str, Any]:
         """Those of the map at the nodes, by name."""
         return file_of_map(self._diagnosis).point_data
-
-    @cached_property
-    def ball(self) -> tuple[Floats, float] | None:
-        """Centre (3,) and radius of what was located [m]."""
-        where = self.summary["where"]
-        return None if where is None else (np.array(where["centre_m"]), float(where["radius_m"]))
-
-    @cached_property
-    def centre(self) -> Floats:
-        """Where to cut (3,) [m]: through what was located, else through the middle of the body."""
-        if self.ball is not None:
-            return self.ball[0]
-        points = self.mesh.points
-        # beside the midline, where a hemisphere is; elsewhere off planes that nodes of a regular mesh lie in
-        off = np.array([0.12, 0.003, 0.003]) * np.ptp(points, axis=0)
-        return 0.5 * (points.min(axis=0) + points.max(axis=0)) + off
-
-    @property
-    def margin(self) -> float:
-        """Room around the body [mm] for letters, a scale bar and the key of arrows."""
-        return 0.7 * scale_length(self.mesh)
 
     def plane(self, view: views.View) -> str:
         """A cut in words."""
@@ -125,7 +113,7 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> dict[str, Any]:
     large = float(np.quantile(np.linalg.norm(first, axis=1), 0.95)) or 1e-3
     enlarged = _LONG * float(np.ptp(points, axis=0).max()) / large
     across, high = np.ptp(points[:, view.plane], axis=0)
-    errors = _errors(anatomy.summary, shown)
+    errors = {state: length(anatomy.summary["fit"]["rmse_m"][state]) for state in shown}
 
     def draw(narrow: bool) -> Any:
         figure, axes = panels(narrow, 0.9 + 2.8 * float(high / across), len(shown), width=3.0 * len(shown))
@@ -151,10 +139,6 @@ def residuals_figure(anatomy: Anatomy, recorded: Recorded) -> dict[str, Any]:
     arrows = {"points": len(vectors.where), "enlarged": number(enlarged, 2), "plane": anatomy.plane(view)}
     aside = int(vectors.aside.sum())
     return inlined(draw, **arrows, times=len(times), last=last, aside=aside, errors=_listed(errors))
-
-
-def _errors(summary: dict[str, Any], states: list[str]) -> dict[str, str]:
-    return {state: length(summary["fit"]["rmse_m"][state]) for state in states}
 
 
 def _listed(errors: dict[str, str]) -> str:
@@ -199,7 +183,7 @@ def agreement_figure(summary: dict[str, Any], recorded: Recorded) -> dict[str, A
     ends = np.concatenate([observed, *computed.values()])
     margin = 0.05 * float(np.ptp(ends)) or 1.0
     limits = (float(ends.min()) - margin, float(ends.max()) + margin)
-    errors = _errors(summary, shown)
+    errors = {state: length(summary["fit"]["rmse_m"][state]) for state in shown}
 
     def draw(narrow: bool) -> Any:
         figure, axes = panels(narrow, 3.6, len(shown), sharex=True, sharey=True, width=2.75 * len(shown))

@@ -17,13 +17,20 @@ WIDTH, NARROW, TEXT = 8.0, 4.0, 9.0
 _NARROW_WINDOW = 640
 
 
-def panels(narrow: bool, height: float, count: int = 1, width: float = WIDTH, **options: Any) -> tuple[Any, list[Any]]:
-    """A figure with panels side by side, or on a narrow window one below the other, each of that height [inch]."""
-    figure, axes = (
+def side_by_side(
+    count: int, narrow: bool, height: float, size: tuple[float, float], **options: Any
+) -> tuple[Any, list[Any]]:
+    """A figure of a size [inch] with panels side by side, or one below the other, each of that height [inch]."""
+    return (
         views.panels(count, 1, (NARROW, height * count), **options)
         if narrow
-        else views.panels(1, count, (width, height), **options)
+        else views.panels(1, count, size, **options)
     )
+
+
+def panels(narrow: bool, height: float, count: int = 1, width: float = WIDTH, **options: Any) -> tuple[Any, list[Any]]:
+    """A figure with panels side by side, or on a narrow window one below the other, each of that height [inch]."""
+    figure, axes = side_by_side(count, narrow, height, (width, height), **options)
     for panel in axes:
         panel.tick_params(labelsize=TEXT - 1)
         panel.spines[["top", "right"]].set_visible(False)

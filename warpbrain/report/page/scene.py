@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -63,7 +63,7 @@ class View:
     u: Floats | None = None
     exaggeration: float = 1.0
     #: Planes that can be shown, by name: axis and place [m].
-    cuts: Mapping[str, tuple[int, float]] | None = None
+    cuts: Mapping[str, tuple[int, float]] = field(default_factory=dict)
 
 
 def viewer(view: View, legend: str, note: str) -> Markup:
@@ -90,7 +90,7 @@ def describe_scene(view: View) -> dict[str, Any]:
         "triangles": _packed(triangles.reshape(-1, 3), np.uint32),
         "moves": None if view.u is None else _packed(MILLIMETRES * view.u[used]),
         "exaggeration": view.exaggeration,
-        "cuts": [_cut(view, name, axis, place) for name, (axis, place) in (view.cuts or {}).items()],
+        "cuts": [_cut(view, name, axis, place) for name, (axis, place) in view.cuts.items()],
         "fields": [_field(field, used) for field in view.fields],
         "recorded": _packed(MILLIMETRES * view.recorded),
         "arrows": [
@@ -125,18 +125,12 @@ def _enlarged(arrows: Sequence[Arrows], mesh: TetMesh) -> int:
 def _field(field: Field, used: Any) -> dict[str, Any]:
     values = np.asarray(field.values)[used]
     beyond = "≥ " if float(values.max()) > field.high else ""
+    under_mark, under_bar = ("", field.note) if field.mark is None else (field.note, "")
     return {
-        "name": field.name,
-        "label": field.label,
-        "values": _packed(values),
-        "low": field.low,
-        "high": field.high,
-        "low_text": f"{field.low:.3g}",
-        "high_text": f"{beyond}{field.high:.3g}",
-        "mark": field.mark,
-        "mark_text": "" if field.mark is None else field.note,
-        "note": "" if field.mark is not None else field.note,
-    }
+        "name": field.name, "label": field.label, "values": _packed(values), "low": field.low, "high": field.high,
+        "low_text": f"{field.low:.3g}", "high_text": f"{beyond}{field.high:.3g}",
+        "mark": field.mark, "mark_text": under_mark, "note": under_bar,
+    }  # fmt: skip
 
 
 def _cut(view: View, name: str, axis: int, place: float) -> dict[str, Any]:
