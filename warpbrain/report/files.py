@@ -72,8 +72,7 @@ def file_of_result(result: Result) -> Any:
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:
     """Write a summary as JSON; numbers that are not finite become null."""
-    text = json.dumps(plain(summary), indent=2, allow_nan=False)
-    write_text(path, text + "\n")
+    write_text(path, json.dumps(plain(summary), indent=2, allow_nan=False) + "\n")
 
 
 def plain(value: Any) -> Any:
@@ -108,9 +107,7 @@ def fingerprints(case: Case) -> dict[str, str]:
 
 def fingerprint_of(case: Case, *others: str) -> str:
     """Twelve digits that change when a file of the case, its laws or something else that is named changes."""
-    laws = [
-        f"{label}: {tissue.model} {tissue.formulation} {tissue.prior}" for label, tissue in sorted(case.tissues.items())
-    ]
+    laws = [f"{label}: {t.model} {t.formulation} {t.prior}" for label, t in sorted(case.tissues.items())]
     text = "\n".join([*(f"{name} {value}" for name, value in fingerprints(case).items()), *laws, *others])
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 

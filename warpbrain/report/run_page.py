@@ -49,14 +49,9 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
     subtitles = [*lines("run.txt", "subtitle", case, solution), *summary["recordings"]["in_words"], *left_out]
     begun = begin_pictures(whole, result.mesh, result.u, names, moved)
-    fields = [
-        Field(
-            name.replace("_", " "), f"{name.replace('_', ' ')} [Pa]", values, float(values.min()), float(values.max())
-        )
-        for name, values in result.nodal_pressures.items()
-    ]
-    places = views.places(whole)
-    view = body_view(result.mesh, result.u, fields, moved, places)
+    pressures = {name.replace("_", " "): values for name, values in result.nodal_pressures.items()}
+    fields = [Field(name, f"{name} [Pa]", p, float(p.min()), float(p.max())) for name, p in pressures.items()]
+    view = body_view(result.mesh, result.u, fields, moved, views.places(whole))
     pictures = draw(folder / "deformation.png", begun, run.case.title, subtitles)
     sentences = judged.sentences or ["Nothing was recorded of this case that the simulation could be compared with."]
     _write(

@@ -76,12 +76,8 @@ def describe_tests(tests: Sequence[Tested]) -> list[dict[str, Any]]:
 
 def write_tests(path: Path, tests: Sequence[Tested]) -> None:
     """Write every row of every test: what was imposed, recorded and computed, and the difference."""
-    rows: list[list[Any]] = [
-        [
-            *("recording", "mode", "role", "row", "t_s", "quantity", "imposed", "imposed_unit"),
-            *("recorded", "computed", "difference", "unit"),
-        ]
-    ]
+    head = ["recording", "mode", "role", "row", "t_s", "quantity", "imposed", "imposed_unit", "recorded", "computed"]
+    rows: list[list[Any]] = [[*head, "difference", "unit"]]
     for test in tests:
         recording, result = test.recording, test.result
         quantity, controlled = recording.controlled

@@ -74,13 +74,8 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
         "density_kg_per_m3": model.density,
         "poisson": case.poisson,
         "tissues": {
-            str(label): {
-                "name": tissue.name,
-                "law": tissue.known_law.name,
-                "formulation": tissue.formulation,
-                **_law(tissue),
-            }
-            for label, tissue in sorted(case.tissues.items())
+            str(label): {"name": t.name, "law": t.known_law.name, "formulation": t.formulation, **_law(t)}
+            for label, t in sorted(case.tissues.items())
             if (model.mesh.tissue == label).any()
         },
         "assumptions": list(case.assumptions),
@@ -132,23 +127,16 @@ def sizes_mm(statistics: Any) -> dict[str, float]:
 
 def displacement_rows(described: Mapping[str, Any]) -> list[list[Any]]:
     """Node set, number of nodes, mean, root mean square, 95th percentile and largest displacement [mm], as text."""
-    return [
-        [
-            *(SET_TITLES.get(name, name), s["nodes"]),
-            *(tabled(s[key]) for key in ("mean", "root_mean_square", "percentile_95", "largest")),
-        ]
-        for name, s in described["displacement_mm"].items()
-    ]
+    keys = ("mean", "root_mean_square", "percentile_95", "largest")
+    sets = described["displacement_mm"].items()
+    return [[SET_TITLES.get(name, name), s["nodes"], *(tabled(s[key]) for key in keys)] for name, s in sets]
 
 
 def describe_prior(prior: FromPrior) -> dict[str, Any]:
     """Model, draw and laws, with units; the draw is None where the laws are those of middle curves."""
     drawn, draw = prior.drawn, None
-    tissues: dict[str, dict[str, Any]] = {}
-    for label in prior.labels:
-        tissue = prior.case.tissues[label]
-        known = {"name": tissue.name, "group": tissue.prior, "law": tissue.known_law.name}
-        tissues[str(label)] = known | _law(tissue)
+    each = {str(label): prior.case.tissues[label] for label in prior.labels}
+    tissues = {k: {"name": t.name, "group": t.prior, "law": t.known_law.name, **_law(t)} for k, t in each.items()}
     if drawn is not None:
         draw = {"sample": drawn.number, "seed": drawn.seed, "redrawn": len(drawn.rejected), "reasons": drawn.rejected}
         for described, fitted in zip(tissues.values(), drawn.fits, strict=True):

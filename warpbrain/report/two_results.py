@@ -20,8 +20,8 @@ _KINDS = {"diagnosis.json": "diagnose", "estimate.json": "estimate", "summary.js
 #: Keys of what is said of the case and of the solution that are outcomes, or are said elsewhere.
 _NO_INPUT = ("tissues", "left_out", "title", "file", "first_step", "history", "relative_residual", "stored_energy_J")
 _INPUTS = ("solution", "options", "prior", "method", "seed", "chosen", "course", "device", "workers")
-
-
+#: Of two meshes in the same place: how far apart nodes may be in parts of the mesh's size, by rounding in files.
+_SAME = 1e-6
 #: A number of a result, its unit, and the interval (low, high) that holds it with 95 % if there is one.
 Quantity = tuple[float, str, tuple[float, float] | None]
 
@@ -110,12 +110,6 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, str]]:
         yield name, str(value)
 
 
-# side by side -----------------------------------------------------------------------------------------------------
-
-#: Of two meshes in the same place: how far apart nodes may be in parts of the mesh's size, by rounding in files.
-_SAME = 1e-6
-
-
 def difference(first: SavedState, second: SavedState) -> dict[str, Any]:
     """How far the displacement of the second result is from that of the first, in the first's body.
 
@@ -126,17 +120,15 @@ def difference(first: SavedState, second: SavedState) -> dict[str, Any]:
     """
     mesh, second_mesh = first.mesh, second.mesh
     size = float(np.ptp(mesh.points, axis=0).max())
-    same = mesh.tetrahedra.shape == second_mesh.tetrahedra.shape and np.array_equal(
-        mesh.tetrahedra, second_mesh.tetrahedra
+    there, inside = second.u, np.ones(len(mesh.points), dtype=bool)
+    same = (
+        np.array_equal(mesh.tetrahedra, second_mesh.tetrahedra)
+        and mesh.points.shape == second_mesh.points.shape
+        and bool(np.abs(mesh.points - second_mesh.points).max() <= _SAME * size)
     )
-    same = same and mesh.points.shape == second_mesh.points.shape
-    same = same and bool(np.abs(mesh.points - second_mesh.points).max() <= _SAME * size)
-    if same:
-        there, inside = second.u, np.ones(len(mesh.points), dtype=bool)
-    else:
+    if not same:
         location = locate(second_mesh.points, second_mesh.tetrahedra, mesh.points)
-        inside = location.distance <= _SAME * size
-        there = location.interpolate(second.u)
+        there, inside = location.interpolate(second.u), location.distance <= _SAME * size
     if not inside.any():
         raise InputError(f"{first.path} and {second.path}: the bodies are nowhere in one place")
     weights = mesh.node_volumes * inside

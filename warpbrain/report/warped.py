@@ -76,9 +76,8 @@ def read_request(image: Path | None, labels: Path | None, points: Sequence[Path]
     if request.labels is not None:
         labels_of(request.labels)
     if request.image is not None and request.image.values.dtype.kind not in "iufb":
-        raise InputError(
-            f"{request.image.path}: expected real numbers, found values of type {request.image.values.dtype}"
-        )
+        kind = request.image.values.dtype
+        raise InputError(f"{request.image.path}: expected real numbers, found values of type {kind}")
     if request.grid_of is not None and request.grid_of.grid.is_skew:
         raise InputError(
             f"{request.grid_of.path}: affine: its axes are not at right angles, which no ITK transform can have: "
@@ -88,10 +87,8 @@ def read_request(image: Path | None, labels: Path | None, points: Sequence[Path]
     # one file on systems that take letters for the same in either case
     plain = [name.lower() for name in names]
     for name in names:
-        if plain.count(name.lower()) > 1:
-            raise InputError(
-                f"{name}: {plain.count(name.lower())} of the files given would be written as it: rename one"
-            )
+        if (times := plain.count(name.lower())) > 1:
+            raise InputError(f"{name}: {times} of the files given would be written as it: rename one")
     return request
 
 
@@ -162,8 +159,7 @@ def check_place(request: WarpRequest, mesh: TetMesh, path: Path) -> None:
             corners = image.grid.positions(np.indices((2, 2, 2)).reshape(3, -1).T * (np.array(image.grid.shape) - 1))
             raise InputError(
                 f"{image.path}: affine: {100 * share:.0f} % of the body of {path} are in it: it spans "
-                f"{_span(corners)}, the body {_span(points)} "
-                "mm RAS: is it the image that the mesh was made from?"
+                f"{_span(corners)}, the body {_span(points)} mm RAS: is it the image that the mesh was made from?"
             )
     if request.labels is not None:
         there = request.labels.values != 0
@@ -171,8 +167,8 @@ def check_place(request: WarpRequest, mesh: TetMesh, path: Path) -> None:
         if not len(labelled[0]):
             raise InputError(f"{request.labels.path}: all its voxels are 0: there are no labels to warp")
         ends = np.array([(index.min() - 0.5, index.max() + 0.5) for index in labelled])
-        low, high = request.labels.grid.indices(points).min(axis=0), request.labels.grid.indices(points).max(axis=0)
-        if (ends[:, 1] < low).any() or (ends[:, 0] > high).any():
+        indices = request.labels.grid.indices(points)
+        if (ends[:, 1] < indices.min(axis=0)).any() or (ends[:, 0] > indices.max(axis=0)).any():
             box = request.labels.grid.positions(np.array(np.meshgrid(*ends, indexing="ij")).reshape(3, -1).T)
             raise InputError(
                 f"{request.labels.path}: affine: its labels span {_span(box)}, the body of {path} {_span(points)} "
@@ -182,9 +178,8 @@ def check_place(request: WarpRequest, mesh: TetMesh, path: Path) -> None:
 
 def _span(points: Floats) -> str:
     """The box (n, 3) points are in, as text."""
-    return " x ".join(
-        f"{low:.0f} to {high:.0f}" for low, high in zip(points.min(axis=0), points.max(axis=0), strict=True)
-    )
+    ends = zip(points.min(axis=0), points.max(axis=0), strict=True)
+    return " x ".join(f"{low:.0f} to {high:.0f}" for low, high in ends)
 
 
 def _for_transforms(grid: Grid) -> Grid:
@@ -203,9 +198,7 @@ def _write_maps(folder: Path, state: SavedState, inside: VoxelsInside) -> list[s
         write_volume(folder / DEVIATION, inside.image(deviation), inside.grid)
         files.append(DEVIATION)
     if state.trust is not None:
-        nearest = np.take_along_axis(
-            state.mesh.tetrahedra[inside.elements], inside.weights.argmax(axis=1)[:, None], axis=1
-        )[:, 0]
+        nearest = state.mesh.tetrahedra[inside.elements, inside.weights.argmax(axis=1)]
         write_volume(folder / TRUST_MAP, inside.image(state.trust[nearest]).astype(np.uint8), inside.grid)
         files.append(TRUST_MAP)
     return files

@@ -100,9 +100,8 @@ def _cut_open(grid: Any, scene: Scene) -> list[Any]:
         for side in (k for k in range(3) if k != axis):
             if face.n_points:
                 face = face.clip(normal=towards[side] * np.eye(3)[side], origin=middle, invert=False)
-        if face.n_points:
-            face.field_data["flat"] = [1]
-            parts.append(face)
+        face.field_data["flat"] = [1]
+        parts.append(face)
     return [part for part in parts if part.n_points]
 
 
@@ -125,9 +124,8 @@ def _coloured(plotter: Any, part: Any, scene: Scene, **options: Any) -> None:
 
 def _draw_motion(plotter: Any, scene: Scene) -> None:
     """What was recorded beside what was computed; where nothing was, how the surface moves."""
-    plotter.add_mesh(
-        _surface(_body_of(scene, ~scene.removed)), color="#a89c92", opacity=0.22, smooth_shading=True, ambient=0.4
-    )
+    surface = _surface(_body_of(scene, ~scene.removed))
+    plotter.add_mesh(surface, color="#a89c92", opacity=0.22, smooth_shading=True, ambient=0.4)
     size = float(np.ptp(scene.points, axis=0).max())
     if len(scene.where):
         dots = pyvista.PolyData(np.asarray(scene.where, dtype=np.float64))
@@ -135,7 +133,7 @@ def _draw_motion(plotter: Any, scene: Scene) -> None:
         for vectors, colour in ((scene.recorded, RECORDED), (scene.computed, COMPUTED)):
             _arrows(plotter, scene.where, scene.arrows * vectors, colour, size)
         return
-    used = np.unique(_surface(_body_of(scene, ~scene.removed)).point_data["vtkOriginalPointIds"])
+    used = np.unique(surface.point_data["vtkOriginalPointIds"])
     chosen = used[_thinned(scene.points[used], _GRID * size)]
     _arrows(plotter, scene.points[chosen], scene.exaggeration * scene.u[chosen], COMPUTED, size)
 
@@ -153,9 +151,7 @@ def _draw_cut(plotter: Any, scene: Scene, axis: int, camera: Camera) -> None:
     moved = section.warp_by_vector(_U, factor=scene.exaggeration)
     _coloured(plotter, moved, scene, lighting=False)
     for body, colour, width in ((section, GHOST, 2.0), (moved, ARROW, 1.5)):
-        rim = body.extract_feature_edges(
-            boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
-        )
+        rim = body.extract_feature_edges(feature_edges=False, manifold_edges=False, non_manifold_edges=False)
         if rim.n_points:
             plotter.add_mesh(rim.translate(lift), color=colour, line_width=width, lighting=False)
     chosen = _thinned(section.points, _GRID * size)
@@ -186,13 +182,10 @@ def _arrows(plotter: Any, where: Floats, vectors: Floats, colour: str, size: flo
     rings = np.stack(
         [where + shaft * around, neck + shaft * around, neck + wide * around, where + vectors + 0.0 * around]
     )
-    count = len(where)
-    number = np.arange(4 * _SIDES * count).reshape(4, _SIDES, count)
+    number = np.arange(rings.size // 3).reshape(4, _SIDES, len(where))
     following = np.roll(number, -1, axis=1)
-    quads = [
-        np.stack([number[k], following[k], following[k + 1], number[k + 1]], axis=-1).reshape(-1, 4) for k in (0, 1, 2)
-    ]
-    arrows = pyvista.PolyData.from_regular_faces(rings.reshape(-1, 3), np.concatenate(quads))
+    quads = np.stack([number[:-1], following[:-1], following[1:], number[1:]], axis=-1).reshape(-1, 4)
+    arrows = pyvista.PolyData.from_regular_faces(rings.reshape(-1, 3), quads)
     plotter.add_mesh(arrows, color=colour, ambient=0.45)
 
 
@@ -200,10 +193,8 @@ def _thinned(points: Floats, width: float) -> Any:
     """One point of each cube of a lattice: the one that is nearest to its middle."""
     cells = np.floor(points / width).astype(np.int64)
     off = np.linalg.norm(points / width - cells - 0.5, axis=1)
-    order = np.lexsort((off, *cells.T))
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = np.any(np.diff(cells[order], axis=0) != 0, axis=1)
-    return np.sort(order[first])
+    order = np.argsort(off, kind="stable")
+    return np.sort(order[np.unique(cells[order], axis=0, return_index=True)[1]])
 
 
 def interactive(scene: Scene, exaggeration: float | None) -> Any:
