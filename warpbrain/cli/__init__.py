@@ -48,12 +48,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = [word for word in given if word != "--debug"]
     options = parser.parse_args(given)
     options.record = Record(given, getattr(options, "quiet", False))
-    return exit_status(parser.prog, lambda: _call(options), options.record, debug)
 
+    def work() -> None:
+        with options.record.warnings_kept():
+            call(options, "warpbrain.cli")
 
-def _call(options: argparse.Namespace) -> None:
-    with options.record.warnings_kept():
-        call(options, "warpbrain.cli")
+    return exit_status(parser.prog, work, options.record, debug)
 
 
 def _parser() -> _GroupedParser:

@@ -112,30 +112,25 @@ def sample(options: argparse.Namespace) -> None:
         check_writable(options.csv.absolute())
     model = _chosen_model(options)
     if options.sweep is None:
-        first: tuple[str, ...] = ("draw", "attempts")
-        rows, sentences = _drawn(options, model)
-        last = "why attempts were redrawn"
+        draws, seed = [], options.seed or 0
+        with Progress("draws") as bar:
+            for number in range(options.number):
+                draws.append(draw_laws(model, options.group, options.model, number, seed, options.poisson))
+                bar.show(len(draws) / options.number)
+        rows = [text.LawRow((str(d.number), str(1 + len(d.rejected))), d.fits, d.rejected) for d in draws]
+        sentences = text.redrawn_lines(draws)
+        first, last = ["draw", "attempts"], "why attempts were redrawn"
+        shown = first
     else:
-        first = tuple(f"k of {group}" for group in options.group)
         rows, sentences = _swept(options, model)
-        last = "unstable"
+        first, last = [f"k of {group}" for group in options.group], "unstable"
+        shown = [f"k {number}" for number, _ in enumerate(first, 1)]
     if options.csv is None:
-        shown = first if options.sweep is None else tuple(f"k {i}" for i in range(1, len(first) + 1))
         print(*text.law_lines(shown, options.group, rows), sep="\n")
     else:
         text.write_laws(options.csv, first, options.group, rows, last)
         sentences.append(f"written to {options.csv}")
     print("", *sentences, sep="\n")
-
-
-def _drawn(options: argparse.Namespace, model: Process) -> tuple[list[text.LawRow], list[str]]:
-    draws, seed = [], options.seed or 0
-    with Progress("draws") as bar:
-        for number in range(options.number):
-            draws.append(draw_laws(model, options.group, options.model, number, seed, options.poisson))
-            bar.show(len(draws) / options.number)
-    rows = [text.LawRow((str(draw.number), str(1 + len(draw.rejected))), draw.fits, draw.rejected) for draw in draws]
-    return rows, text.redrawn_lines(draws)
 
 
 def _swept(options: argparse.Namespace, model: Process) -> tuple[list[text.LawRow], list[str]]:

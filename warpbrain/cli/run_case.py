@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from warpbrain.atomic import safe_name
@@ -14,25 +15,26 @@ from warpbrain.cases.assuming import assume
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import FromPrior, with_prior_draw, with_prior_middle
 from warpbrain.cases.shipped import find_case
-from warpbrain.cli import run_specimen, warp
+from warpbrain.cli import warp
 from warpbrain.cli.log import drawn, note_device
 from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
 from warpbrain.kernels.module import is_compiling
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
+from warpbrain.report import specimen, views
 from warpbrain.report import summary as tables
-from warpbrain.report import views
 from warpbrain.report.comparison import describe_comparisons, describe_mesh_error, recorded_rows, write_comparisons
 from warpbrain.report.files import read_state, write_result, write_summary
 from warpbrain.report.page import lines
 from warpbrain.report.rendering import render_nothing
-from warpbrain.report.run_page import write_run_page
+from warpbrain.report.run_page import write_run_page, write_specimen_page
 from warpbrain.simulation.equilibrium import NewtonStep
 from warpbrain.simulation.mesh_error import MeshError, mesh_error, observe_without
-from warpbrain.simulation.observation import observe
+from warpbrain.simulation.observation import Observed, observe
 from warpbrain.simulation.relaxation import RelaxationStep
 from warpbrain.simulation.result import nodal_state_of
 from warpbrain.simulation.run import Course, Run, Running, Watching
+from warpbrain.simulation.specimen import SHOWN, SpecimenRunning
 from warpbrain.simulation.system import System
 from warpbrain.terminal.progress import Progress
 from warpbrain.terminal.record import Record
@@ -51,7 +53,7 @@ def run_case(options: argparse.Namespace) -> None:
     prior = None if drawn_laws is None else tables.describe_prior(drawn_laws)
     if case.specimen is not None:
         render_nothing()
-        run_specimen.run(options, case, out, prior)
+        _run_tests(options, case, out, prior)
         return
 
     record: Record = options.record
@@ -110,6 +112,52 @@ def run_case(options: argparse.Namespace) -> None:
         write_summary(out / "summary.json", summary)
         if to_warp is not None:
             warp.warp(read_state(out / "result.vtu"), out, to_warp, record, options.quiet)
+
+
+def _run_tests(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any] | None) -> None:
+    """Simulate every test of a case with a specimen, as the options of `warpbrain run` change it; `prior` is what is to
+    be said of laws that the generative model gave. Refuses options that mean nothing for tests."""
+    has = f"{case.path} has a [specimen]"
+    if options.mesh_error is not None:
+        raise InputError(f"--mesh-error: {has}, which has no one state: compare --elements tet4-averaged")
+    for option, asked_of in (("--steps", options.steps), ("--to-rest", options.to_rest), ("--until", options.until)):
+        if asked_of:
+            raise InputError(f"{option}: {has}, whose tests are quasi-static: there is no motion")
+    if options.elements in ("tet10", "tet10-mixed"):
+        raise InputError(f"--elements {options.elements}: {has}, whose tests have linear elements only")
+
+    record: Record = options.record
+    say = record.say
+    running = SpecimenRunning(case, options.tolerance, options.elements, options.device, options.precision)
+    rig = running.rig
+    system = rig.system
+    in_time = any(rig.follows_time(recording) for recording in running.tests)
+    described = specimen.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
+    say(*lines("run.txt", "specimen", described, prior), sep="\n")
+    note_device(record, case, system, options.precision)
+
+    seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}
+    with Progress("tests", options.quiet) as progress:
+        done = running.run(progress.show).tests
+    seconds |= rig.solver.clock.seconds
+    say(*lines("run.txt", "tests", done, SHOWN), sep="\n")
+    say(*lines("run.txt", "times", seconds, rig.solver.clock.counts), sep="\n")
+
+    [subtitle] = lines("run.txt", "subtitle_of_tests", rig.specimen.grips, system.model)
+    summary = {
+        **tables.describe_opening(case, described, prior, system, options.precision),
+        "solution": {"kind": "tests", "tolerance": rig.solver.tolerance, "tests": specimen.describe_tests(done)},
+        "recordings": describe_comparisons(Observed(tuple(test.comparison for test in done), ())),
+        "seconds_by_phase": seconds,
+        "calls_by_phase": rig.solver.clock.counts,
+        "versions": tables.machine(),
+    }
+    with results_in(out, record, options.overwrite):
+        specimen.write_tests_picture(out / "tests.png", done, case.title, subtitle)
+        specimen.write_tests(out / "comparison.csv", done)
+        write_summary(out / "summary.json", summary)
+        write_specimen_page(out / "report.html", summary, done)
+        record.files += ["summary.json", "comparison.csv", "tests.png", "report.html"]
 
 
 def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:

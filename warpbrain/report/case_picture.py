@@ -201,10 +201,25 @@ def _draw_legend(figure: Any, scene: _Scene) -> None:
         for length in (scene.near, scene.near_recorded)
     )
     names = {label: _short(name) for label, name in scene.names.items()}
+    sets = []
+    for number, (name, members) in enumerate(scene.node_sets):
+        colour, shape = _SET_STYLES[number]
+        dot = _mark(marker=shape, markersize=_dot_size(number), color=colour, markeredgecolor="#333333")
+        sets.append((dot, f"{_short(SET_TITLES.get(name, name))}: {members.sum()}"))
+    if left_out := len(scene.mesh.node_sets) - len(sets):
+        sets.append((_mark(), f"and {left_out} larger, not drawn"))
+    arrow = {"marker": ">", "linestyle": "-", "linewidth": 1.8, "markersize": 6.0}
+    cross = {"marker": "x", "markersize": 5.0}
+    styles = [(r, arrow, colour) for r, colour in zip(scene.tracked, cycle(_ARROWS), strict=False)]
+    styles += [(r, cross, colour) for r, colour in zip(scene.surfaces, cycle(_CROSSES), strict=False)]
+    recorded = _first([(_mark(color=colour, **style), f"{_short(r.name)}: {r.count}") for r, style, colour in styles])
+    if scene.tracked:
+        length = "true length" if scene.enlarged == 1.0 else f"drawn {scene.enlarged:g} times as long"
+        recorded.append((_mark(), f"arrows: {length}"))
     groups = {
         "tissue": _first(views.tissue_entries(names, scene.mesh, scene.resected)),
-        f"nodes within {near} of a cut": _sets(scene),
-        f"recorded (in a cut: within {near_recorded})": _recordings(scene),
+        f"nodes within {near} of a cut": sets,
+        f"recorded (in a cut: within {near_recorded})": recorded,
     }
     entries: list[tuple[Any, str]] = []
     headings = []
@@ -215,26 +230,6 @@ def _draw_legend(figure: Any, scene: _Scene) -> None:
     texts = views.legend(figure, entries[:-1], loc="outside right upper", fontsize=10)
     for number in headings:
         texts[number].set_fontweight("bold")
-
-
-def _sets(scene: _Scene) -> list[tuple[Any, str]]:
-    entries = []
-    for number, (name, members) in enumerate(scene.node_sets):
-        colour, shape = _SET_STYLES[number]
-        dot = _mark(marker=shape, markersize=_dot_size(number), color=colour, markeredgecolor="#333333")
-        entries.append((dot, f"{_short(SET_TITLES.get(name, name))}: {members.sum()}"))
-    left_out = len(scene.mesh.node_sets) - len(entries)
-    return entries + ([(_mark(), f"and {left_out} larger, not drawn")] if left_out else [])
-
-
-def _recordings(scene: _Scene) -> list[tuple[Any, str]]:
-    arrow = {"marker": ">", "linestyle": "-", "linewidth": 1.8, "markersize": 6.0}
-    cross = {"marker": "x", "markersize": 5.0}
-    styles = [(r, arrow, colour) for r, colour in zip(scene.tracked, cycle(_ARROWS), strict=False)]
-    styles += [(r, cross, colour) for r, colour in zip(scene.surfaces, cycle(_CROSSES), strict=False)]
-    entries = [(_mark(color=colour, **style), f"{_short(r.name)}: {r.count}") for r, style, colour in styles]
-    length = "true length" if scene.enlarged == 1.0 else f"drawn {scene.enlarged:g} times as long"
-    return _first(entries) + ([(_mark(), f"arrows: {length}")] if scene.tracked else [])
 
 
 def _first(entries: list[tuple[Any, str]]) -> list[tuple[Any, str]]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.atomic import whole_file, write_csv
-from warpbrain.ensemble.results import EnsembleResult, Fields, Row, Spread
+from warpbrain.ensemble.results import EnsembleResult, Fields, Spread
 from warpbrain.report import views
 from warpbrain.report.comparison import SHOWN
 from warpbrain.report.files import MILLIMETRES, body_file, sets_of
@@ -57,37 +57,35 @@ def ensemble_lines(described: Mapping[str, Any]) -> list[str]:
 
 def table_of(result: EnsembleResult) -> list[dict[str, Any]]:
     """A row for each sample, all with the same columns; None where there is nothing to say. Units are in the names."""
-    rows = [_described(row) for row in result.rows]
-    columns = dict.fromkeys(name for row in rows for name in row)
-    return [{name: row.get(name) for name in columns} for row in rows]
-
-
-def _described(row: Row) -> dict[str, Any]:
-    outcome, sample = row.outcome, row.sample
-    status = "failed" if outcome.failed else "done"
-    cells: dict[str, Any] = {"sample": outcome.number, "status": status, "reason": outcome.reason}
-    cells |= {f"tissue_{label}_deviations": deviation for label, deviation in sample.deviations.items()}
-    for label, material in sorted((sample.materials or {}).items()):
-        cells[f"tissue_{label}_law"] = material.law.name
-        cells[f"tissue_{label}_shear_modulus_Pa"] = material.law.shear_modulus
-        for name, value in vars(material.law).items():
-            # exponents have no unit
-            unit = "" if name == "alpha" else "_Pa"
-            values = value if isinstance(value, tuple) else (value,)
-            for term, number in enumerate(values, 1):
-                cells[f"tissue_{label}_{name}{f'_{term}' if len(values) > 1 else ''}{unit}"] = number
-    cells |= {"steps": outcome.steps, "cg_iterations": outcome.cg_iterations, "time_s": outcome.time}
-    if outcome.failed:
-        return cells
-    cells |= {"out_of_balance": outcome.residual, "smallest_J": outcome.min_J}
-    for name, s in row.displacement.items():
-        place = name.replace(" ", "_")
-        cells |= {f"displacement_{place}_{key}_mm": size for key, size in sizes_mm(s).items()}
-    for comparison in row.comparisons:
-        factor, unit = SHOWN[comparison.unit]
-        cells[f"rmse_{comparison.name}_before_{unit}"] = factor * comparison.before.root_mean_square
-        cells[f"rmse_{comparison.name}_after_{unit}"] = factor * comparison.after.root_mean_square
-    return cells
+    rows = []
+    for row in result.rows:
+        outcome, sample = row.outcome, row.sample
+        status = "failed" if outcome.failed else "done"
+        cells: dict[str, Any] = {"sample": outcome.number, "status": status, "reason": outcome.reason}
+        rows.append(cells)
+        cells |= {f"tissue_{label}_deviations": deviation for label, deviation in sample.deviations.items()}
+        for label, material in sorted((sample.materials or {}).items()):
+            cells[f"tissue_{label}_law"] = material.law.name
+            cells[f"tissue_{label}_shear_modulus_Pa"] = material.law.shear_modulus
+            for name, value in vars(material.law).items():
+                # exponents have no unit
+                unit = "" if name == "alpha" else "_Pa"
+                values = value if isinstance(value, tuple) else (value,)
+                for term, number in enumerate(values, 1):
+                    cells[f"tissue_{label}_{name}{f'_{term}' if len(values) > 1 else ''}{unit}"] = number
+        cells |= {"steps": outcome.steps, "cg_iterations": outcome.cg_iterations, "time_s": outcome.time}
+        if outcome.failed:
+            continue
+        cells |= {"out_of_balance": outcome.residual, "smallest_J": outcome.min_J}
+        for name, s in row.displacement.items():
+            place = name.replace(" ", "_")
+            cells |= {f"displacement_{place}_{key}_mm": size for key, size in sizes_mm(s).items()}
+        for comparison in row.comparisons:
+            factor, unit = SHOWN[comparison.unit]
+            cells[f"rmse_{comparison.name}_before_{unit}"] = factor * comparison.before.root_mean_square
+            cells[f"rmse_{comparison.name}_after_{unit}"] = factor * comparison.after.root_mean_square
+    columns = dict.fromkeys(name for cells in rows for name in cells)
+    return [{name: cells.get(name) for name in columns} for cells in rows]
 
 
 def write_table(folder: Path, rows: list[dict[str, Any]]) -> list[str]:

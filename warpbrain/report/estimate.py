@@ -14,7 +14,7 @@ from warpbrain.diagnosis.locating import ScoreMap
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.posterior import INTERVALS, Marginal, Posterior, Prediction
 from warpbrain.estimation.registration import registration_of
-from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
+from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
 from warpbrain.report.comparison import SHOWN, error_text
 from warpbrain.report.diagnosis.files import seen
 from warpbrain.report.files import MILLIMETRES, body_file, fingerprints, picked, write_body
@@ -286,26 +286,24 @@ def _number(value: float) -> str:
 def write_predictions(path: Path, posterior: Posterior) -> None:
     """Write every row, in mm or N, axes RAS; of a surface the distance stands in the first of three components."""
     recordings = {recording.name: recording for recording in posterior.case.recordings}
-    vectors = [f"{quantity}_{axis}" for quantity in ("observed", "predicted", "standard_deviation") for axis in "xyz"]
-    rows = [["recording", "kind", "role", "unit", "row", "gross_error", "x_mm", "y_mm", "z_mm", *vectors]]
+    names = [f"{quantity}_{axis}" for quantity in ("observed", "predicted", "standard_deviation") for axis in "xyz"]
+    rows: list[list[Any]] = [
+        ["recording", "kind", "role", "unit", "row", "gross_error", "x_mm", "y_mm", "z_mm", *names]
+    ]
     for prediction in posterior.predictions:
-        rows += [_predicted(prediction, recordings[prediction.name], number) for number in range(len(prediction.rows))]
+        (factor, unit), recording = SHOWN[prediction.unit], recordings[prediction.name]
+        each = zip(prediction.before, prediction.before - prediction.after, prediction.deviation, strict=True)
+        for row, gross, vectors in zip(prediction.rows.tolist(), prediction.gross.tolist(), each, strict=True):
+            cells = [prediction.name, prediction.kind, prediction.role, unit, row, int(gross)]
+            if isinstance(recording, PointsRecording | SurfaceRecording):
+                cells += [f"{MILLIMETRES * value:.6g}" for value in recording.points[row]]
+            else:
+                cells += [""] * 3
+            for values in vectors:
+                shown = [f"{factor * value:.6g}" for value in np.atleast_1d(values)]
+                cells += shown + [""] * (3 - len(shown))
+            rows.append(cells)
     write_csv(path, rows)
-
-
-def _predicted(prediction: Prediction, recording: Recording, number: int) -> list[Any]:
-    factor, unit = SHOWN[prediction.unit]
-    row = int(prediction.rows[number])
-    cells = [prediction.name, prediction.kind, prediction.role, unit, row, int(prediction.gross[number])]
-    if isinstance(recording, PointsRecording | SurfaceRecording):
-        cells += [f"{MILLIMETRES * value:.6g}" for value in recording.points[row]]
-    else:
-        cells += [""] * 3
-    before = prediction.before[number]
-    for values in (before, before - prediction.after[number], prediction.deviation[number]):
-        shown = [f"{factor * value:.6g}" for value in np.atleast_1d(values)]
-        cells += shown + [""] * (3 - len(shown))
-    return cells
 
 
 def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | None = None) -> None:

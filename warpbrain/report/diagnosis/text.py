@@ -26,15 +26,28 @@ def diagnosis_lines(summary: Summary) -> list[str]:
 def shown_of(summary: Summary) -> dict[str, Any]:
     """What templates of printed lines and of the page show: rows of tables, sentences, and the unit of errors."""
     suffix, factor, unit = unit_of(summary)
-    held = summary["fit"][f"heldout_rmse_{suffix}"]
+    held, sets = summary["fit"][f"heldout_rmse_{suffix}"], summary.get("combinations", summary.get("hypotheses"))
+    # log evidence against nothing, as that of a specimen is already
+    nothing = 0.0 if "combinations" in summary else next((s["log_evidence"] for s in sets if not s["causes"]), 0.0)
+    smallest = []
+    for kind, effect in summary["smallest_detectable"].items():
+        named = effect.get("named_from")
+        # of what is there or not there is no size
+        of_size = named is not None and effect["unit"] != "of being there"
+        smallest.append([kind, effect["says"], f"{named:.2g} {effect['unit']}" if of_size else ""])
     return {
         "unit": unit,
-        "sets": _set_rows(summary),
+        # the most probable ones: which, with what probability, and the log evidence against nothing
+        "sets": [
+            [" and ".join(s["causes"]) or "nothing", percent(s["probability"]), f"{s['log_evidence'] - nothing:+.1f}"]
+            for s in sets[:_SETS]
+        ],
         "candidates": _candidate_rows(summary),
         "rejected": [[c["mechanism"], c["rejected_because"]] for c in summary["ranking"] if c["log_evidence"] is None],
         "fit": _fit_rows(summary),
         "held_out": [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None],
-        "smallest": _smallest_rows(summary),
+        # what these data would have shown of each mechanism, and from which size half would be named
+        "smallest": smallest,
         "measurements": [[m["what"], f"{m['expected_nats']:.1f}"] for m in summary["next_measurement"]],
         "where": summary["where"] and _where_in_words(summary["where"]),
         "when": summary["when"] and when_in_words(summary["when"]),
@@ -44,17 +57,6 @@ def shown_of(summary: Summary) -> dict[str, Any]:
 def unit_of(summary: Summary) -> tuple[str, float, str]:
     """Of errors: how keys of `diagnosis.json` end, a factor to what is shown, and its unit."""
     return ("m", MILLIMETRES, "mm") if "rmse_m" in summary["fit"] else ("pa", 1.0, "Pa")
-
-
-def _set_rows(summary: Summary) -> list[list[str]]:
-    """The most probable sets of causes: which, with what probability, and the log evidence against nothing."""
-    sets = summary.get("combinations", summary.get("hypotheses"))
-    # of a specimen it is against nothing already
-    nothing = 0.0 if "combinations" in summary else next((s["log_evidence"] for s in sets if not s["causes"]), 0.0)
-    return [
-        [" and ".join(s["causes"]) or "nothing", percent(s["probability"]), f"{s['log_evidence'] - nothing:+.1f}"]
-        for s in sets[:_SETS]
-    ]
 
 
 def _candidate_rows(summary: Summary) -> list[list[str]]:
@@ -102,17 +104,6 @@ def _fit_rows(summary: Summary) -> list[list[str]]:
         rows.append(["nine of ten patterns that mean nothing, with as many parameters", "", between, ""])
     if fit.get("noise_rmse_m") is not None:
         rows.append(["what noise alone leaves", cell(fit["noise_rmse_m"]), "", ""])
-    return rows
-
-
-def _smallest_rows(summary: Summary) -> list[list[str]]:
-    """What these data would have shown of each mechanism, and from which size half would be named."""
-    rows = []
-    for kind, effect in summary["smallest_detectable"].items():
-        named = effect.get("named_from")
-        # of what is there or not there is no size
-        of_size = named is not None and effect["unit"] != "of being there"
-        rows.append([kind, effect["says"], f"{named:.2g} {effect['unit']}" if of_size else ""])
     return rows
 
 

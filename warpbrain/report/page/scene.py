@@ -85,6 +85,12 @@ def describe_scene(view: View) -> dict[str, Any]:
     if view.ball is not None:
         centre, radius = view.ball
         ball = {"centre": [MILLIMETRES * float(value) for value in centre], "radius": MILLIMETRES * radius}
+    enlarged = 1
+    if view.arrows and len(view.arrows[0].vectors):
+        # how many times as long as they are arrows are drawn at first: a large one is a tenth of the body
+        large = float(np.quantile(np.linalg.norm(view.arrows[0].vectors, axis=1), 0.95))
+        size = float(np.ptp(mesh.points, axis=0).max())
+        enlarged = int(np.clip(round(0.1 * size / max(large, 1e-9)), 1, 40))
     return {
         "points": _packed(MILLIMETRES * mesh.points[used]),
         "triangles": _packed(triangles.reshape(-1, 3), np.uint32),
@@ -102,7 +108,7 @@ def describe_scene(view: View) -> dict[str, Any]:
             }
             for arrows in view.arrows
         ],
-        "enlarged": _enlarged(view.arrows, mesh),
+        "enlarged": enlarged,
         "ball": ball,
         "colours": np.round(255.0 * stops).astype(int).tolist(),
     }
@@ -111,15 +117,6 @@ def describe_scene(view: View) -> dict[str, Any]:
 def scene_json(scene: dict[str, Any]) -> str:
     """As text that can stand in a page: nothing of it ends the element that it is in."""
     return json.dumps(scene, allow_nan=False).replace("</", "<\\/")
-
-
-def _enlarged(arrows: Sequence[Arrows], mesh: TetMesh) -> int:
-    """How many times as long as they are arrows are drawn at first: a large one is a tenth of the body."""
-    if not arrows or not len(arrows[0].vectors):
-        return 1
-    large = float(np.quantile(np.linalg.norm(arrows[0].vectors, axis=1), 0.95))
-    size = float(np.ptp(mesh.points, axis=0).max())
-    return int(np.clip(round(0.1 * size / max(large, 1e-9)), 1, 40))
 
 
 def _field(field: Field, used: Any) -> dict[str, Any]:
