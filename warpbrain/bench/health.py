@@ -34,7 +34,7 @@ from warpbrain.threads import processors, thread_count
 _GIB = 2.0**30
 
 
-def health(on_test: Callable[[str], None] = lambda device: None) -> dict[str, Any]:
+def health(on_test: Callable[[str], None]) -> dict[str, Any]:
     """Look at the machine and run the self-test on each of its devices; Warp must have been started.
 
     `on_test` is called with the alias of each device before its test. The dictionary is for JSON; memory is in GiB, and

@@ -1,4 +1,5 @@
-"""Measures one row: pre-processing, the phases of a step one by one, and the step as users get it.
+"""`python -m warpbrain.bench`: pre-processing, each phase of a step, and the step as users get it, beside the paper's
+Table 3.
 
 Table 3 times everything from a mesh in memory to the first step. Here much of that is kept once it is made, with a
 `TetMesh`, a `Case` or a `Model`, by mesh or by bytes of coordinates, because a diagnosis asks for the same mesh
@@ -9,7 +10,9 @@ that is paid once on a machine or in a process, not for a mesh.
 
 from __future__ import annotations
 
+import argparse
 import gc
+import statistics
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -19,15 +22,19 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.bench.table3 import MAIN_LOOP, Row
+from warpbrain.bench import command
+from warpbrain.bench.table3 import MAIN_LOOP, TABLE3, Row
 from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
+from warpbrain.kernels.module import find_device, find_precision
 from warpbrain.kernels.persistent import blocks_stay
 from warpbrain.mesh import TetMesh
-from warpbrain.simulation.dynamics import PHASES, PhaseClock, Simulator
+from warpbrain.report.page import lines
+from warpbrain.simulation.dynamics import PHASES, PhaseClock, Simulator, finest_tolerance
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
+from warpbrain.terminal.progress import Progress
 
 #: The motion starts again from rest after this many steps: the phantom's load crushes its softest mesh after 50 to
 #: 60 ms (see docs/phantom.md), and timing inverted elements would be worthless.
@@ -36,6 +43,51 @@ RESTART = 20
 BODIES = 10
 #: Names of times beside those of the phases.
 PREPROCESSING, STEP = "pre-processing", "step without instruments"
+
+
+def bench(options: argparse.Namespace) -> None:
+    """Measure and print."""
+    names = command.chosen("--rows", options.rows, list(TABLE3))
+    versions, where = command.start(options), command.host()
+    devices = [d.alias for d in wp.get_devices()] if options.device == "all" else [find_device(options.device).alias]
+    results = []
+    for alias in devices:
+        device = wp.get_device(alias)
+        tolerance = finest_tolerance(options.tol, find_precision(options.precision))
+        command.say("steps", device, options, tolerance, RESTART, BODIES, command.release(versions))
+        progress = Progress("bench")
+        for number, name in enumerate(names):
+            progress.show(number / len(names), f"{name} on {alias}")
+            measured = measure_row(TABLE3[name], alias, options.precision, options.steps, options.warmup, options.tol)
+            progress.clear()
+            results.append(measured)
+            print(*_lines(measured), sep="\n")
+        print("", *_table(results[-len(names) :]), sep="\n")
+    command.write(options.json, {"versions": versions, "host": where, "rows": results})
+
+
+def _columns(measured: dict[str, Any]) -> dict[str, tuple[list[float], tuple[float, float | None]]]:
+    """Samples beside the paper's mean and sd [ms], by what they are of."""
+    ours, paper = measured["milliseconds"], measured["paper_milliseconds"]
+    theirs = {**paper, PREPROCESSING: (paper[PREPROCESSING], None), STEP: paper[MAIN_LOOP]}
+    return {name: (samples, theirs[name]) for name, samples in ours.items() if name in theirs}
+
+
+def _lines(measured: dict[str, Any]) -> list[str]:
+    """A row of the table with its phases, ours beside the paper's."""
+    columns = _columns(measured)
+    first, *others = columns.items()
+    # a body's first step is replayed once it is captured: both stand between a mesh in memory and that step
+    both = [sum(pair) for pair in zip(first[1][0], measured["milliseconds"]["capture"], strict=True)]
+    rows = first, ("and capture of the step", (both, first[1][1])), *others
+    return lines("bench.txt", "row", measured, rows, columns[STEP][0], statistics)
+
+
+def _table(results: list[dict[str, Any]]) -> list[str]:
+    """The paper's table again: a line for each row, each cell our mean (sd) | the paper's mean = how often faster."""
+    heads = [label.removeprefix("step ") for label in _columns(results[0])]
+    rows = [(measured, _columns(measured).values()) for measured in results]
+    return lines("bench.txt", "table", heads, rows, statistics)
 
 
 def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, tolerance: float) -> dict[str, Any]:

@@ -48,7 +48,8 @@ def check(options: argparse.Namespace) -> None:
     """Check case folders completely."""
     from warpbrain.cases.checking import check_case
     from warpbrain.cases.shipped import files_of
-    from warpbrain.report.summary import check_lines
+    from warpbrain.report.page import lines
+    from warpbrain.report.summary import SET_TITLES
     from warpbrain.simulation.run import why_not
 
     wrong = 0
@@ -56,7 +57,7 @@ def check(options: argparse.Namespace) -> None:
         checked = check_case(file)
         wrong += len(checked.problems)
         cannot = why_not(checked.case) if checked.case is not None and not checked.problems else ""
-        print(*check_lines(checked, cannot), sep="\n")
+        print(*lines("case.txt", "check", checked, cannot, SET_TITLES), sep="\n")
     if wrong:
         raise InputError(f"{options.folder}: {wrong} problem{'s' if wrong > 1 else ''}, listed above")
 

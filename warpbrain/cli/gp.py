@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from itertools import product
 from pathlib import Path
 
@@ -54,7 +55,9 @@ def show(options: argparse.Namespace) -> None:
     curved = [group for group in groups if group.startswith("hyperelastic/")]
     if curved and isinstance(model, Hierarchical):
         papers = asymmetries_of_papers(model.studies)
-        print("", *text.asymmetry_lines([asymmetry(model, group) for group in curved], papers), sep="\n")
+        asymmetries = [asymmetry(model, group) for group in curved]
+        told = lines("gp.txt", "tension_over_compression", asymmetries, list(papers.values()), math.exp)
+        print("", *told, sep="\n")
     other = trained("coregionalised" if model.name == KINDS[0] else "hierarchical", options.variant or "corrected")
     text.write_moduli(out / "moduli.csv", rows)
     save(draw_studies(model, options.group), out / "studies.png")

@@ -16,22 +16,18 @@ from warpbrain.report.two_results import describe_two, read_result
 
 def view(options: argparse.Namespace) -> None:
     """Show a result in a window, or write a page of it."""
+    # windows that are not those of X11 or Wayland can always be opened
+    has_display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if options.html is not None:
         check_writable(options.html)
-    elif not _has_display():
+    elif not has_display:
         raise InputError("view: there is no display here: --html FILE writes a page that any browser shows")
-
     state = read_state(options.result)
     if options.html is None:
         window(state, options.exaggeration).show(title=f"warpbrain: {state.path}")
         return
     write_view_page(options.html, state, options.exaggeration)
     print(f"written: {options.html}")
-
-
-def _has_display() -> bool:
-    """Whether a window can be opened: always, where windows are not those of X11 or Wayland."""
-    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def compare(options: argparse.Namespace) -> None:

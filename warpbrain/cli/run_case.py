@@ -153,7 +153,8 @@ def _run_tests(options: argparse.Namespace, case: Case, out: Path, prior: dict[s
         "versions": tables.machine(),
     }
     with results_in(out, record, options.overwrite):
-        specimen.write_tests_picture(out / "tests.png", done, case.title, subtitle)
+        figure = specimen.tests_figure(done, specimen.COLUMNS)
+        views.save(figure, out / "tests.png", f"{case.title}\n{subtitle}")
         specimen.write_tests(out / "comparison.csv", done)
         write_summary(out / "summary.json", summary)
         write_specimen_page(out / "report.html", summary, done)

@@ -15,7 +15,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.mesh import face_vectors
-from warpbrain.recordings.recording import PointsRecording, SurfaceRecording
+from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.picture import Moved, cameras_of, notes_on, scene_of, show
@@ -210,6 +210,7 @@ def _draw_legend(figure: Any, scene: _Scene) -> None:
         sets.append((_mark(), f"and {left_out} larger, not drawn"))
     arrow = {"marker": ">", "linestyle": "-", "linewidth": 1.8, "markersize": 6.0}
     cross = {"marker": "x", "markersize": 5.0}
+    styles: list[tuple[Recording, dict[str, Any], str]]
     styles = [(r, arrow, colour) for r, colour in zip(scene.tracked, cycle(_ARROWS), strict=False)]
     styles += [(r, cross, colour) for r, colour in zip(scene.surfaces, cycle(_CROSSES), strict=False)]
     recorded = _first([(_mark(color=colour, **style), f"{_short(r.name)}: {r.count}") for r, style, colour in styles])

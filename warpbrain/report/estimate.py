@@ -26,7 +26,7 @@ from warpbrain.worlds.body.uncertainty import AveragedTissue
 _UNEXPLAINED = 0.3
 
 
-def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissue | None = None) -> dict[str, Any]:
+def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissue | None) -> dict[str, Any]:
     """Everything that is known of an estimate, with units in keys or beside the values; docs/estimation.md."""
     prior, parameters, case, options = posterior.prior, posterior.parameters, posterior.case, posterior.options
     check, chain, best, known = posterior.importance, posterior.chain, posterior.best, posterior.identifiability
@@ -306,7 +306,7 @@ def write_predictions(path: Path, posterior: Posterior) -> None:
     write_csv(path, rows)
 
 
-def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | None = None) -> None:
+def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | None) -> None:
     """Write the most probable state of an estimate as VTU with coordinates in mm.
 
     Point arrays: ``displacement`` [mm] and ``displacement_sd`` of its components [mm]: what is not known of the tissue,

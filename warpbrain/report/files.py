@@ -46,7 +46,7 @@ def sets_of(members: Mapping[str, Any]) -> dict[str, Any]:
     return {name: inside.astype(np.uint8) for name, inside in members.items()}
 
 
-def write_result(path: Path, result: Result, mesh_error: Floats | None = None) -> None:
+def write_result(path: Path, result: Result, mesh_error: Floats | None) -> None:
     """Write a result as compressed VTU, coordinates and displacement in mm.
 
     Point arrays: ``displacement`` [mm], ``reaction`` [N], the node sets, ``fluid_pressure`` [Pa] of drainage and, if it

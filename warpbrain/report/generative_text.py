@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from warpbrain.atomic import write_csv
-from warpbrain.gp.asymmetry import Asymmetry
 from warpbrain.gp.sampling import CURVES, DrawnLaws, Fit, Moduli, rejection_rate
 from warpbrain.report.page import lines
-
-
-def asymmetry_lines(asymmetries: Sequence[Asymmetry], papers: Mapping[str, tuple[float, bool]]) -> list[str]:
-    """Compression and tension, a line for each group, and one of the literature, as of `asymmetries_of_papers`."""
-    return lines("gp.txt", "tension_over_compression", asymmetries, list(papers.values()), math.exp)
 
 
 def moduli_lines(moduli: Sequence[Moduli]) -> list[str]:

@@ -31,7 +31,7 @@ COLUMNS = 3
 
 
 def describe_specimen(
-    case: Case, specimen: Specimen, model: Model, in_time: bool = False, chosen: str | None = None
+    case: Case, specimen: Specimen, model: Model, in_time: bool, chosen: str | None
 ) -> dict[str, Any]:
     """Specimen and assumptions, with units; the keys of `describe_case` and those of the specimen.
 
@@ -91,11 +91,6 @@ def write_tests(path: Path, tests: Sequence[Tested]) -> None:
             head = [recording.name, recording.mode, recording.role, row, time]
             rows.append([*head, *imposed, *(f"{v:z.6g}" for v in values), answer_unit])
     write_csv(path, rows)
-
-
-def write_tests_picture(path: Path, tests: Sequence[Tested], title: str, subtitle: str) -> None:
-    """Draw tests as PNG."""
-    views.save(tests_figure(tests, COLUMNS), path, f"{title}\n{subtitle}")
 
 
 def tests_figure(tests: Sequence[Tested], most: int) -> Any:

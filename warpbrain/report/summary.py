@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpbrain import __version__
 from warpbrain.cases.case import Case, Tissue
-from warpbrain.cases.checking import NOTHING_ACTS, Checked
+from warpbrain.cases.checking import NOTHING_ACTS
 from warpbrain.mesh import measure
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import tabled
@@ -147,8 +147,3 @@ def describe_prior(prior: FromPrior) -> dict[str, Any]:
 def show_lines(case: Case) -> list[str]:
     """Everything a case says, as printed."""
     return lines("case.txt", "show", case, measure(case.mesh), SET_TITLES, STAND_IN)
-
-
-def check_lines(checked: Checked, cannot: str) -> list[str]:
-    """What checking found, as printed: problems first; `cannot` says why a sound case cannot be run yet."""
-    return lines("case.txt", "check", checked, cannot, SET_TITLES)

@@ -182,7 +182,7 @@ def element_colours(mesh: TetMesh, resected: Bools, names: Mapping[int, str] | N
     return np.where(resected, RESECTED, np.array([colours[label] for label in mesh.labels])[numbers])
 
 
-def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float = 0.4) -> None:
+def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float) -> None:
     """Fill a cut with the colours of its elements; a rim of the same colour hides the seams between them."""
     from matplotlib.collections import PolyCollection
 

@@ -38,9 +38,8 @@ def screenshot(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int
         camera = cameras[name]
         draw(plotter, scene, name, camera)
         plotter.camera.parallel_projection = True
-        plotter.camera.focal_point = tuple(camera.centre)
-        plotter.camera.position = tuple(camera.centre + 4.0 * camera.half_height * camera.towards)
-        plotter.camera.up = tuple(camera.up)
+        position = camera.centre + 4.0 * camera.half_height * camera.towards
+        plotter.camera_position = position, camera.centre, camera.up
         plotter.camera.parallel_scale = camera.half_height
         plotter.renderer.reset_camera_clipping_range()
     image = plotter.screenshot(return_img=True)
