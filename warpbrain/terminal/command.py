@@ -75,8 +75,7 @@ def exit_status(program: str, call: Callable[[], None], record: Record | None = 
         print(f"{program}: not enough memory{f': {detail}' if detail else ''}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        clear_up()
-        print(f"\n{program}: interrupted; nothing half-written was left", file=sys.stderr)
+        clear_up(program)
         leave_threads()
         # `python -m` ends by the signal itself, whatever status is returned, if the interrupt fell into text that was
         # executed, as dataclasses and Warp do, and no other text has been executed since

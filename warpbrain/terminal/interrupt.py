@@ -26,8 +26,9 @@ from warpbrain.threads import is_working_beside
 _GRACE = 0.6
 
 
-def clear_up() -> None:
-    """Remove what an interrupted process leaves: half-written files, empty folders, folders of half-built kernels."""
+def clear_up(program: str) -> None:
+    """Remove what an interrupted process leaves, half-written files, empty folders, folders of half-built kernels, and
+    say so."""
     remove_unfinished()
     release()
     warp = sys.modules.get("warp")
@@ -36,6 +37,7 @@ def clear_up() -> None:
         # Warp builds a kernel in a folder that carries the process id, and moves it when it is done
         for unfinished in Path(cache).glob(f"*_p{os.getpid()}_t*"):
             shutil.rmtree(unfinished, ignore_errors=True)
+    print(f"\n{program}: interrupted; nothing half-written was left", file=sys.stderr, flush=True)
 
 
 def leave_threads() -> None:
@@ -45,7 +47,6 @@ def leave_threads() -> None:
     """
     module = sys.modules.get("warpbrain.kernels.module")
     if is_working_beside() or (module is not None and module.is_compiling()):
-        sys.stderr.flush()
         os._exit(130)
 
 
@@ -62,8 +63,7 @@ def stop_promptly() -> Iterator[None]:
     def watch() -> None:
         while data := reader.recv(1):
             if data[0] == signal.SIGINT and not finished.wait(_GRACE):
-                clear_up()
-                print("\nwarpbrain: interrupted; nothing half-written was left", file=sys.stderr, flush=True)
+                clear_up("warpbrain")
                 os._exit(130)
 
     previous = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)

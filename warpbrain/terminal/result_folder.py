@@ -102,8 +102,6 @@ MARKS = ("summary.json", "estimate.json", "diagnosis.json", "ensemble.json", "sw
 def choose_folder(requested: Path | None, usual: str, overwrite: bool, allowed_marks: Collection[str] = ()) -> Path:
     """Where results are to be written, known before anything is computed; this process alone has it until it ends.
 
-    A folder that was made for nothing goes again when the command ends (`release`).
-
     Without one that is asked for it is of the usual name, in the working folder; where that has results, or another
     process writes to it, the next free one of ``NAME-2``, ``NAME-3``, ... Of `MARKS` the allowed ones may lie in it:
     what the command reads or goes on with. `InputError` if the folder that was asked for has results and may not be
@@ -135,10 +133,9 @@ def results_in(path: Path, record: Record, replace: bool) -> Iterator[None]:
     """The folder that results are written to in the block, for this process alone; says what was written when it ends,
     and writes the log.
 
-    A folder that was made for nothing goes again. If the results `replace` earlier ones, what these left there by their
-    log and the block did not write is taken away at the end, for nobody should take it for new. The file that says what
-    they are goes first: a process that is killed in the block leaves nothing that could be taken for results, old or
-    new. `InputError` if it cannot be a folder, be written to, or another process writes to it.
+    If the results `replace` earlier ones, what these left there by their log and the block did not write is taken away
+    at the end, for nobody should take it for new. The file that says what they are goes first: a process that is killed
+    in the block leaves nothing that could be taken for results, old or new. `InputError` as of `claim`.
     """
     made = not path.exists()
     claim(path)

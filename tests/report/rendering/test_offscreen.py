@@ -11,16 +11,7 @@ import pytest
 from busy import slowness
 
 from warpbrain.report import rendering
-from warpbrain.report.rendering import (
-    Camera,
-    RenderingError,
-    Scene,
-    read_scene,
-    ready_to_render,
-    render,
-    render_nothing,
-    write_scene,
-)
+from warpbrain.report.rendering import RenderingError, Scene, ready_to_render, render, render_nothing
 
 SCENE = Scene(
     points=np.eye(4, 3), tetrahedra=np.array([[0, 1, 2, 3]]), removed=np.array([False]),
@@ -98,13 +89,3 @@ def _is_there(process: int) -> bool:
     except OSError:
         return False
     return state != "Z"
-
-
-def test_a_scene_comes_back_as_it_went(tmp_path):
-    camera = Camera(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.array([1.0, 2.0, 3.0]), 4.0)
-    write_scene(tmp_path, SCENE, {"a": camera}, (30, 20))
-    scene, cameras, size = read_scene(tmp_path)
-    assert size == (30, 20) and cameras["a"].half_height == 4.0
-    np.testing.assert_array_equal(cameras["a"].towards, [0.0, -1.0, 0.0])
-    for name, value in vars(SCENE).items():
-        np.testing.assert_array_equal(getattr(scene, name), value)

@@ -27,6 +27,8 @@ CUTS = {AXIAL: 2, CORONAL: 1, SAGITTAL: 0}
 NAMES = (BEFORE, AFTER, MOTION, *CUTS)
 #: Colours of Okabe and Ito of what was recorded and of what was computed.
 RECORDED, COMPUTED = "#d55e00", "#0072b2"
+#: File of a scene, its cameras and the size of a picture [pixel], for the process that renders.
+SCENE = "scene.pickle"
 #: Longest that rendering may take [s]: a driver that hangs must not hold a result back.
 _LONGEST = 300.0
 #: A process that waits for a scene.
@@ -94,13 +96,13 @@ class Scene:
 
 
 def render(scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -> dict[str, Any]:
-    """The pictures of a scene that have cameras by name, each (height, width, 3) uint8.
+    """The pictures of a scene that have cameras by name, each (height, width, 3) uint8; `size` is width and height.
 
     `RenderingError` if there is no graphics library, or it fails.
     """
     with tempfile.TemporaryDirectory(prefix="warpbrain-") as name, _ready.pop() if _ready else _begin() as process:
         folder = Path(name)
-        write_scene(folder, scene, cameras, size)
+        (folder / SCENE).write_bytes(pickle.dumps((scene, dict(cameras), size)))
         try:
             _, said = process.communicate(name, timeout=_LONGEST)
         except subprocess.TimeoutExpired:
@@ -152,14 +154,3 @@ def _begin() -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "warpbrain.report.rendering.drawing"]
     piped = subprocess.PIPE
     return subprocess.Popen(command, stdin=piped, stdout=piped, stderr=piped, text=True)
-
-
-def write_scene(folder: Path, scene: Scene, cameras: Mapping[str, Camera], size: tuple[int, int]) -> None:
-    """Write what `read_scene` reads; `size` of each picture is in pixels."""
-    (folder / "scene.pickle").write_bytes(pickle.dumps((scene, dict(cameras), size)))
-
-
-def read_scene(folder: Path) -> tuple[Scene, dict[str, Camera], tuple[int, int]]:
-    """What `write_scene` wrote."""
-    read: tuple[Scene, dict[str, Camera], tuple[int, int]] = pickle.loads((folder / "scene.pickle").read_bytes())
-    return read

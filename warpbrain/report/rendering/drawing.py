@@ -7,6 +7,7 @@ input; without one it ends.
 from __future__ import annotations
 
 import os
+import pickle
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 import pyvista
 
 from warpbrain.arrays import Bools, Floats
-from warpbrain.report.rendering import AFTER, BEFORE, COMPUTED, CUTS, MOTION, NAMES, RECORDED, Camera, Scene, read_scene
+from warpbrain.report.rendering import AFTER, BEFORE, COMPUTED, CUTS, MOTION, NAMES, RECORDED, SCENE, Camera, Scene
 
 #: Colours of where surfaces were, and of arrows over colours.
 GHOST, ARROW = "#c0392b", "#1d1d1d"
@@ -229,7 +230,8 @@ def _main() -> None:
         # the first one loads what is drawn with, while the scene may still be computed
         pyvista.Plotter(off_screen=True).close()
         if name := sys.stdin.read():
-            np.save(Path(name) / "pictures.npy", screenshot(*read_scene(Path(name))))
+            scene = pickle.loads((Path(name) / SCENE).read_bytes())
+            np.save(Path(name) / "pictures.npy", screenshot(*scene))
 
 
 if __name__ == "__main__":
