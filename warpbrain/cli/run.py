@@ -18,27 +18,23 @@ def run(options: argparse.Namespace) -> None:
     _check(options)
     with ready_to_render():
         start_warp_quietly()
-        _begin_loading_kernels(options)
+        # begin to compile what every model needs; `System.load_kernels` does the rest
+        from warpbrain.kernels.assembly import assembly_kernels
+        from warpbrain.kernels.module import begin_loading, find_device, find_precision
+        from warpbrain.kernels.multicore import team_kernels
+
+        device, precision = find_device(options.device), find_precision(options.precision)
+        # the least one first: until it is compiled others wait
+        first = team_kernels()[:1] if device.is_cpu else ()
+        begin_loading([*first, assembly_kernels(precision).gather_matrix], device)
+        # what this imports takes long, too
+        from warpbrain.kernels.linear import solver_kernels
+
+        begin_loading(solver_kernels(precision, device), device)
         # takes as long as all that is imported so far, beside the compiler
         from warpbrain.cli.run_case import run_case
 
         run_case(options)
-
-
-def _begin_loading_kernels(options: argparse.Namespace) -> None:
-    """Begin to compile what every model needs; `System.load_kernels` does the rest."""
-    from warpbrain.kernels.assembly import assembly_kernels
-    from warpbrain.kernels.module import begin_loading, find_device, find_precision
-    from warpbrain.kernels.multicore import team_kernels
-
-    device, precision = find_device(options.device), find_precision(options.precision)
-    # the least one first: until it is compiled others wait
-    first = team_kernels()[:1] if device.is_cpu else ()
-    begin_loading([*first, assembly_kernels(precision).gather_matrix], device)
-    # what this imports takes long, too
-    from warpbrain.kernels.linear import solver_kernels
-
-    begin_loading(solver_kernels(precision, device), device)
 
 
 def _check(options: argparse.Namespace) -> None:

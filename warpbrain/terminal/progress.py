@@ -32,15 +32,13 @@ class Progress:
         if self._bar:
             done = round(30 * share)
             bar = "#" * done + "." * (30 - done)
-            sys.stderr.write(f"\r{self._label} [{bar}] {100 * fraction:3.0f} % {note:<40.40}")
-            sys.stderr.flush()
+            shown = f"\r{self._label} [{bar}] {100 * fraction:3.0f} % {note:<40.40}"
+            print(shown, end="", file=sys.stderr, flush=True)
         elif not self._quiet and time.monotonic() - self._said >= EVERY:
             self._said = time.monotonic()
-            sys.stderr.write(f"{self._label.strip()} {100 * share:.0f} % {note}".rstrip() + "\n")
-            sys.stderr.flush()
+            print(f"{self._label.strip()} {100 * share:.0f} % {note}".rstrip(), file=sys.stderr, flush=True)
 
     def clear(self) -> None:
         """Take the bar away."""
         if self._bar:
-            sys.stderr.write("\r" + " " * (len(self._label) + 82) + "\r")
-            sys.stderr.flush()
+            print("\r" + " " * (len(self._label) + 82), end="\r", file=sys.stderr, flush=True)
