@@ -119,7 +119,7 @@ def measure_row(row: Row, device: str, precision: str, steps: int, warmup: int, 
     iterations = []
     for counts in samples():
         clock = PhaseClock(simulator.system.device)
-        simulator.timed_step(clock)
+        simulator.step(clock)
         if counts:
             for name in PHASES:
                 phases[name].append(1000.0 * clock.seconds[name])

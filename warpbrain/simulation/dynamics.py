@@ -225,13 +225,6 @@ class Simulator:
         inputs = [self._u_start, s.solution, self._v_prescribed, s.free, h, self.v, s.u]
         launch(self._kernels.update, s.size, inputs, s.device)
 
-    def _finish(self) -> None:
-        self.time += self._h
-        self._pending = True
-        if self._moving:
-            self._v_prescribed.zero_()
-            self._moving = False
-
     def _run_phases(self, clock: PhaseClock | None = None) -> None:
         phase: Callable[[str], AbstractContextManager[Any]] = nullcontext if clock is None else clock.phase
         if self.newton > 1:
@@ -253,22 +246,19 @@ class Simulator:
             self.system.advance()
         self._pending = False
 
-    def step(self) -> None:
-        """Advance by one time step."""
+    def step(self, clock: PhaseClock | None = None) -> None:
+        """Advance by one time step; slower with a clock, which is stopped between phases."""
         self._remember()
         self.apply_loads()
-        if self._graph is not None and self._graph_moves == self._moving:
+        if clock is None and self._graph is not None and self._graph_moves == self._moving:
             self._graph.launch()
         else:
-            self._run_phases()
-        self._finish()
-
-    def timed_step(self, clock: PhaseClock) -> None:
-        """Advance by one time step with the clock stopped between phases; slower than `step`."""
-        self._remember()
-        self.apply_loads()
-        self._run_phases(clock)
-        self._finish()
+            self._run_phases(clock)
+        self.time += self._h
+        self._pending = True
+        if self._moving:
+            self._v_prescribed.zero_()
+            self._moving = False
 
     def step_to(self, share: float, clock: PhaseClock | None = None) -> float:
         """Advance by one time step, timed if there is a clock, to where prescribed displacements are at its end.
@@ -277,10 +267,7 @@ class Simulator:
         smallest `J`; for errors see `check`.
         """
         self.prescribe(self.system.model.prescribed_at(self.time + self._h, share))
-        if clock is None:
-            self.step()
-        else:
-            self.timed_step(clock)
+        self.step(clock)
         return self.check()
 
     def capture(self) -> None:
@@ -318,7 +305,7 @@ class Simulator:
         """
         linear = self.last_solve()
         _, min_J = self.system.energy()
-        if fault := fault_of_step(self.time, min_J, linear, self.system.most_compressed):
+        if fault := fault_of_step(self.time, min_J, linear, self.system.least_of):
             raise SolveError(fault)
         return min_J
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -154,11 +155,6 @@ class EquilibriumSolver:
         Adds up the wall time by phase.
     factors : KeptFactors, optional
         Kept by who solves for many states that are near to each other; they serve on the CPU alone.
-
-    Attributes
-    ----------
-    clock : PhaseClock
-        Wall time by phase.
     """
 
     def __init__(
@@ -174,7 +170,6 @@ class EquilibriumSolver:
         self.options = options or EquilibriumOptions()
         self._on_step = on_step
         self.clock = clock or PhaseClock(system.device)
-        self._reference_shift: float | None = None
         self._linear = system.linear_solver(
             tolerance=self.options.cg_tolerance,
             max_iterations=self.options.max_cg,
@@ -207,10 +202,6 @@ class EquilibriumSolver:
         prescribed : (n, 3) array, optional
             Displacement of the constrained components at full load [m]; that of the model by default.
 
-        Returns
-        -------
-        Equilibrium
-
         Raises
         ------
         InputError
@@ -231,12 +222,7 @@ class EquilibriumSolver:
     def linear_estimate(self) -> Floats:
         """Displacement (n, 3) [m] at full load if the body kept the stiffness that it has at rest.
 
-        Raises
-        ------
-        InputError
-            If nothing holds the body, or a part of it.
-        SolveError
-            If the stiffness at rest is not positive definite.
+        `InputError` if nothing holds the body, or a part of it; `SolveError` if that is not positive definite.
         """
         model, system = self.system.model, self.system
         require_held(model)
@@ -249,7 +235,7 @@ class EquilibriumSolver:
         system.gather_forces()
         r = self._free * (model.external_forces() - system.internal.numpy().astype(np.float64))
         prescribed = np.where(model.constrained, model.prescribed, 0.0)
-        d, linear = self._direction(r, prescribed, bool(np.any(prescribed)), self.options.cg_tolerance, 0.0)
+        d, linear = self._direction(r, prescribed, self.options.cg_tolerance, 0.0)
         if linear.indefinite or not np.isfinite(d).all():
             raise SolveError("the stiffness of the body at rest is not positive definite")
         return d
@@ -260,6 +246,7 @@ class EquilibriumSolver:
         """Go on from a state to the equilibrium a time step later, slowly: without inertia, but with memory.
 
         Terms with a memory keep it and take the step into it. To begin at rest, let them forget first (`Term.forget`).
+        Raises as `solve`.
 
         Parameters
         ----------
@@ -271,11 +258,6 @@ class EquilibriumSolver:
             At the end of the step [s], for what has a ramp; by default long after every one.
         prescribed : (n, 3) array, optional
             Displacement of the constrained components at the end of the step [m]; that of the model by default.
-
-        Raises
-        ------
-        InputError, SolveError
-            As `solve`.
         """
         equilibrium = self.try_step(start, time_step, time, prescribed)
         self.system.u.assign(equilibrium.u)
@@ -294,9 +276,9 @@ class EquilibriumSolver:
             return self._follow(np.array(start, dtype=np.float64), model.external_forces(time), prescribed, time)
 
     def _follow(
-        self, start: Floats, full: Floats, prescribed: Floats, time: float | None = None, from_rest: bool = False
+        self, start: Floats, full: Floats, prescribed: Floats, time: float = math.inf, from_rest: bool = False
     ) -> Equilibrium:
-        """Go from a state to full load, from rest in load steps; see the module. At a time, what acts is that of it.
+        """Go from a state to full load, from rest in load steps; see the module. What acts is that of the time.
 
         With one thread of BLAS: a sum over nodes takes less than to wake others, and bits would depend on their number.
         """
@@ -308,15 +290,15 @@ class EquilibriumSolver:
         while done < 1.0:
             load = min(1.0, done + step)
             target = origin + load * (prescribed - origin * model.constrained)
-            if time is None:
-                self.system.set_load(load if from_rest else 1.0)
-            else:
-                self.system.set_load(time=time)
+            self.system.set_load(load if from_rest else 1.0, time)
             external = load * full if from_rest else full
             try:
                 if load < 1.0 and not from_rest:
                     if out_of_balance is None:
-                        out_of_balance = self._out_of_balance(start, full)
+                        self.system.u.assign(start)
+                        out_of_balance = self._free * (full - self.system.internal_forces())
+                    if not np.isfinite(out_of_balance).all():
+                        raise _StepFailed("the out-of-balance force of the start is not finite")
                     external = full - (1.0 - load) * out_of_balance
                 reached, energy, residual = self._newton(u, load, external, target)
             except _StepFailed as failure:
@@ -338,14 +320,6 @@ class EquilibriumSolver:
             if done == 1.0:
                 u, energy, residual = self._augmented(u, full, target, energy, residual)
         return Equilibrium(u, self.system.internal.numpy().astype(np.float64), energy, residual, tuple(self._history))
-
-    def _out_of_balance(self, u: Floats, external: Floats) -> Floats:
-        """What a displacement (n, 3) [m] leaves out of balance on free components (n, 3) [N]."""
-        self.system.u.assign(u)
-        r = self._free * (external - self.system.internal_forces())
-        if not np.isfinite(r).all():
-            raise _StepFailed("the out-of-balance force of the start is not finite")
-        return r
 
     def _augmented(
         self, u: Floats, full: Floats, target: Floats, energy: float, residual: float
@@ -426,17 +400,22 @@ class EquilibriumSolver:
             # far from equilibrium the tangent changes too much from step to step
             near = secants is not None and not moving and relative < _NEAR
             predicted, remaining = secants.split(u, r) if secants is not None and near else (0.0, r)
-            d, linear, shift, indefinite = self._descent(remaining, prescribed, moving, min(eta, 0.5), shift)
+            d, linear, shift, indefinite = self._descent(remaining, prescribed, min(eta, 0.5), shift)
             d = d + predicted
             if options.contracts and secants is None and not moving:
-                largest = self._require_less(r, d, largest)
+                # half the square of Newton's decrement: unlike lengths it is right where systems are solved roughly,
+                # which leaves most of what is soft
+                gain = 0.5 * float(np.vdot(r, d))
+                if not gain < largest:
+                    raise _StepFailed(f"Newton's method does not contract: {largest:.1e} J to gain, then {gain:.1e} J")
+                largest = gain
             with self.clock.phase("line search"):
                 alpha, u, potential, min_J = self._line_search(u, d, r, external, potential, moving)
             if options.contracts and alpha < 1.0:
                 raise _StepFailed(f"a whole step of Newton's method leads too far{self._worst_element()}")
             record = NewtonStep(load, iteration, relative, linear.iterations, alpha, min_J, indefinite)
             # try the tangent itself again soon: only that converges quadratically
-            shift = 0.1 * shift if shift > self._least_shift() else 0.0
+            shift = 0.1 * shift if shift > self._least_shift else 0.0
             self._history.append(record)
             if self._on_step is not None:
                 self._on_step(record)
@@ -445,29 +424,16 @@ class EquilibriumSolver:
             f"(relative residual {relative:.1e}, goal {self.tolerance:.1e}){self._worst_element()}"
         )
 
-    @staticmethod
-    def _require_less(r: Floats, d: Floats, largest: float) -> float:
-        """The energy [J] that a step (n, 3) [m] is expected to gain, which must be less than that of the one before it.
-
-        Of forces `r` (n, 3) [N]: half the square of Newton's decrement. Unlike lengths it is right where systems are
-        solved roughly, which leaves most of what is soft.
-        """
-        energy = 0.5 * float(np.vdot(r, d))
-        if not energy < largest:
-            raise _StepFailed(f"Newton's method does not contract: {largest:.1e} J to gain, then {energy:.1e} J")
-        return energy
-
+    @cached_property
     def _least_shift(self) -> float:
         """A multiple of the mass that is just felt beside the tangent: 0.1 % of its mean diagonal [1/s2]."""
-        if self._reference_shift is None:
-            # picked on the device: the whole matrix takes longer to copy than a system to solve
-            diagonal = self.system.matrix.values[self.system.diagonal].numpy()
-            stiffness = float(np.mean(np.trace(diagonal, axis1=1, axis2=2))) / 3.0
-            self._reference_shift = 1e-3 * abs(stiffness) / float(np.mean(self.system.model.node_masses))
-        return self._reference_shift
+        # picked on the device: the whole matrix takes longer to copy than a system to solve
+        diagonal = self.system.matrix.values[self.system.diagonal].numpy()
+        stiffness = float(np.mean(np.trace(diagonal, axis1=1, axis2=2))) / 3.0
+        return 1e-3 * abs(stiffness) / float(np.mean(self.system.model.node_masses))
 
     def _descent(
-        self, r: Floats, prescribed: Floats, moving: bool, eta: float, shift: float
+        self, r: Floats, prescribed: Floats, eta: float, shift: float
     ) -> tuple[Floats, LinearResult, float, bool]:
         """Newton's direction, with as much of the mass added to the tangent as makes it positive definite.
 
@@ -475,7 +441,7 @@ class EquilibriumSolver:
         """
         indefinite = False
         while True:
-            d, linear = self._direction(r, prescribed, moving, eta, shift)
+            d, linear = self._direction(r, prescribed, eta, shift)
             if not linear.indefinite:
                 break
             indefinite = True
@@ -483,9 +449,9 @@ class EquilibriumSolver:
                 f"the tangent stiffness is indefinite (curvature {linear.curvature:.2e} N/m along a search direction): "
                 f"the equilibrium path turns or branches here{self._worst_element()}"
             )
-            if not self.options.pass_unstable or shift > 1e6 * self._least_shift():
+            if not self.options.pass_unstable or shift > 1e6 * self._least_shift:
                 raise _StepFailed(unstable)
-            shift = max(10.0 * shift, self._least_shift())
+            shift = max(10.0 * shift, self._least_shift)
         if not np.all(np.isfinite(d)):
             where = self._worst_element()
             raise _StepFailed(f"conjugate gradients broke down after {linear.iterations} iterations{where}")
@@ -496,15 +462,13 @@ class EquilibriumSolver:
             )
         return d, linear, shift, indefinite
 
-    def _direction(
-        self, r: Floats, prescribed: Floats, moving: bool, eta: float, shift: float
-    ) -> tuple[Floats, LinearResult]:
+    def _direction(self, r: Floats, prescribed: Floats, eta: float, shift: float) -> tuple[Floats, LinearResult]:
         """Solve `(K + shift M) d = r`, with prescribed increments."""
         system = self.system
         with self.clock.phase("assemble system"):
             system.assemble(k=1.0, m=shift)
             system.load.assign(r)
-            if moving:
+            if prescribed.any():
                 system.increment.assign(prescribed)
                 system.subtract_constrained_load(system.increment, 1.0)
             system.solution.zero_()
@@ -519,13 +483,6 @@ class EquilibriumSolver:
         energy, min_J = self.system.energy()
         return energy - float(np.vdot(external, u)), min_J
 
-    def _without_potential(self, u: Floats) -> Floats | None:
-        """Forces [N] that have no potential; None if there is no such term."""
-        if all(term.conservative for term in self.system.terms):
-            return None
-        self.system.u.assign(u)
-        return self.system.forces_without_potential()
-
     def _line_search(
         self, u: Floats, d: Floats, r: Floats, external: Floats, potential: float, moving: bool
     ) -> tuple[float, Floats, float, float]:
@@ -537,11 +494,12 @@ class EquilibriumSolver:
             raise _StepFailed("Newton's direction does not descend: the tangent stiffness is not positive definite")
         alpha = 1.0
         min_J = np.nan
-        before = self._without_potential(u)
+        self.system.u.assign(u)
+        before = self.system.forces_without_potential()
         while alpha > 1e-3:
             trial = u + alpha * d
             reached, min_J = self._potential(trial, external)
-            after = self._without_potential(trial)
+            after = self.system.forces_without_potential()
             # of forces without a potential, the work along the step by the trapezoidal rule
             work = 0.0 if before is None or after is None else 0.5 * alpha * float(np.vdot(before + after, d))
             descends = moving or reached + work <= potential + 1e-4 * alpha * slope + noise
@@ -553,7 +511,7 @@ class EquilibriumSolver:
 
     def _worst_element(self) -> str:
         """Where the element with the smallest J of the last evaluation is, for a message."""
-        return f"; most compressed {self.system.most_compressed()}, J = {np.min(self.system.element_J.numpy()):.3g}"
+        return f"; most compressed {self.system.least_of()}, J = {np.min(self.system.element_J.numpy()):.3g}"
 
 
 def solve_equilibrium(

@@ -190,11 +190,24 @@ def mesh_error(
     def solve(elements: str, small: bool, start: Floats) -> State:
         solved = replace(finer.model(model) if small and finer is not None else model, elements=elements)
         label = "half the size" if small else elements
-        say = (lambda share: None) if on_share is None else (lambda share: on_share(share, label))
+        system = System(solved, device)
+
+        def say(share: float) -> None:
+            if on_share is not None:
+                on_share(share, label)
+
         try:
             if steps is None:
-                return _equilibrium(System(solved, device), start, say)
-            return _motion(System(solved, device), steps, say)
+                say(0.0)
+                options = EquilibriumOptions(tolerance=TOLERANCE)
+                found = EquilibriumSolver(system, options, lambda step: say(step.load)).solve(start=start)
+                reactions = solved.reactions(found.internal, solved.external_forces())
+                return NodalState(system.mesh, found.u, reactions)
+            simulator = Simulator(system)
+            for step in range(1, steps + 1):
+                simulator.step_to(step / steps)
+                say(step / steps)
+            return nodal_state_of(system, simulator.time)
         except SolveError as error:
             raise SolveError(f"on elements {'of half the size' if small else elements}: {error}") from None
 
@@ -204,19 +217,3 @@ def mesh_error(
 def observe_without(case: Case, result: Result, error: MeshError, time: float | None = None) -> Observed:
     """Recordings beside a state with the estimated error taken off; see `observe`."""
     return observe(case, NodalState(result.mesh, result.u + error.u, result.reactions + error.reactions), time)
-
-
-def _equilibrium(system: System, start: Floats, say: Callable[[float], None]) -> NodalState:
-    say(0.0)
-    options = EquilibriumOptions(tolerance=TOLERANCE)
-    equilibrium = EquilibriumSolver(system, options, lambda step: say(step.load)).solve(start=start)
-    reactions = system.model.reactions(equilibrium.internal, system.model.external_forces())
-    return NodalState(system.mesh, equilibrium.u, reactions)
-
-
-def _motion(system: System, steps: int, say: Callable[[float], None]) -> NodalState:
-    simulator = Simulator(system)
-    for step in range(1, steps + 1):
-        simulator.step_to(step / steps)
-        say(step / steps)
-    return nodal_state_of(system, simulator.time)

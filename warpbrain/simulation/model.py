@@ -61,7 +61,7 @@ class Damping:
     mass: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value in (("stiffness", self.stiffness), ("mass", self.mass)):
+        for name, value in vars(self).items():
             if not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"damping: {name} = {value}: expected a number >= 0")
 
@@ -275,7 +275,11 @@ class Model:
             at_nodes = self._whole_forces
         else:
             part = self.remaining_part([mechanism.factor(time) for mechanism in self.emptying])
-            at_nodes = self._at_nodes(self.unit_forces if unit_forces is None else unit_forces, part)
+            nodes = self.quadratic or self.mesh
+            at_nodes = [
+                summed_at_nodes(nodes, part[:, None, None] * forces) if isinstance(load, BodyForce) else forces
+                for load, forces in zip(self.loads, unit_forces or self.unit_forces, strict=True)
+            ]
         for load, forces in zip(self.loads, at_nodes, strict=True):
             total += load.factor(time) * forces
         return total
@@ -284,14 +288,6 @@ class Model:
     def _whole_forces(self) -> list[Floats]:
         """Nodal forces (n, 3) [N] of each load at factor 1 on all of the tissue, for every step of a motion."""
         return [load.nodal_forces(self.quadratic or self.mesh) for load in self.loads]
-
-    def _at_nodes(self, unit_forces: Sequence[Floats], part: Floats) -> list[Floats]:
-        """Forces of each load on the nodes (n, 3) [N], those on the volume times the part (m,) of it that is left."""
-        nodes = self.quadratic or self.mesh
-        return [
-            summed_at_nodes(nodes, part[:, None, None] * forces) if isinstance(load, BodyForce) else forces
-            for load, forces in zip(self.loads, unit_forces, strict=True)
-        ]
 
 
 def unaware_of_midsides(model: Model) -> list[str]:

@@ -103,13 +103,8 @@ def nodal_state_of(system: System, time: float = math.inf) -> NodalState:
 
 
 def result_of(system: System, time: float = math.inf) -> Result:
-    """Evaluate a system at its present displacement.
-
-    Parameters
-    ----------
-    system : System
-    time : float
-        Of the state [s], for loads with a ramp; by default long after every one.
+    """Strain, stress and reactions of a system at its present displacement, at a time [s]; by default long after every
+    ramp.
     """
     require_kind(system, System, "system", "a System, as warpbrain.System(model) gives")
     state = nodal_state_of(system, time)

@@ -24,14 +24,13 @@ from warpbrain.shown import Shown
 from warpbrain.simulation.dynamics import PhaseClock, Simulator
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver, NewtonStep
 from warpbrain.simulation.locking import choose_elements
-from warpbrain.simulation.model import ELEMENTS, Model, require_held
+from warpbrain.simulation.model import Model, require_held
 from warpbrain.simulation.observation import Observed, observe
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.quasi_static import follow_slowly, growing_times
 from warpbrain.simulation.relaxation import RelaxationOptions, RelaxationStep, relax_to_rest
 from warpbrain.simulation.result import NodalState, Result, nodal_state_of, result_of
 from warpbrain.simulation.specimen import SpecimenRun, SpecimenRunning, not_transmitted, specimen_of
-from warpbrain.simulation.swing import Swing
 from warpbrain.simulation.system import System
 
 #: Steps of slow change where nobody names a number.
@@ -138,26 +137,20 @@ def _to_rest(system: System, course: Course, watching: Watching) -> Followed:
     if course.time_step is not None:
         options = replace(options, time_step=course.time_step, swing=True)
     state = relax_to_rest(system, options, on_step, clock)
+    swing = state.swing and {
+        "frequency_Hz": state.swing.frequency,
+        "damping": state.swing.damping,
+        "damping_in_steps": state.swing.damping_in_steps,
+        "time_step_s": state.swing.time_step,
+    }
     solution = {
         "kind": "at rest",
         "tolerance": state.tolerance,
         "relative_residual": state.residual,
-        **({"swing": _described(state.swing)} if options.swing else {}),
+        **({"swing": swing} if options.swing else {}),
         "history": [vars(step) for step in state.history],
     }
     return Followed(solution, None, (*times, time.perf_counter())[0], clock.seconds, clock.counts)
-
-
-def _described(swing: Swing | None) -> dict[str, float] | None:
-    """For `summary.json`; dampings are relative to critical."""
-    if swing is None:
-        return None
-    return {
-        "frequency_Hz": swing.frequency,
-        "damping": swing.damping,
-        "damping_in_steps": swing.damping_in_steps,
-        "time_step_s": swing.time_step,
-    }
 
 
 def _motion(case: Case, system: System, steps: int, watching: Watching) -> Followed:
@@ -254,7 +247,6 @@ class Run(Shown):
 
     Attributes
     ----------
-    case : Case
     model : Model
         Of the case, with the elements that were asked for or chosen.
     chosen : str or None
@@ -313,8 +305,6 @@ class Running:
         self.chosen: str | None = None
         if elements is None:
             elements, self.chosen = choose_elements(model, needed_by)
-        elif elements not in ELEMENTS:
-            raise InputError(f"elements = {elements!r}: expected one of {', '.join(ELEMENTS)}")
         self.model = replace(model, elements=elements)
         self.system = System(self.model, device, precision)
 

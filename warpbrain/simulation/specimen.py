@@ -11,6 +11,7 @@ What has a memory (viscoelasticity) or a ramp follows the times of the test inst
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +27,7 @@ from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.recordings.comparison import Comparison
 from warpbrain.recordings.recording import TestRecording
 from warpbrain.shown import Shown
-from warpbrain.simulation.equilibrium import Equilibrium, EquilibriumOptions, EquilibriumSolver
+from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.history import History, history_of
 from warpbrain.simulation.locking import choose_elements
 from warpbrain.simulation.model import Material, Model, with_mechanisms
@@ -205,12 +206,12 @@ class Rig:
         sides = imposed_values(recording.imposed, rest, steps)
         at_rest = _State(rest)
         if self.system.model.mechanisms:
-            at_rest = self._equilibrium(recording, rest, at_rest)
+            at_rest = self._solved(recording, rest, at_rest)
         states = [at_rest]
         for side in sides:
             last = at_rest
             for value in side.tolist():
-                last = self._equilibrium(recording, value, last)
+                last = self._solved(recording, value, last)
                 states.append(last)
                 on_state((len(states) - 1) / sum(map(len, sides)))
         if recording.force_controlled:
@@ -226,7 +227,7 @@ class Rig:
             for _ in range(_FARTHER * steps):
                 if sign * last.response >= sign * force:
                     break
-                last = self._equilibrium(recording, last.imposed + sign * reach / steps, last)
+                last = self._solved(recording, last.imposed + sign * reach / steps, last)
                 states_beyond.append(last)
             else:
                 raise SolveError(
@@ -245,45 +246,38 @@ class Rig:
         history = history_of(recording.time, recording.imposed, reach, steps, self._shortest, ramps)
         start, first = float(history.time[0]), float(history.imposed[0])
         self.system.forget()
-        state = self._step(recording, rest, np.zeros((len(self._top), 3)), math.inf, start)
+        state = self._solved(recording, rest, _State(rest), math.inf, start)
         if first != rest:
-            state = self._step(recording, first, state.u, 0.0, start)
+            state = self._solved(recording, first, state, 0.0, start)
         states = [state]
-        for k in range(1, len(history.time)):
-            before, time, value = (float(x) for x in (history.time[k - 1], history.time[k], history.imposed[k]))
-            states.append(self._step(recording, value, states[-1].u, time - before, time))
+        rows = zip(history.time.tolist(), history.imposed.tolist(), strict=True)
+        for (before, _), (time, value) in itertools.pairwise(rows):
+            states.append(self._solved(recording, value, states[-1], time - before, time))
             on_state(len(states) / len(history.time))
         return _result(recording, states, history)
 
-    def _step(self, recording: TestRecording, value: float, start: Floats | None, h: float, time: float) -> _State:
-        """The state a time step `h` after another, at a time."""
-        assert start is not None
-        return self._solved(recording, value, lambda u: self.solver.step(start, h, time, u), at=f" at {time:.4g} s")
-
-    def _equilibrium(self, recording: TestRecording, value: float, last: _State) -> _State:
-        """Equilibrium at an imposed value, from the state before it."""
-        came = f", coming from {SHOWN[recording.quantities[0]][0] * last.imposed:.4g}"
-        return self._solved(recording, value, lambda u: self.solver.solve(start=last.u, prescribed=u), came=came)
-
     def _solved(
-        self,
-        recording: TestRecording,
-        value: float,
-        solve: Callable[[Floats], Equilibrium],
-        at: str = "",
-        came: str = "",
+        self, recording: TestRecording, value: float, last: _State, h: float | None = None, time: float = math.inf
     ) -> _State:
-        led = np.where(self._led[:, None], self._platen(recording, value), 0.0)
+        """The equilibrium at an imposed value, from the state before it; with `h`, that a time step after it at a
+        time.
+        """
+        led = np.where(self._led[:, None], self._platen(recording, value), 0.0) * self.system.model.constrained
         try:
-            state = solve(led * self.system.model.constrained)
-            response = self._response(recording, state.u, state.internal)
-            return _State(value, response, len(state.history), state.min_J, state.unstable_iterations, state.u)
+            if h is None:
+                state = self.solver.solve(start=last.u, prescribed=led)
+            else:
+                state = self.solver.step(np.zeros_like(led) if last.u is None else last.u, h, time, led)
         except SolveError as error:
-            factor, unit = SHOWN[recording.quantities[0]]
+            quantity = recording.quantities[0]
+            factor, unit = SHOWN[quantity]
+            at, came = f" at {time:.4g} s", f", coming from {factor * last.imposed:.4g}"
             raise SolveError(
-                f"test '{recording.name}' ({recording.mode}){at}: {recording.quantities[0]} {factor * value:.4g} "
-                f"{unit}{came}: {error}"
+                f"test '{recording.name}' ({recording.mode}){'' if h is None else at}: {quantity} {factor * value:.4g} "
+                f"{unit}{came if h is None else ''}: {error}"
             ) from None
+        response = self._response(recording, state.u, state.internal)
+        return _State(value, response, len(state.history), state.min_J, state.unstable_iterations, state.u)
 
     def _platen(self, recording: TestRecording, value: float) -> Floats:
         """Displacement (n, 3) [m] that the upper platen would give to each node."""

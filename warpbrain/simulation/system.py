@@ -29,7 +29,7 @@ from warpbrain.physics.laws.device import GrownLaw
 from warpbrain.physics.mechanism import Following
 from warpbrain.physics.term import T, Term
 from warpbrain.simulation.assembly import Assembly
-from warpbrain.simulation.averaged import PART, AveragedTerm, Patches, averaged_modulus, own_modulus, patches_of
+from warpbrain.simulation.averaged import PART, AveragedTerm, averaged_modulus, own_modulus, patches_of
 from warpbrain.simulation.coupled import CoupledSolver
 from warpbrain.simulation.factors import KeptFactors
 from warpbrain.simulation.mixed import NodalVolumeTerm
@@ -45,14 +45,10 @@ def _code(material: Material) -> tuple[type[Law], str, int]:
 class ElementGroup:
     """Elements that share a law and formulation: one launch, whatever their tissues."""
 
+    count: int
     kernels: ElementKernels
     on_device: Any  # the struct of its kernels
     averaged: list[AveragedTerm]
-
-    @property
-    def count(self) -> int:
-        """How many there are."""
-        return len(self.on_device.elements)
 
 
 class System:
@@ -109,6 +105,7 @@ class System:
         self.constrained: Bools = model.constrained
         self.movable: Bools = np.asarray(~model.constrained.all(axis=1))
         self._kernels = assembly_kernels(self.precision)
+        self._averages, self._mixes = (model.elements == kind for kind in ("tet4-averaged", "tet10-mixed"))
         self._place_mesh()
         # of each element; terms ask for them
         self.stiffness_factors, self.remaining_parts = np.ones(self.elements), np.ones(self.elements)
@@ -120,6 +117,13 @@ class System:
         # of what alters elements, as they are now; None: not known yet
         alters = model.growing or model.weakening or model.emptying or self._averages or self._mixes
         self._scales: tuple[float, ...] | None = None if alters else ()
+        #: From a material to the volumetric modulus [Pa] that elements have themselves.
+        self._modulus: Callable[[Material], float] = attrgetter("volumetric_modulus")
+        if self._averages:
+            self._modulus = own_modulus
+        elif self._mixes:
+            # all of it acts on the volumes at corners
+            self._modulus = lambda _material: 0.0
         self.groups = self._group_elements()
         self.terms += [term for group in self.groups for term in group.averaged]
         self._volumes_at_nodes: NodalVolumeTerm | None = None
@@ -179,32 +183,22 @@ class System:
             device_law: DeviceLaw = GrownLaw(law) if self.model.growing else law
             linear = self.quadratic is None
             kernels = device_law.kernels(self.precision) if linear else quadratic_kernels(device_law, self.precision)
-            averaged = [AveragedTerm(self, patches, kernels) for patches in self._patches(list(materials))]
+            averaged = []
+            if self._averages:
+                labels, kinds = list(materials), self.model.element_kinds
+                made = self.once("patches", [np.array(labels), kinds], partial(patches_of, self, labels, kinds))
+                averaged = [AveragedTerm(self, patches, kernels) for patches in made]
             group = kernels.group()
             group.elements = self._array(members, int)
             group.nodes, group.inverse_edges, group.volume = self.element_nodes, self.inverse_edges, self.volume
-            group.parameters = self._array(self._parameters(law_type, materials), self.precision.scalar)
-            groups.append(ElementGroup(kernels, group, averaged))
+            parameters = self._parameters(law_type, materials, self._modulus)
+            group.parameters = self._array(parameters, self.precision.scalar)
+            groups.append(ElementGroup(len(members), kernels, group, averaged))
         return groups
-
-    def _patches(self, labels: list[int]) -> list[Patches]:
-        """Of tissues that share a law, where elements are averaged."""
-        if not self._averages:
-            return []
-        kinds = self.model.element_kinds
-        return self.once("patches", [np.array(labels), kinds], lambda: patches_of(self, labels, kinds))
 
     def once(self, kind: str, arrays: Sequence[NDArray[Any]], make: Callable[[], T]) -> T:
         """See `Assembly.once`."""
         return self.assembly.once(kind, arrays, make)
-
-    @property
-    def _averages(self) -> bool:
-        return self.model.elements == "tet4-averaged"
-
-    @property
-    def _mixes(self) -> bool:
-        return self.model.elements == "tet10-mixed"
 
     @staticmethod
     def _grouped(model: Model) -> dict[tuple[type[Law], str], dict[int, Material]]:
@@ -216,13 +210,9 @@ class System:
         return by_code
 
     def _parameters(
-        self, law_type: type[Law], materials: Mapping[int, Material], modulus: Callable[[Material], float] | None = None
+        self, law_type: type[Law], materials: Mapping[int, Material], modulus: Callable[[Material], float]
     ) -> Floats:
         """Parameters by element; 1 where it is of no tissue of the group."""
-        if modulus is None:
-            modulus = own_modulus if self._averages else attrgetter("volumetric_modulus")
-            # all of it acts on the volumes at corners
-            modulus = (lambda _material: 0.0) if self._mixes else modulus
         rows = law_type.parameter_rows([material.law for material in materials.values()])
         # the last column, where something grows, is the growth stretch
         parameters = np.ones((self.elements, 1 + len(rows[0]) + bool(self.model.growing)))
@@ -264,27 +254,25 @@ class System:
         self._require_alike(model)
         # terms ask their body for its moduli
         self._model = model
-        others: dict[int, Term] = {}
+        made = {} if made is None else made
+        others: list[tuple[Term, Term]] = []
+        pairs = zip(before.mechanisms, model.mechanisms, strict=True)
+        following = [(was, now) for was, now in pairs if isinstance(now, Following)]
         try:
-            pairs = zip(before.mechanisms, model.mechanisms, strict=True)
-            following = [(was, now) for was, now in pairs if isinstance(now, Following)]
-            changed = {n: now for n, (was, now) in enumerate(following) if was is not now and was != now}
-            made = {} if made is None else made
-            for place, mechanism in changed.items():
-                if id(mechanism) not in made:
-                    made[id(mechanism)] = mechanism.bind(self)
-                others[place] = made[id(mechanism)]
-            for place, other in others.items():
-                if not self._following[place].fits(other):
-                    raise InputError(
-                        f"mechanism {changed[place]}: acts on other nodes, or has more numbers, than before"
-                    )
+            for term, (was, now) in zip(self._following, following, strict=True):
+                if was is now or was == now:
+                    continue
+                if id(now) not in made:
+                    made[id(now)] = now.bind(self)
+                if not term.fits(made[id(now)]):
+                    raise InputError(f"mechanism {now}: acts on other nodes, or has more numbers, than before")
+                others.append((term, made[id(now)]))
         except InputError:
             self._model = before
             raise
-        for place, other in others.items():
+        for term, other in others:
             other.set_time_step(self._time_step)
-            self._following[place].adopt(other)
+            term.adopt(other)
         if list(before.mechanisms) != list(model.mechanisms):
             self._scales = None if model.growing or model.weakening or model.emptying else self._scales
             self._act()
@@ -319,7 +307,7 @@ class System:
     def _write_materials(self) -> None:
         """Let laws and terms have the moduli, factors and growth that elements have now."""
         for group, ((law_type, _), members) in zip(self.groups, self._grouped(self.model).items(), strict=True):
-            group.on_device.parameters.assign(self._parameters(law_type, members))
+            group.on_device.parameters.assign(self._parameters(law_type, members, self._modulus))
             for term in group.averaged:
                 term.set_elements(self._parameters(law_type, members, averaged_modulus), self.stiffness_factors)
         if self._volumes_at_nodes is not None:
@@ -329,13 +317,10 @@ class System:
             following.take_moduli()
 
     def _place_fields(self) -> None:
-        p, n, m = self.precision, self.size, self.elements
-
-        def vectors() -> wp.array:
-            return wp.zeros(n, dtype=p.vec3, device=self.device)
-
-        self.u, self.internal, self.external = vectors(), vectors(), vectors()
-        self.load, self.solution, self.increment = vectors(), vectors(), vectors()
+        p, n = self.precision, self.size
+        self.u, self.internal, self.external, self.load, self.solution, self.increment = (
+            wp.zeros(n, dtype=p.vec3, device=self.device) for _ in range(6)
+        )
         self.coupling_factor = 1.0
         self._stiffness_factor = wp.ones(1, dtype=p.scalar, device=self.device)
         self.free = self._array(1.0 - self.model.constrained, p.vec3)
@@ -357,8 +342,9 @@ class System:
         self.element_forces, self.element_blocks = parts(self.stencils)
         for term in self.terms:
             term.place(*parts(term.stencils))
-        self.element_energy = wp.zeros(m, dtype=p.scalar, device=self.device)
-        self.element_J = wp.zeros(m, dtype=p.scalar, device=self.device)
+        self.element_energy, self.element_J = (
+            wp.zeros(self.elements, dtype=p.scalar, device=self.device) for _ in range(2)
+        )
 
     # -- sums over elements ---------------------------------------------------------------------------------------
 
@@ -458,26 +444,15 @@ class System:
         assert self._volumes_at_nodes is not None
         self._volumes_at_nodes.add_stiffness(x, factor, y, self.free, self.free, self._stiffness_factor)
 
-    def subtract_constrained_load(self, increment: wp.array, k: float, coupling: float | None = None) -> None:
-        """`load -= k K increment` on the free components, for increments of the constrained ones.
+    def subtract_constrained_load(
+        self, increment: wp.array, k: float, coupling: float | None = None, rows: wp.array = None
+    ) -> None:
+        """`load -= k K increment` for increments of the constrained components, on the components that are 1 in `rows`:
+        the free ones by default.
 
         What unknowns of a term's own do to it counts `coupling` times, `k` times if absent.
         """
-        self._subtract_stiffness_times(increment, k, coupling, self.free)
-
-    def stiffness_times(self, increment: Floats, k: float = 1.0, coupling: float | None = None) -> Floats:
-        """`k K increment` [N] on every component, constrained ones included, shape (n, 3).
-
-        What unknowns of a term's own do to it counts `coupling` times, `k` times if absent.
-        """
-        self.increment.assign(increment)
-        self.load.zero_()
-        added = None if coupling is None else -coupling
-        self._subtract_stiffness_times(self.increment, -k, added, self._all_components)
-        return self.load.numpy().astype(np.float64)
-
-    def _subtract_stiffness_times(self, increment: wp.array, k: float, coupling: float | None, rows: wp.array) -> None:
-        """`load -= k K increment`, of couplings `coupling` times if given, on components that are 1 in `rows`."""
+        rows = self.free if rows is None else rows
         for term in self.terms:
             factor = k if term.coupling is None or coupling is None else coupling
             if factor != 0.0:
@@ -487,6 +462,17 @@ class System:
             self.pair_first, self.contributions, self._flat_blocks, increment, rows, self.precision.scalar(k),
             self.load,
         )  # fmt: skip
+
+    def stiffness_times(self, increment: Floats, k: float = 1.0, coupling: float | None = None) -> Floats:
+        """`k K increment` [N] on every component, constrained ones included, shape (n, 3).
+
+        What unknowns of a term's own do to it counts `coupling` times, `k` times if absent.
+        """
+        self.increment.assign(increment)
+        self.load.zero_()
+        added = None if coupling is None else -coupling
+        self.subtract_constrained_load(self.increment, -k, added, self._all_components)
+        return self.load.numpy().astype(np.float64)
 
     def linear_solver(
         self,
@@ -635,13 +621,15 @@ class System:
         self.set_time_step(other._time_step)
         self.recall(other.remembered())
 
-    def forces_without_potential(self) -> Floats:
-        """Sum of the forces [N], shape (n, 3), at `u` of the terms that have no potential."""
+    def forces_without_potential(self) -> Floats | None:
+        """Sum of the forces [N], shape (n, 3), at `u` of the terms that have no potential; None if all have one."""
+        terms = [term for term in self.terms if not term.conservative]
+        if not terms:
+            return None
         total = np.zeros((self.size, 3))
-        for term in self.terms:
-            if not term.conservative:
-                term.evaluate_forces(self.u)
-                np.add.at(total, term.stencils, term.forces.numpy())
+        for term in terms:
+            term.evaluate_forces(self.u)
+            np.add.at(total, term.stencils, term.forces.numpy())
         return total
 
     @property
@@ -658,13 +646,11 @@ class System:
         by_label = np.array([values[label] for label in self.mesh.labels])
         return np.asarray(by_label[np.searchsorted(self.mesh.labels, self.mesh.tissue)])
 
-    def most_compressed(self) -> str:
-        """Which element had the smallest `J` when the energy was last evaluated, and where it is, for a message."""
-        return self.least_of(self.element_J.numpy())
-
-    def least_of(self, J: Floats) -> str:
-        """The element with the smallest of some volume ratios (m,), and where it is, for a message."""
-        mesh, e = self.mesh, int(np.argmin(J))
+    def least_of(self, J: Floats | None = None) -> str:
+        """The element with the smallest of volume ratios (m,), those of the last `energy` by default, and where it is,
+        for a message.
+        """
+        mesh, e = self.mesh, int(np.argmin(self.element_J.numpy() if J is None else J))
         x, y, z = 1000.0 * mesh.points[mesh.tetrahedra[e]].mean(axis=0)
         return f"element {e} at ({x:.1f}, {y:.1f}, {z:.1f}) mm, tissue {mesh.tissue[e]}"
 
