@@ -244,11 +244,8 @@ class Proposal:
         **where: object,
     ) -> Proposal:
         """A proposal with one coefficient."""
-
-        def made(c: Floats) -> Mechanism:
-            return make(float(c[0]))
-
-        return cls(made, np.array([mean]), np.array([sd]), follows, np.array([start]), **where)  # type: ignore[arg-type]
+        numbers = (np.array([mean]), np.array([sd]))
+        return cls(lambda c: make(float(c[0])), *numbers, follows, np.array([start]), **where)  # type: ignore[arg-type]
 
     @classmethod
     def switch(cls, mechanism: Mechanism, sd: float, follows: Follows = "switch", **where: Any) -> Proposal:
@@ -288,11 +285,8 @@ class Proposal:
                 # beside the body, or in a mesh that is too coarse for it: it would hold no element
                 centre = situation.mesh.centres[nearest]
             x, y, z = centre.tolist()
-
-            def made(coefficient: float) -> Mechanism:
-                return make(coefficient, (x, y, z), radius)
-
-            return cls.of_one(made, 0.0, sd, "smooth", elsewhere=ball, centre=centre, radius=radius, varying=varying)
+            where: dict[str, Any] = {"elsewhere": ball, "centre": centre, "radius": radius, "varying": varying}
+            return cls.of_one(lambda coefficient: make(coefficient, (x, y, z), radius), 0.0, sd, "smooth", **where)
 
         return [ball(site, part * situation.mesh.radius) for site in situation.volume_sites for part in radii]
 

@@ -243,6 +243,10 @@ class Term(abc.ABC):
 class KernelTerm(Term):
     """A term of kernels with a thread for each stencil: for forces, for forces with blocks, and for energies."""
 
+    lasting: ClassVar[tuple[str, ...]] = ("_inputs",)
+    #: What the kernels take before displacements [m] and outputs.
+    _inputs: tuple[Any, ...]
+
     def __init__(
         self, body: Body, stencils: NDArray[np.integer], kernels: Sequence[Any], ramp: Callable[[float], float]
     ) -> None:
@@ -250,12 +254,8 @@ class KernelTerm(Term):
         self._kernels = kernels
         self._energies = self.zeros(len(stencils))
 
-    @abc.abstractmethod
-    def _inputs(self) -> list[Any]:
-        """What the kernels take before displacements [m] and outputs."""
-
     def _launch(self, kernel: Any, u: wp.array, *outputs: wp.array) -> None:
-        self.launch(kernel, len(self.stencils), *self._inputs(), u, *outputs)
+        self.launch(kernel, len(self.stencils), *self._inputs, u, *outputs)
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._launch(self._kernels[0], u, self.forces)
@@ -276,8 +276,6 @@ class TriangleTerm(KernelTerm):
     for each triangle. The ramp is a factor over time [s].
     """
 
-    lasting = ("_triangles",)
-
     def __init__(
         self,
         body: Body,
@@ -291,12 +289,9 @@ class TriangleTerm(KernelTerm):
         self._nodes = self.array(self.stencils, int)
         self._points = self.array(points, body.precision.vec3)
         self._data = self.array(data.reshape(len(triangles), -1), body.precision.scalar)
-        self._triangles = triangles_struct(body.precision)()
-        self._triangles.nodes, self._triangles.points = self._nodes, self._points
-        self._triangles.data, self._triangles.scale = self._data, self.scale
-
-    def _inputs(self) -> list[Any]:
-        return [self._triangles]
+        t = triangles_struct(body.precision)()
+        t.nodes, t.points, t.data, t.scale = self._nodes, self._points, self._data, self.scale
+        self._inputs = (t,)
 
     def evaluate_tangents(self, u: wp.array) -> None:
         self.evaluate_forces(u)
@@ -331,8 +326,6 @@ class ExtraEnergyTerm(KernelTerm):
     of each element: that on its moduli, or the part of it that is left.
     """
 
-    lasting = ("_group",)
-
     def __init__(
         self,
         body: Body,
@@ -350,10 +343,11 @@ class ExtraEnergyTerm(KernelTerm):
         self._parameters = self.zeros(len(elements), self._numbers.shape[1] + 1)
         self._J = self.zeros(len(elements))
         self.take_moduli()
-        self._group = made()
-        self._group.nodes, self._group.inverse_edges = body.element_nodes, body.inverse_edges
-        self._group.elements, self._group.volume = self._elements, self._volume
-        self._group.parameters, self._group.scale = self._parameters, self.scale
+        group = made()
+        group.nodes, group.inverse_edges = body.element_nodes, body.inverse_edges
+        group.elements, group.volume = self._elements, self._volume
+        group.parameters, group.scale = self._parameters, self.scale
+        self._inputs = (group,)
 
     def take_moduli(self) -> None:
         assert self.elements is not None
@@ -361,9 +355,6 @@ class ExtraEnergyTerm(KernelTerm):
         factor = body.stiffness_factors if self.of_moduli else body.remaining_parts
         self._volume.assign((factor * body.mesh.volumes)[self.elements])
         self._parameters.assign(np.column_stack([self._numbers, body.growth_stretches[self.elements]]))
-
-    def _inputs(self) -> list[Any]:
-        return [self._group]
 
     def energy(self, u: wp.array) -> float:
         self._launch(self._kernels[2], u, self._energies, self._J)

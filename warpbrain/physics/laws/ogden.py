@@ -61,18 +61,33 @@ NEO_HOOKEAN = 2.0
 
 
 @wp.func
+def _logs_of(l: Any):
+    return type(l)(wp.log(l[0]), wp.log(l[1]), wp.log(l[2]))
+
+
+@wp.func
+def _term(logs: Any, mu: Any, alpha: Any):
+    """`mu/alpha (sum_i l_i^alpha - 3)` of `ln l_i`."""
+    powers = power_minus_one(logs[0], alpha) + power_minus_one(logs[1], alpha) + power_minus_one(logs[2], alpha)
+    return mu / alpha * powers
+
+
+@wp.func
+def _quotients(logs: Any, n: Any):
+    """`power_quotient` of the stretches 0 and 1, 0 and 2, 1 and 2."""
+    first = power_quotient(logs[0], logs[1], n)
+    return type(logs)(first, power_quotient(logs[0], logs[2], n), power_quotient(logs[1], logs[2], n))
+
+
+@wp.func
 def _coupled_energy(l: Any, parameters: wp.array2d[Any], e: int):
     terms = (parameters.shape[1] - 1) / 2
-    log_0 = wp.log(l[0])
-    log_1 = wp.log(l[1])
-    log_2 = wp.log(l[2])
-    log_J = log_0 + log_1 + log_2
+    logs = _logs_of(l)
+    log_J = logs[0] + logs[1] + logs[2]
     psi = l.dtype(0.5) * parameters[e, 0] * log_J * log_J
     for p in range(terms):
         mu = parameters[e, 1 + p]
-        alpha = parameters[e, 1 + terms + p]
-        powers = power_minus_one(log_0, alpha) + power_minus_one(log_1, alpha) + power_minus_one(log_2, alpha)
-        psi += mu / alpha * powers - mu * log_J
+        psi += _term(logs, mu, parameters[e, 1 + terms + p]) - mu * log_J
     return psi
 
 
@@ -81,7 +96,7 @@ def _coupled_derivatives(l: Any, parameters: wp.array2d[Any], e: int):
     terms = (parameters.shape[1] - 1) / 2
     lam = parameters[e, 0]
     one = l.dtype(1.0)
-    logs = type(l)(wp.log(l[0]), wp.log(l[1]), wp.log(l[2]))
+    logs = _logs_of(l)
     volumetric = lam * (logs[0] + logs[1] + logs[2])
     T = type(l)()
     diagonal = type(l)()
@@ -95,9 +110,7 @@ def _coupled_derivatives(l: Any, parameters: wp.array2d[Any], e: int):
             power = mu * wp.exp(alpha * logs[i])
             T[i] += power
             diagonal[i] += (alpha - one) * power
-        m[0] += mu * power_quotient(logs[0], logs[1], alpha - one)
-        m[1] += mu * power_quotient(logs[0], logs[2], alpha - one)
-        m[2] += mu * power_quotient(logs[1], logs[2], alpha - one)
+        m += mu * _quotients(logs, alpha - one)
     inverse = type(l)(one / l[0], one / l[1], one / l[2])
     H = lam * wp.outer(inverse, inverse)
     for i in range(3):
@@ -113,23 +126,13 @@ def _coupled_derivatives(l: Any, parameters: wp.array2d[Any], e: int):
 def _uncoupled_energy(l: Any, parameters: wp.array2d[Any], e: int):
     terms = (parameters.shape[1] - 1) / 2
     third = l.dtype(1.0) / l.dtype(3.0)
-    log_0 = wp.log(l[0])
-    log_1 = wp.log(l[1])
-    log_2 = wp.log(l[2])
-    mean = third * (log_0 + log_1 + log_2)
+    logs = _logs_of(l)
+    mean = third * (logs[0] + logs[1] + logs[2])
+    isochoric = type(l)(logs[0] - mean, logs[1] - mean, logs[2] - mean)
     dilation = l[0] * l[1] * l[2] - l.dtype(1.0)
     psi = l.dtype(0.5) * parameters[e, 0] * dilation * dilation
     for p in range(terms):
-        alpha = parameters[e, 1 + terms + p]
-        psi += (
-            parameters[e, 1 + p]
-            / alpha
-            * (
-                power_minus_one(log_0 - mean, alpha)
-                + power_minus_one(log_1 - mean, alpha)
-                + power_minus_one(log_2 - mean, alpha)
-            )
-        )
+        psi += _term(isochoric, parameters[e, 1 + p], parameters[e, 1 + terms + p])
     return psi
 
 
@@ -139,7 +142,7 @@ def _uncoupled_derivatives(l: Any, parameters: wp.array2d[Any], e: int):
     K = parameters[e, 0]
     one = l.dtype(1.0)
     third = l.dtype(1.0) / l.dtype(3.0)
-    logs = type(l)(wp.log(l[0]), wp.log(l[1]), wp.log(l[2]))
+    logs = _logs_of(l)
     mean = third * (logs[0] + logs[1] + logs[2])
     J = l[0] * l[1] * l[2]
     pressure = K * (J - one) * J
@@ -155,10 +158,7 @@ def _uncoupled_derivatives(l: Any, parameters: wp.array2d[Any], e: int):
             power = mu * wp.exp(alpha * (logs[i] - mean))
             q[i] += power
             weighted[i] += alpha * power
-        scaled = mu * wp.exp(-alpha * mean)
-        m[0] += scaled * power_quotient(logs[0], logs[1], alpha - one)
-        m[1] += scaled * power_quotient(logs[0], logs[2], alpha - one)
-        m[2] += scaled * power_quotient(logs[1], logs[2], alpha - one)
+        m += mu * wp.exp(-alpha * mean) * _quotients(logs, alpha - one)
     common = pressure - third * (q[0] + q[1] + q[2])
     all_weighted = third * third * (weighted[0] + weighted[1] + weighted[2])
     inverse = type(l)(one / l[0], one / l[1], one / l[2])

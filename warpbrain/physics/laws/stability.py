@@ -30,11 +30,11 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.laws.law import Law
 
-#: Points beyond each end of a line that the differences take.
-_BEYOND = 3
+#: Points on both sides of one where sixth-order differences are taken, from the left to the right.
+_AROUND = np.arange(-3, 4)
 #: Step of `ln l` for the slope at rest: small enough for exponents of some hundreds.
 _STEP = 2e-4
-_NEAR_REST = np.exp(_STEP * np.arange(-3, 4)[:, None] * np.ones(3))
+_NEAR_REST = np.exp(_STEP * _AROUND[:, None] * np.ones(3))
 
 
 def total_energy(law: Law, stretches: Floats, poisson: float, formulation: str) -> Floats:
@@ -79,12 +79,8 @@ class Path:
     @cached_property
     def stretches(self) -> Floats:
         """Where the energy is asked for, shape (2 steps + 7, 3): three points beyond each end."""
-        count = self.steps + _BEYOND
+        count = self.steps + 3
         return np.exp(self.step * np.arange(-count, count + 1.0)[:, None] * np.array(self.exponents))
-
-    def derivatives(self, energy: Floats) -> tuple[Floats, Floats]:
-        """`dPsi/dl` and `d2Psi/dl2` at `logs` of an energy given at `stretches`."""
-        return derivatives(energy, self.logs, self.step)
 
 
 def derivatives(energy: Floats, logs: Floats, step: float) -> tuple[Floats, Floats]:
@@ -106,14 +102,12 @@ _IN_SPACE = {
     " along (l, 1, 1)": Path((1.0, 0.0, 0.0), reach=2.0, steps=60),
     " along (l, l, l)": Path((1.0, 1.0, 1.0), reach=2.0 ** (1.0 / 3.0), steps=20),
 }
-#: So near to rest that differences see no more than the slope there, for exponents of some hundreds.
-_REST = Path((1.0, 0.0, 0.0), reach=1.0 + 2e-4, steps=1)
 #: Where the growth at the two ends is judged: so far out that a part of a millionth comes to light if it grows.
 _ENDS = {"l -> 0": (1e-3, 1e-9), "l -> infinity": (1e3, 1e9)}
 _END_STEP = 1e-2
 #: `ln l` there (end, near or far, 1), and stretches around for differences (end, near or far, 7, 3).
 _LOG_ENDS = np.log(list(_ENDS.values()))[..., None]
-_AROUND_ENDS = np.exp((_LOG_ENDS + _END_STEP * np.arange(-3, 4))[..., None] * np.array(_UNIAXIAL.exponents))
+_AROUND_ENDS = np.exp((_LOG_ENDS + _END_STEP * _AROUND)[..., None] * np.array(_UNIAXIAL.exponents))
 
 
 class UnstableLawError(InputError):
@@ -151,9 +145,9 @@ def require_stable(law: Law, poisson: float = 0.45, formulation: str = "coupled"
             f"{whole} has lam = {volumetric:.3g} Pa: its energy falls without bound as J -> 0 (supplement Table 2); "
             "the uncoupled formulation does not"
         )
-    energy = total_energy(law, _REST.stretches, poisson, formulation)
+    energy = total_energy(law, _NEAR_REST ** np.array([1.0, 0.0, 0.0]), poisson, formulation)
     # by the symmetry of the energy its three slopes are the same: one along `(l, 1, 1)` stands for the gradient
-    rest, slope = float(energy[len(energy) // 2]), float(_REST.derivatives(energy)[0][_REST.steps])
+    rest, slope = float(energy[3]), float(derivatives(energy, np.zeros(1), _STEP)[0][0])
     if abs(rest) > 1e-9 * law.shear_modulus or abs(slope) > 1e-6 * law.shear_modulus:
         raise UnstableLawError(f"{whole} is not at rest at l = 1: energy {rest:.3g} Pa, slope {slope:.3g} Pa")
     _require_rising_and_convex(repr(law), "", _UNIAXIAL, law.energy(_UNIAXIAL.stretches))
@@ -164,7 +158,7 @@ def require_stable(law: Law, poisson: float = 0.45, formulation: str = "coupled"
 
 def _require_rising_and_convex(subject: str, along: str, path: Path, energy: Floats) -> None:
     with np.errstate(over="ignore", invalid="ignore"):
-        slope, curvature = path.derivatives(energy)
+        slope, curvature = derivatives(energy, path.logs, path.step)
     wrong = (slope * path.logs <= 0.0) & (path.logs != 0.0)
 
     def nearest_to_rest(where: Bools) -> float:

@@ -174,7 +174,7 @@ class ContactTerm(KernelTerm):
     """`Contact` on a device; a stencil is a node."""
 
     memory = ("_found", "_pressing", "_directions", "_tractions")
-    lasting = ("_field", "_wall")
+    lasting = ("_field", "_inputs")
     in_full = True
 
     def __init__(self, body: Body, contact: Contact) -> None:
@@ -213,19 +213,17 @@ class ContactTerm(KernelTerm):
         if not given:
             reached = self.array(body.mesh.points[members], precision.vec3)
             self._field.at(reached, self._start, wp.zeros_like(reached))
-        self._wall = made()
+        wall = made()
         for name in ("_nodes", "_points", "_area", "_start", "_numbers", *self.memory):
-            setattr(self._wall, name[1:], getattr(self, name))
+            setattr(wall, name[1:], getattr(self, name))
         for name in ("coefficients", "origin", "spacing"):
-            setattr(self._wall, name, getattr(self._field, name))
+            setattr(wall, name, getattr(self._field, name))
+        self._inputs = (wall, STATES.index(contact.state))
 
     def take_moduli(self) -> None:
         modulus = self.body.shear_moduli.max() + self.body.volumetric_moduli.max()
         self.stiffness = self.mechanism.penalty * modulus / self._size
         self._numbers.assign([self.stiffness, self.mechanism.friction])
-
-    def _inputs(self) -> list[Any]:
-        return [self._wall, STATES.index(self.mechanism.state)]
 
     def evaluate_tangents(self, u: wp.array) -> None:
         self.evaluate_forces(u)

@@ -177,26 +177,20 @@ class Gravity(BodyForce, Mechanism):
         deepest = points[depths >= depths.max() - SAME_PLACE * extent(points)].mean(axis=0)
         across = tangents(down)
         sd, usual = np.array([_SHARE, _POSE, _POSE]), np.array([1.0, 0.0, 0.0])
+
+        def hanging(c: Floats, **fluid: Any) -> Gravity:
+            direction = tuple((down + c[1] * across[0] + c[2] * across[1]).tolist())
+            return cls(direction=direction, density=situation.density, ramp=((0.0, float(c[0])),), **fluid)
+
         if situation.stiffness > 1.0 and cls.kind not in situation.assumed:
-
-            def hanging(c: Floats) -> Gravity:
-                direction = down + c[1] * across[0] + c[2] * across[1]
-                return cls(direction=tuple(direction.tolist()), density=situation.density, ramp=((0.0, float(c[0])),))
-
             return [Proposal(hanging, usual, sd, "smooth", usual, np.zeros(3), odds="causes.weight")]
         over_time: dict[str, Any] = {"varying": (3,), "in_turns": True, "only_over_time": True}
         proposals = []
         for level in np.linspace(-0.05, 0.9, _LEVELS) * height:
 
             def drained(c: Floats, middle: float = float(level)) -> Gravity:
-                direction = tuple((down + c[1] * across[0] + c[2] * across[1]).tolist())
-                return cls(
-                    direction=direction,
-                    density=situation.density,
-                    csf_level=middle + (float(c[3]) if len(c) > 3 else 0.0),
-                    lowest=-float(deepest @ unit_vector("direction", direction)),
-                    ramp=((0.0, float(c[0])),),
-                )
+                lowest = float(deepest @ hanging(c)._up)
+                return hanging(c, csf_level=middle + (float(c[3]) if len(c) > 3 else 0.0), lowest=lowest)
 
             proposals.append(Proposal(drained, usual, sd, "smooth", usual, np.zeros(3)))
             falling, at_first = np.append(sd, _FALL * height), np.append(usual, 0.0)
@@ -211,7 +205,13 @@ class Gravity(BodyForce, Mechanism):
             clauses.append(
                 f"the fluid's surface is {measured(level.value, level.sd, 'mm')} above the lowest point of the anatomy"
             )
-        down = _down(values, gravity_axis)
+        names = [f"direction_{letter}" for letter in "xyz"]
+        spreads = [values[name].sd for name in names if name in values]
+        down = vector_in(values, "direction")
+        if gravity_axis is not None:
+            # a component that is not known better than beforehand is where it was
+            declared = unit_vector("gravity_axis", gravity_axis)
+            down = np.where([name in values for name in names], down, declared)
         if "share" in values:
             share = values["share"]
             where = towards(math.copysign(1.0, share.value) * down)
@@ -219,7 +219,13 @@ class Gravity(BodyForce, Mechanism):
             clauses.append(f"{part} % of that weight acts{f', {where}' if where else ''}")
         elif down.any():
             clauses.append(f"its weight acts {towards(down)}")
-        return [*clauses, *_tilt(values, gravity_axis, down)]
+        if gravity_axis is not None and spreads:
+            across = down - (down @ declared) * declared
+            degrees = math.degrees(math.atan2(float(np.linalg.norm(across)), float(down @ declared)))
+            spread = math.degrees(math.hypot(*spreads))
+            where = f" {towards(across)}" if degrees > spread else ""
+            clauses.append(f"'down' is tilted by {measured(degrees, spread)} degrees{where} from what was declared")
+        return clauses
 
     def detail(self) -> str:
         """What the sentence leaves open, for people to read."""
@@ -283,24 +289,3 @@ class Gravity(BodyForce, Mechanism):
         """Direction of gravity less that while imaged."""
         assert self.imaged_direction is not None
         return -self._up - unit_vector("imaged_direction", self.imaged_direction)
-
-
-def _down(values: Values, axis: tuple[float, float, float] | None) -> Floats:
-    """Where 'down' was found to be (3,): a component that is not known better than beforehand is where it was."""
-    direction = vector_in(values, "direction")
-    if axis is None:
-        return direction
-    is_given = [f"direction_{letter}" in values for letter in "xyz"]
-    return np.where(is_given, direction, unit_vector("gravity_axis", axis))
-
-
-def _tilt(values: Values, axis: tuple[float, float, float] | None, direction: Floats) -> list[str]:
-    components = [values[name] for letter in "xyz" if (name := f"direction_{letter}") in values]
-    if axis is None or not components:
-        return []
-    down = unit_vector("gravity_axis", axis)
-    across = direction - (direction @ down) * down
-    degrees = math.degrees(math.atan2(float(np.linalg.norm(across)), float(direction @ down)))
-    spread = math.degrees(math.hypot(*(component.sd for component in components)))
-    where = f" {towards(across)}" if degrees > spread else ""
-    return [f"'down' is tilted by {measured(degrees, spread)} degrees{where} from what was declared"]

@@ -191,7 +191,6 @@ class ViscoelasticTerm(KernelTerm):
     """`Viscoelasticity` on a device, with its memory."""
 
     memory = ("_q", "_S")
-    lasting = ("_branches",)
 
     def __init__(self, body: Body, mechanism: Viscoelasticity) -> None:
         made, *kernels = _kernels(body.precision)
@@ -203,11 +202,10 @@ class ViscoelasticTerm(KernelTerm):
         self.take_moduli()
         self._decay, self._response = self.zeros(branches), self.zeros(branches)
         self._q, self._S = self.zeros(count, branches, dtype=mat33), self.zeros(count, dtype=mat33)
-        self._branches = made()
-        self._branches.nodes, self._branches.inverse_edges = body.nodes, body.inverse_edges
-        self._branches.q, self._branches.S_before, self._branches.scale = self._q, self._S, self.scale
-        for name in ("weights", "decay", "response"):
-            setattr(self._branches, name, getattr(self, f"_{name}"))
+        b = made()
+        b.nodes, b.inverse_edges, b.weights = body.nodes, body.inverse_edges, self._weights
+        b.decay, b.response, b.q, b.S_before, b.scale = self._decay, self._response, self._q, self._S, self.scale
+        self._inputs = (b,)
         self.forgets_in = min(mechanism.times)
 
     def set_time_step(self, h: float) -> None:
@@ -223,9 +221,6 @@ class ViscoelasticTerm(KernelTerm):
     def forget(self) -> None:
         self._q.zero_()
         self._S.zero_()
-
-    def _inputs(self) -> list[Any]:
-        return [self._branches]
 
     def advance(self, u: wp.array) -> None:
         self._launch(self._kernels[3], u)
