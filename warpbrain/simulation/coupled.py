@@ -66,14 +66,11 @@ class CoupledSolver:
         self._plain.multiply(x, z)
 
     def prepare(self) -> None:
-        if self._system.coupled:
-            self._take_matrix()
-        else:
-            self._plain.prepare()
-
-    def _take_matrix(self) -> None:
         from scipy.sparse import block_diag, bsr_matrix, diags, vstack
 
+        if not self._system.coupled:
+            self._plain.prepare()
+            return
         n, matrix = self._system.size, self._system.matrix
         values = matrix.values.numpy().astype(np.float64, copy=False)
         # constrained rows and columns are those of the identity

@@ -16,7 +16,6 @@ kept inverse of the stiffness took 21, and a diagnosis as long (2026-11-26).
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -35,7 +34,11 @@ class SparseFactors:
         from scipy.sparse import tril
 
         if _is_fork:
-            self._solve = _by_superlu(matrix)
+            from scipy.sparse.linalg import splu
+
+            options = {"SymmetricMode": True}
+            A = matrix.tocsc().astype(np.float64)
+            self._solve = splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).solve
             return
 
         global _is_used
@@ -49,14 +52,6 @@ class SparseFactors:
         columns = np.asarray(columns, dtype=np.float64)
         solution = np.asarray(self._solve(np.asfortranarray(columns.reshape(len(columns), -1))))
         return solution.reshape(columns.shape)
-
-
-def _by_superlu(matrix: Any) -> Callable[[Floats], Floats]:
-    from scipy.sparse.linalg import splu
-
-    options = {"SymmetricMode": True}
-    A = matrix.tocsc().astype(np.float64)
-    return splu(A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options).solve
 
 
 #: Symbolic analyses of the last symmetric patterns, a quarter of the work each: a body has one for all of its states.

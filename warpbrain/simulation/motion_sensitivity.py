@@ -28,7 +28,6 @@ from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.kernels.linear import LinearSolver
 from warpbrain.simulation.dynamics import Simulator
-from warpbrain.simulation.model import Model
 from warpbrain.simulation.sensitivity import ROUNDINGS, Corrections, ModelOf, ParameterStencil, lengths
 
 #: Iterations of a linear solve, and what it may leave of what a parameter puts out of balance in a step.
@@ -101,30 +100,26 @@ class MotionSensitivity:
             # unknowns of a term's own damp by themselves
             return inertia + system.stiffness_times(v, share, undamped) + h * _host(system.internal)
 
-        def along(k: int, dv: Floats) -> Floats:
-            def look(offset: float, _: Model) -> Floats:
+        def left_of(k: int, dv: Floats) -> Floats:
+            def look(offset: float) -> Floats:
                 return unbalanced(u_start + offset * self.u[k], v_start + offset * self.v[k], v_end + offset * dv)
 
-            return stencil.derivative(k, look)
-
-        def left_of(k: int, dv: Floats) -> Floats:
-            return loaded[k] - along(k, dv)
+            return loaded[k] - stencil.derivative(k, look)
 
         def stand() -> None:
+            stencil.go_back()
             system.u.assign(u_start if linearised else u_end)
             system.evaluate_tangents()
 
         def stand_again() -> None:
             if system.coupled:
                 # what terms have of their own is in no matrix, and a look beside changes it
-                with stencil.here():
-                    stand()
+                stand()
 
-        with stencil.here():
-            stand()
-            system.assemble(h * damping.stiffness + h * h, 1.0 + h * damping.mass, coupling=h * h)
-            inertia = float(np.linalg.norm(_host(system.mass)[:, None] * v_end))
-            corrections = Corrections(solver, system, self._tolerance, len(stencil), stand_again)
+        stand()
+        system.assemble(h * damping.stiffness + h * h, 1.0 + h * damping.mass, coupling=h * h)
+        inertia = float(np.linalg.norm(_host(system.mass)[:, None] * v_end))
+        corrections = Corrections(solver, system, self._tolerance, len(stencil), stand_again)
         start = np.zeros_like(self.v)
         residual = np.array([left_of(k, dv) for k, dv in enumerate(start)])
         free = ~system.model.constrained

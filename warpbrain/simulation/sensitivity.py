@@ -53,8 +53,8 @@ from warpbrain.simulation.system import System
 ModelOf = Callable[[Floats], Model]
 #: What each term of a system remembers.
 Remembered = list[tuple[wp.array, ...]]
-#: From how far from a parameter a system is, and the model there, to what is differentiated.
-Looked = Callable[[float, Model], Floats]
+#: From how far from a parameter a system is to what is differentiated.
+Looked = Callable[[float], Floats]
 
 #: Weights of the values at -2, -1, 1 and 2 steps in the derivative.
 _STENCIL = {-2: 1.0 / 12.0, -1: -8.0 / 12.0, 1: 8.0 / 12.0, 2: -1.0 / 12.0}
@@ -91,7 +91,7 @@ class ParameterStencil:
 
     def derivative(self, k: int, look: Looked) -> Floats:
         """The derivative by parameter k of what `look` finds; call it inside `away`."""
-        return self._weighted(k, lambda distance: look(*self._go(k, distance)))
+        return self._weighted(k, lambda distance: look(self._go(k, distance)))
 
     def _weighted(self, k: int, value: Callable[[int], Floats]) -> Floats:
         """Derivative by parameter k of what is known at each distance."""
@@ -109,8 +109,7 @@ class ParameterStencil:
         """Do what changes what is remembered at every place, given parameter and offset; call it inside `away`."""
         for k, remembered in enumerate(self._remembered):
             for distance in _STENCIL:
-                offset, _ = self._go(k, distance)
-                act(k, offset)
+                act(k, self._go(k, distance))
                 remembered[distance] = self.system.remembered()
 
     def shift_memory(self, before: Remembered, after: Remembered) -> None:
@@ -121,12 +120,11 @@ class ParameterStencil:
                     for array, a, b in zip(arrays, old, new, strict=True):
                         array.assign(array.numpy() + (b.numpy() - a.numpy()))
 
-    def _go(self, k: int, distance: int) -> tuple[float, Model]:
-        model = self._places[k][distance]
-        self.system.set_model(model, self._made)
+    def _go(self, k: int, distance: int) -> float:
+        self.system.set_model(self._places[k][distance], self._made)
         if self.remembers:
             self.system.recall(self._remembered[k][distance])
-        return distance * float(self.steps[k]), model
+        return distance * float(self.steps[k])
 
     @contextmanager
     def away(self) -> Iterator[None]:
@@ -135,15 +133,13 @@ class ParameterStencil:
         try:
             yield
         finally:
-            with self.here():
-                self.system.u.assign(u)
+            self.go_back()
+            self.system.u.assign(u)
 
-    @contextmanager
-    def here(self) -> Iterator[None]:
-        """The parameters and the memory that the system had before it went away; inside `away`."""
+    def go_back(self) -> None:
+        """Let the system have the parameters and the memory that it had before it went away; inside `away`."""
         self.system.set_model(self.model, self._made)
         self.system.recall(self._here)
-        yield
 
     def by_loads(self, k: int, time: float) -> Floats:
         """Derivative of the external forces [N] at a time [s] by parameter k; nothing is asked of a system."""
@@ -219,9 +215,8 @@ class SensitivitySolver:
         The system has the model of `theta` and the displacement `u` when this returns. What its terms remember is that
         of the equilibrium, which must be the last that was solved for in it if a term has augmented its constraints.
 
-        `u` (n, 3) [m] is in equilibrium under the model of `theta` (p,) at full load. `models`, from parameters (p,) to
-        a model that differs from the system's in numbers only, is smooth and defined a little around `theta`. `scales`
-        (p,) say by how much each must change to change much; by default its size, or 1 if that is less or nothing.
+        `u` (n, 3) [m] is in equilibrium under the model of `theta` (p,) at full load. The models of parameters differ
+        from the system's in numbers only; for them and `scales` see `ParameterStencil`.
 
         `SolveError` if the equilibrium is unstable, so that it has no derivative, or a linear solve does not converge;
         or if it is that of a step in which unknowns of a term's own follow the displacement.
@@ -255,7 +250,7 @@ class SensitivitySolver:
         start = np.array([stencil.by_prescribed(k) for k in range(len(stencil))])
 
         def left_of(k: int, moved: Floats) -> Floats:
-            def internal(offset: float, _: Model) -> Floats:
+            def internal(offset: float) -> Floats:
                 system.u.assign(state + offset * moved)
                 return system.internal_forces()
 
@@ -288,10 +283,10 @@ class SensitivitySolver:
                 term.augment(system.u)
 
         stencil.remember(lambda k, offset: augment(offset, moved[k]))
-        with stencil.here():
-            before = system.remembered()
-            augment(0.0, moved[0])
-            after = system.remembered()
+        stencil.go_back()
+        before = system.remembered()
+        augment(0.0, moved[0])
+        after = system.remembered()
         stencil.shift_memory(after, before)
 
 
@@ -352,7 +347,10 @@ class Corrections:
             solution, residual = solution + tried[-1], now
             if np.linalg.norm(now[free]) > goal:
                 # and the combination of all directions after which least is left
-                shares = _least(np.stack([gain[free] for gain in gained], axis=1), now[free])
+                columns = np.stack([gain[free] for gain in gained], axis=1)
+                sizes = np.linalg.norm(columns, axis=0)
+                sizes[sizes == 0.0] = 1.0
+                shares = np.linalg.lstsq(columns / sizes, now[free], rcond=1e-12)[0] / sizes
                 solution = solution + np.tensordot(shares, np.array(tried), axes=1)
                 residual = residual - np.tensordot(shares, np.array(gained), axes=1)
         return solution, residual
@@ -378,10 +376,3 @@ class Corrections:
                 f"iterations (residual {linear.residual:.1e}, goal {linear.tolerance:.1e})"
             )
         return np.where(constrained, 0.0, system.solution.numpy().astype(np.float64))
-
-
-def _least(columns: Floats, values: Floats) -> Floats:
-    """The combination (m,) of columns (n, m) that comes nearest to values (n,)."""
-    sizes = np.linalg.norm(columns, axis=0)
-    sizes[sizes == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(columns / sizes, values, rcond=1e-12)[0] / sizes)

@@ -34,24 +34,12 @@ _LONGEST = 600
 
 @dataclass(frozen=True)
 class Swing:
-    """A damped oscillation.
+    """A damped oscillation."""
 
-    Attributes
-    ----------
-    frequency : float
-        Of the undamped oscillation, `|s| / 2 pi` [Hz].
-    damping : float
-        Relative to critical, `-Re s / |s|`.
-    damping_in_steps : float
-        That of the motion as it was computed: steps of backward Euler add to it.
-    time_step : float
-        [s]
-    """
-
-    frequency: float
-    damping: float
-    damping_in_steps: float
-    time_step: float
+    frequency: float  # of the undamped oscillation, `|s| / 2 pi` [Hz]
+    damping: float  # relative to critical, `-Re s / |s|`
+    damping_in_steps: float  # that of the motion as it was computed: steps of backward Euler add to it
+    time_step: float  # [s]
 
 
 class Momentum:
@@ -104,8 +92,8 @@ def swing_of(series: Floats, time_step: float) -> Swing | None:
         return None
     best = int(np.argmax(np.where(swinging, sizes, -1.0)))
     pole, in_step = poles[best], in_steps[best]
-    damping, damping_in_steps = float(-pole.real / abs(pole)), float(-in_step.real / abs(in_step))
-    return Swing(float(abs(pole)) / (2.0 * math.pi), damping, damping_in_steps, time_step)
+    dampings = (float(-s.real / abs(s)) for s in (pole, in_step))
+    return Swing(float(abs(pole)) / (2.0 * math.pi), *dampings, time_step)
 
 
 def _poles(series: Floats) -> NDArray[np.complex128]:

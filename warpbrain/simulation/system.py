@@ -78,16 +78,8 @@ class System:
         1 for free components, 0 for constrained ones.
     mass : wp.array, shape (n,)
         Lumped masses [kg] of the tissue that is there.
-    mesh, node_mesh : TetMesh
-        The reference shape, and linear tetrahedra with a corner at every node: it, or its elements cut into eight.
     terms : list of Term
-        What else acts with forces that follow the deformation.
-    stiffness_factors : (m,) array
-        Factor on all moduli of each element.
-    remaining_parts : (m,) array
-        Part of each element that is left.
-    growth_stretches : (m,) array
-        Stretch of each element without stress.
+        What else acts with forces that follow the deformation; for what they ask see `warpbrain.physics.term.Body`.
     coupling_factor : float
         How many times what unknowns of a term's own do to the stiffness counts in the matrix.
     seconds : float
@@ -244,11 +236,7 @@ class System:
             Terms of mechanisms by the `id` of these, which the caller keeps. What is not there yet is added, so that
             who goes to and fro between models makes each term once.
 
-        Raises
-        ------
-        InputError
-            If a tissue has another law, formulation or number of parameters, or a mechanism is another one, or
-            something that has no parameters is. The system is then as it was.
+        `InputError` if a model needs pre-processing of its own: the system is then as it was.
         """
         before = self.model
         self._require_alike(model)
@@ -487,19 +475,10 @@ class System:
 
         - Conjugate gradients (`warpbrain.kernels.linear.conjugate_gradient`) for one system after the other.
         - GMRES on the host (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is
-          indefinite.
+          indefinite, and `factors` of states nearby precondition it.
 
-        Parameters
-        ----------
-        tolerance : float
-            Relative.
-        max_iterations : int
-        watch_curvature : bool
-            Tell an indefinite matrix.
-        at_rest : bool
-            The matrix is without inertia, so that a coarse space is worth its making.
-        factors : KeptFactors, optional
-            Of states nearby, for an indefinite matrix.
+        The tolerance is relative. `watch_curvature` tells an indefinite matrix; `at_rest` one without inertia, for
+        which a coarse space is worth its making.
         """
         kind, mesh = conjugate_gradient(self.device, only_blocks=self.assembled), self.model.node_mesh
         ordered = partial(mesh.made_once, "compact order", partial(compact_order, mesh.points))

@@ -249,10 +249,9 @@ class DrainageTerm(Term):
 
     def _deformed(self, u: wp.array) -> tuple[Floats, Floats]:
         """`cof F g_a` (k, 4, 3) [1/m] and `J - 1` (k,) at a displacement [m]."""
-        body = self.body
         outputs = self._normals, self._change
-        inputs = self._on_device, body.nodes, body.inverse_edges, u, *outputs
-        self.launch(self._kernels.deform, len(self.stencils), *inputs)
+        inputs = self._on_device, self.body.nodes, self.body.inverse_edges, u
+        self.launch(self._kernels.deform, len(self.stencils), *inputs, *outputs)
         normals, change = (output.numpy().astype(np.float64, copy=False) for output in outputs)
         return normals, change
 

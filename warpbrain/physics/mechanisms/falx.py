@@ -164,11 +164,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any]:
         M1 = inverse[0, 0] * F1 + inverse[1, 0] * F2
         M2 = inverse[0, 1] * F1 + inverse[1, 1] * F2
         K = over * (inner * (wp.outer(F1, M1) + wp.outer(F2, M2)) + wp.outer(b, a) + scalar(2.0) * wp.outer(a, b))
-        geometric = wp.dot(g, S * h)
-        K[0, 0] += geometric
-        K[1, 1] += geometric
-        K[2, 2] += geometric
-        return K
+        return K + wp.dot(g, S * h) * wp.identity(n=3, dtype=scalar)
 
     @wp.kernel(module=module)
     def tangents(s: Triangles, u: wp.array[vec3], out: wp.array2d[mat33]):

@@ -77,12 +77,8 @@ def _moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
     stretched = F * a
     Hg = two * (d * (F * g) + along * wp.dot(a, g) * stretched)
     Hh = two * (d * (F * h) + along * wp.dot(a, h) * stretched)
-    K = second * wp.outer(Hg, Hh)
     isotropic = first * two * (d * wp.dot(g, h) + along * wp.dot(a, g) * wp.dot(a, h))
-    K[0, 0] += isotropic
-    K[1, 1] += isotropic
-    K[2, 2] += isotropic
-    return K
+    return second * wp.outer(Hg, Hh) + isotropic * wp.identity(n=3, dtype=F.dtype)
 
 
 _CODE = ExtraEnergy("fibres", _energy, _stress, _moduli)

@@ -254,12 +254,8 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any, Any]:
         f, fh, c, ch = F * g, F * h, cof * g, cof * h
         K = scalar(2.0) * d1J * (wp.outer(f, ch) + wp.outer(c, fh))
         K += (dJJ + dJ / J) * wp.outer(c, ch) - dJ / J * wp.outer(ch, c)
-        K = response * K
         isotropic = response * (twice_d1 * wp.dot(g, h) - wp.dot(g, S * h)) + wp.dot(g, q * h)
-        K[0, 0] += isotropic
-        K[1, 1] += isotropic
-        K[2, 2] += isotropic
-        return K
+        return response * K + isotropic * wp.identity(n=3, dtype=scalar)
 
     @wp.struct
     class Branches:
