@@ -327,12 +327,7 @@ class ExtraEnergyTerm(KernelTerm):
     """
 
     def __init__(
-        self,
-        body: Body,
-        code: ExtraEnergy,
-        elements: NDArray[np.integer],
-        data: Floats,
-        ramp: Callable[[float], float],
+        self, body: Body, code: ExtraEnergy, elements: NDArray[np.integer], data: Floats, ramp: Callable[[float], float]
     ) -> None:
         stencil = FOUR_NODES if body.quadratic is None else TEN_NODES
         made, *kernels = extra_kernels(code.key, code.energy, code.stress, code.moduli, body.precision, stencil)

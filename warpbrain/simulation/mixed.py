@@ -84,18 +84,16 @@ class NodalVolumeTerm(Term):
     def _ints(self, values: NDArray[Any]) -> wp.array:
         return self.array(np.ascontiguousarray(values, dtype=np.int32), int)
 
-    def set_elements(self, modulus: Floats, weight: Floats, growth: Floats) -> None:
-        """Take what the elements (m,) have: volumetric modulus [Pa] of the law, factor on the energy, and how many
-        times its volume each has grown.
-        """
-
+    def take_moduli(self) -> None:
         def total(values: Floats) -> Floats:
             sums = np.bincount(self._patches.ravel(), self._shares * np.repeat(values, 4), self.count)
             return sums.astype(np.float64)
 
+        # how many times its volume each element has grown
+        growth = self.body.growth_stretches**3
         self._volumes = total(growth)
         with np.errstate(divide="ignore"):
-            self._moduli = self._volumes / total(growth / (modulus * weight))
+            self._moduli = self._volumes / total(growth / (self.body.volumetric_moduli * self.body.stiffness_factors))
         # a captured graph reads these arrays
         self._on_device.volumes.assign(self._volumes)
         self._on_device.moduli.assign(self._moduli)

@@ -92,8 +92,8 @@ def swing_of(series: Floats, time_step: float) -> Swing | None:
         return None
     best = int(np.argmax(np.where(swinging, sizes, -1.0)))
     pole, in_step = poles[best], in_steps[best]
-    dampings = (float(-s.real / abs(s)) for s in (pole, in_step))
-    return Swing(float(abs(pole)) / (2.0 * math.pi), *dampings, time_step)
+    damping, damping_in_steps = (float(-s.real / abs(s)) for s in (pole, in_step))
+    return Swing(float(abs(pole)) / (2.0 * math.pi), damping, damping_in_steps, time_step)
 
 
 def _poles(series: Floats) -> NDArray[np.complex128]:

@@ -298,11 +298,8 @@ class System:
             group.on_device.parameters.assign(self._parameters(law_type, members, self._modulus))
             for term in group.averaged:
                 term.set_elements(self._parameters(law_type, members, averaged_modulus), self.stiffness_factors)
-        if self._volumes_at_nodes is not None:
-            growth = self.growth_stretches**3
-            self._volumes_at_nodes.set_elements(self.volumetric_moduli, self.stiffness_factors, growth)
-        for following in self._following:
-            following.take_moduli()
+        for each in self.terms:
+            each.take_moduli()
 
     def _place_fields(self) -> None:
         p, n = self.precision, self.size

@@ -11,10 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.ogden import NEO_HOOKEAN, Ogden
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.words import Values, measured
@@ -33,9 +32,7 @@ class Asymmetry(Mechanism):
     kind: ClassVar[str] = "asymmetry"
     of_specimens: ClassVar[bool] = True
     enters: ClassVar[Enters] = Enters("law", "alpha")
-    together: ClassVar[Mapping[str, str]] = {
-        "compressibility": "Each says a part of the law, in any order.",
-    }
+    together: ClassVar[Mapping[str, str]] = {"compressibility": "Each says a part of the law, in any order."}
     sentence: ClassVar[str] = "Tissue resists compression otherwise than tension."
     example: ClassVar[str] = "asymmetry:exponent=-20"
     confused_with: ClassVar[tuple[str, ...]] = ("fibres",)

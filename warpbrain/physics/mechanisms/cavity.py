@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh, interface_faces
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.mechanisms.pressure import PressureTerm
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation

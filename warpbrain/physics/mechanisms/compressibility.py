@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.laws import Law
-from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 

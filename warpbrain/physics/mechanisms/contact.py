@@ -36,8 +36,7 @@ from warpbrain.kernels.module import Precision, compiled_module, threads_of_bloc
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
 from warpbrain.mesh.quality import extent
 from warpbrain.mesh.surface import feature_normals
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import ClosedSurface, Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import ClosedSurface, Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Patch, Proposal, Situation
 from warpbrain.physics.term import Body, KernelTerm

@@ -48,8 +48,7 @@ from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import KernelSet, Precision
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_of

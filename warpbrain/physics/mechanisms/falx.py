@@ -20,8 +20,7 @@ from warpbrain.kernels.following_pressure import triangles_struct
 from warpbrain.kernels.module import Precision, compiled_module
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.surface import all_faces
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body, TriangleTerm

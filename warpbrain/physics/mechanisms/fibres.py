@@ -16,8 +16,7 @@ import warp as wp
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
 from warpbrain.physics.regions import element_directions, elements_of, unit_vector
@@ -154,11 +153,9 @@ class Fibres(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy."""
+        sd = 500.0 * situation.stiffness
         return Proposal.along_axes(
-            lambda axis, k1: cls(direction=axis, stiffness=max(k1, 1e-9)),
-            500.0 * situation.stiffness,
-            "fibres",
-            situation,
+            lambda axis, k1: cls(direction=axis, stiffness=max(k1, 1e-9)), sd, "fibres", situation
         )
 
     @classmethod

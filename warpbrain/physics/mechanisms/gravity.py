@@ -28,18 +28,10 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
-from warpbrain.mesh import (
-    QuadraticMesh,
-    TetMesh,
-    integrals_above,
-    integrals_of_shapes,
-    integrals_on_plane,
-    tangents,
-)
+from warpbrain.mesh import QuadraticMesh, TetMesh, integrals_above, integrals_of_shapes, integrals_on_plane, tangents
 from warpbrain.mesh.quality import SAME_PLACE, extent
-from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.load import Along, BodyForce
-from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Expectation, Facts, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import unit_vector
@@ -76,11 +68,7 @@ class Gravity(BodyForce, Mechanism):
         "Where 'down' was while the anatomy was imaged.", kind="vector", default=None, absent="[case] gravity_axis"
     )
     density: float = parameter(
-        "Density of what has its full weight, in air.",
-        unit="kg/m3",
-        above=0.0,
-        absent="[body] density",
-        method=True,
+        "Density of what has its full weight, in air.", unit="kg/m3", above=0.0, absent="[body] density", method=True
     )
     tissue_density: float = parameter(
         "Density of the tissue that the fluid carries, for the load of a turned head.",

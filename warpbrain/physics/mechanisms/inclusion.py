@@ -15,8 +15,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights

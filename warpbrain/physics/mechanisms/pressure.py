@@ -31,8 +31,7 @@ from warpbrain.kernels.following_pressure import pressure_kernels
 from warpbrain.mesh import TetMesh, faces_of, rim_edges
 from warpbrain.mesh.integrals import triangle_rule
 from warpbrain.mesh.surface import SIDES
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import Mechanism, ParameterError, Reading, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, Reading, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_with

@@ -15,8 +15,7 @@ import numpy as np
 import warp as wp
 
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import element_directions, elements_of, unit_vector
@@ -97,12 +96,8 @@ class ResidualStress(Mechanism):
     @classmethod
     def proposals(cls, situation: Situation) -> Sequence[Proposal]:
         """Along each axis of the anatomy, in all tissue."""
-        return Proposal.along_axes(
-            lambda axis, tension: cls(tension=tension, direction=axis),
-            300.0 * situation.stiffness,
-            "tension",
-            situation,
-        )
+        sd = 300.0 * situation.stiffness
+        return Proposal.along_axes(lambda axis, sigma: cls(tension=sigma, direction=axis), sd, "tension", situation)
 
     @classmethod
     def size_in_words(cls, values: Values, gravity_axis: tuple[float, float, float] | None = None) -> Sequence[str]:

@@ -12,10 +12,9 @@ from typing import ClassVar
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, parameter
 from warpbrain.physics.potential import Enters
-from warpbrain.physics.proposal import Proposal, Situation
+from warpbrain.physics.proposal import Place, Proposal, Situation
 from warpbrain.physics.regions import region_weights
 
 #: Where it is looked for: usual standard deviation of the change everywhere and in a ball, which may be 2.5 times as
@@ -37,11 +36,7 @@ class Swelling(Mechanism):
         expectation=Expectation.normal(0.0, 3.0),
         typical="mannitol takes 5 % of the water of white matter; oedema adds up to 30 %",
         source="diagnosis design, M7",
-        told=(
-            "it swells by {} of its volume",
-            "it shrinks by {} of its volume",
-            "it grows by {} of its volume",
-        ),
+        told=("it swells by {} of its volume", "it shrinks by {} of its volume", "it grows by {} of its volume"),
     )
     elements: str = parameter("Element set that swells.", default="", kind="element set")
     centre: tuple[float, float, float] | None = parameter("Centre of a ball.", default=None, kind="position")
@@ -68,14 +63,11 @@ class Swelling(Mechanism):
         everywhere = Proposal.of_one(
             lambda g: cls(amount=g), 0.0, _EVERYWHERE, "smooth", region="all tissue", varying=(0,)
         )
-        balls = Proposal.in_balls(
-            lambda g, centre, radius: cls(amount=g, centre=centre, radius=radius),
-            _SOMEWHERE,
-            _RADII,
-            situation,
-            varying=(0,),
-        )
-        return [everywhere, *balls]
+
+        def swollen(g: float, centre: Place, radius: float) -> Swelling:
+            return cls(amount=g, centre=centre, radius=radius)
+
+        return [everywhere, *Proposal.in_balls(swollen, _SOMEWHERE, _RADII, situation, varying=(0,))]
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

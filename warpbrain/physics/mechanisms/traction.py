@@ -21,9 +21,8 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import QuadraticMesh, TetMesh, patch_around, surface_forces
-from warpbrain.physics.expectation import Expectation
 from warpbrain.physics.load import Load, NodalForce
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_with, unit_vector

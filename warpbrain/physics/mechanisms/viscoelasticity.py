@@ -28,8 +28,7 @@ from warpbrain.arrays import Floats
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import Precision, compiled_module
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks, store_forces
-from warpbrain.physics.expectation import Expectation
-from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.term import Body, KernelTerm
