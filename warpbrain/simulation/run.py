@@ -95,15 +95,6 @@ class Followed:
     states: Mapping[float, NodalState] = field(default_factory=dict)  # earlier ones at which something was recorded
 
 
-def follow(case: Case, system: System, course: Course, watching: Watching) -> Followed:
-    """Simulate a system of a case; `SolveError` if there is no such state, or none was found."""
-    if course.until is not None:
-        return _slowly(case, system, course.until, course, watching)
-    if course.steps is not None:
-        return _motion(case, system, course.steps, watching)
-    return _to_rest(system, course, watching) if course.to_rest else _equilibrium(system, course, watching)
-
-
 def _timed(watch: Callable[[Any], None]) -> tuple[list[float], Callable[[Any], None]]:
     """A list for the times of steps, and who notes them there and watches."""
     times: list[float] = []
@@ -312,13 +303,19 @@ class Running:
         """Simulate it, and compare it with what was recorded; `SolveError` if there is no such state, or none was
         found.
         """
-        followed = follow(self.case, self.system, self.course, watching or Watching())
+        course, system, watching = self.course, self.system, watching or Watching()
+        if course.until is not None:
+            followed = _slowly(self.case, system, course.until, course, watching)
+        elif course.steps is not None:
+            followed = _motion(self.case, system, course.steps, watching)
+        else:
+            followed = (_to_rest if course.to_rest else _equilibrium)(system, course, watching)
         at = math.inf if followed.time is None else followed.time
-        result = result_of(self.system, at)
-        reached = nodal_state_of(self.system, at)
+        result = result_of(system, at)
+        reached = nodal_state_of(system, at)
         states: Mapping[float, Any] = followed.states
         if followed.time is None:
-            states = states_at_rest(self.case, self.system, reached, self.course.tolerance)
+            states = states_at_rest(self.case, system, reached, course.tolerance)
         observed = observe(self.case, reached, followed.time, states)
         return Run(self.case, self.model, self.chosen, result, observed, followed)
 

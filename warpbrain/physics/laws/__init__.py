@@ -7,17 +7,11 @@ from warpbrain.physics.laws.neo_hookean import NeoHookean
 from warpbrain.physics.laws.ogden import Ogden
 from warpbrain.plugins import added_by_packages
 
-
-def _with_added(laws: dict[str, type[Law]]) -> dict[str, type[Law]]:
-    """Laws by name, with those that packages name by entry points `warpbrain.laws`."""
-    added = added_by_packages("laws", laws)
-    for name, law in added.items():
-        if not (isinstance(law, type) and issubclass(law, Law) and law.name == name):
-            raise InputError(f"entry point '{name}' of warpbrain.laws: expected a Law whose name is '{name}'")
-    return laws | added
-
-
-#: Laws by their name in `case.toml`.
-LAWS: dict[str, type[Law]] = _with_added({law.name: law for law in (NeoHookean, MooneyRivlin, Ogden)})
+#: Laws by their name in `case.toml`, with those that packages name by entry points `warpbrain.laws`.
+LAWS: dict[str, type[Law]] = {law.name: law for law in (NeoHookean, MooneyRivlin, Ogden)}
+for _name, _law in added_by_packages("laws", LAWS).items():
+    if not (isinstance(_law, type) and issubclass(_law, Law) and _law.name == _name):
+        raise InputError(f"entry point '{_name}' of warpbrain.laws: expected a Law whose name is '{_name}'")
+    LAWS[_name] = _law
 
 __all__ = ["FORMULATIONS", "LAWS", "Law", "LawKey", "MooneyRivlin", "NeoHookean", "Ogden"]
