@@ -350,11 +350,9 @@ def require_held(model: Model) -> None:
         members = np.flatnonzero(part == number)
         x = mesh.points[members] - mesh.points[members].mean(axis=0)
         size = float(np.abs(x).max())
-        # three translations and three rotations of each node, as rows (node, component)
-        motions = np.zeros((len(members), 3, 6))
-        motions[:, :, :3] = np.eye(3)
-        for axis in range(3):
-            motions[:, :, 3 + axis] = np.cross(np.eye(3)[axis], x) / size
+        # three translations and three rotations of each node: (node, component, motion)
+        turns = np.cross(np.eye(3)[:, None], x / size).transpose(1, 2, 0)
+        motions = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=2)
         held = motions[model.constrained[members]]
         for nodes, directions in holding:
             inside = np.isin(nodes, members)

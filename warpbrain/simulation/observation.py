@@ -68,12 +68,10 @@ def _rows_by_time(
     rows = compared_rows(recording)
     if recording.time is None:
         return [(math.inf, rows_at(recording))]
-    if time is not None and states:
+    if time is not None:
         rows = rows[np.isin(times[rows], [*states, time])]
-        if not len(rows):
+        if not (states and len(rows)):
             return [(time, rows_at(recording, time))]
-    elif time is not None:
-        return [(time, rows_at(recording, time))]
     elif goes_on(case):
         return [(math.inf, rows_at(recording))]
     elif not states:
