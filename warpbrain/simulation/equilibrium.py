@@ -192,22 +192,12 @@ class EquilibriumSolver:
     ) -> Equilibrium:
         """Go from a start (rest by default) to equilibrium at full load.
 
-        Parameters
-        ----------
-        external : (n, 3) array, optional
-            Nodal forces at full load [N]; those of the model by default.
-        start : (n, 3) array, optional
-            Displacement to start from [m], near to the equilibrium. Where that is not found at once, what the start has
-            out of balance is taken off in the place of load steps.
-        prescribed : (n, 3) array, optional
-            Displacement of the constrained components at full load [m]; that of the model by default.
+        Nodal forces `external` (n, 3) [N] and displacements `prescribed` (n, 3) [m] of the constrained components are
+        those at full load, of the model by default. A `start` (n, 3) [m] is near to the equilibrium: where that is not
+        found at once, what the start has out of balance is taken off in the place of load steps.
 
-        Raises
-        ------
-        InputError
-            If nothing holds the body, or a part of it.
-        SolveError
-            If no equilibrium is found: at what load fraction, where and why.
+        `InputError` if nothing holds the body, or a part of it; `SolveError` if no equilibrium is found: at what load
+        fraction, where and why.
         """
         model = self.system.model
         require_held(model)
@@ -246,18 +236,9 @@ class EquilibriumSolver:
         """Go on from a state to the equilibrium a time step later, slowly: without inertia, but with memory.
 
         Terms with a memory keep it and take the step into it. To begin at rest, let them forget first (`Term.forget`).
-        Raises as `solve`.
-
-        Parameters
-        ----------
-        start : (n, 3) array
-            Displacement [m] before the step.
-        time_step : float
-            [s]; 0 for a change that is over at once.
-        time : float
-            At the end of the step [s], for what has a ramp; by default long after every one.
-        prescribed : (n, 3) array, optional
-            Displacement of the constrained components at the end of the step [m]; that of the model by default.
+        From the displacement `start` (n, 3) [m], by a step [s], 0 for a change that is over at once, to a time [s], by
+        default long after every ramp, and displacements `prescribed` (n, 3) [m] of the constrained components, those of
+        the model by default. Raises as `solve`.
         """
         equilibrium = self.try_step(start, time_step, time, prescribed)
         self.system.u.assign(equilibrium.u)

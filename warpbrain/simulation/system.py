@@ -226,17 +226,11 @@ class System:
         those that are there; what it remembers stays. Of loads and prescribed displacements nothing is kept here: the
         model is asked for them.
 
-        Parameters
-        ----------
-        model : Model
-            Of the same mesh, with each tissue's law (of Ogden's, with as many terms) and formulation as it is, the
-            same mechanisms with other numbers, and any loads and prescribed displacements of the components that are
-            constrained already. Sets that a mechanism acts on are pre-processed: others need another system.
-        made : dict of int to Term, optional
-            Terms of mechanisms by the `id` of these, which the caller keeps. What is not there yet is added, so that
-            who goes to and fro between models makes each term once.
-
-        `InputError` if a model needs pre-processing of its own: the system is then as it was.
+        The model is of the same mesh, with each tissue's law (of Ogden's, with as many terms) and formulation as it is,
+        the same mechanisms with other numbers, and any loads and prescribed displacements of the components that are
+        constrained already. Sets that a mechanism acts on are pre-processed: others need another system, and then this
+        raises `InputError` and leaves the system as it was. `made` are terms of mechanisms by the `id` of these, which
+        the caller keeps: what is not there yet is added, so that who goes to and fro between models makes each once.
         """
         before = self.model
         self._require_alike(model)

@@ -19,17 +19,12 @@ from warpbrain.physics.laws.mooney_rivlin import device_code
 
 @dataclass(frozen=True)
 class NeoHookean(Law):
-    """Neo-Hookean law.
+    """Neo-Hookean law; `InputError` if `mu` is not a positive number.
 
     Parameters
     ----------
     mu : float
-        Shear modulus [Pa], positive.
-
-    Raises
-    ------
-    InputError
-        If `mu` is not a positive number.
+        Shear modulus [Pa].
     """
 
     mu: float

@@ -213,7 +213,7 @@ class ContactTerm(KernelTerm):
             reached = self.array(body.mesh.points[members], precision.vec3)
             self._field.at(reached, self._start, wp.zeros_like(reached))
         wall = made()
-        for name in ("_nodes", "_points", "_area", "_start", "_numbers", *self.memory):
+        for name in ("_nodes", "_points", "_area", "_start", "_numbers", "_gaps", *self.memory):
             setattr(wall, name[1:], getattr(self, name))
         for name in ("coefficients", "origin", "spacing"):
             setattr(wall, name, getattr(self._field, name))
@@ -227,10 +227,6 @@ class ContactTerm(KernelTerm):
     def evaluate_tangents(self, u: wp.array) -> None:
         self.evaluate_forces(u)
         self._launch(self._kernels[1], u, self.blocks)
-
-    def energy(self, u: wp.array) -> float:
-        self._launch(self._kernels[2], u, self._energies, self._gaps)
-        return float(np.sum(self._energies.numpy(), dtype=np.float64))
 
     def gaps(self, u: wp.array) -> Floats:
         """Signed distance (k,) [m] of each node beyond the surface."""
@@ -380,6 +376,7 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
         numbers: wp.array[scalar]
         found: wp.array[scalar]
         pressing: wp.array[scalar]
+        gaps: wp.array[scalar]
         directions: wp.array[vec3]
         tractions: wp.array[vec3]
 
@@ -424,19 +421,19 @@ def _kernels(precision: Precision) -> tuple[Any, Any, Any, Any]:
         out[t, 0] = w.area[t] * K
 
     @wp.kernel(module=module)
-    def energies(w: Wall, state: int, u: wp.array[vec3], out: wp.array[scalar], gaps: wp.array[scalar]):
+    def energies(w: Wall, state: int, u: wp.array[vec3], out: wp.array[scalar]):
         t = wp.tid()
         k = w.numbers[0]
         friction = w.numbers[1]
         d = u[w.nodes[t]]
         if state == 0:
-            gaps[t] = wp.length(d)
+            w.gaps[t] = wp.length(d)
             q = k * d + w.tractions[t]
             out[t] = scalar(0.5) * w.area[t] / k * wp.dot(q, q)
             return
         g, _slope, _H = distance(w.points[w.nodes[t]] + d, w.coefficients, w.origin, w.spacing)
-        gaps[t] = g - w.start[t]
-        pressure = k * gaps[t] + w.found[t]
+        w.gaps[t] = g - w.start[t]
+        pressure = k * w.gaps[t] + w.found[t]
         if state == 2:
             pressure = wp.max(pressure, scalar(0.0))
         s = d - wp.dot(d, w.directions[t]) * w.directions[t]
