@@ -277,17 +277,16 @@ class SensitivitySolver:
         """Augment beside `theta` along the way, by as much more than in the state itself as belongs to the way."""
         system = self.system
 
-        def augment(offset: float, along: Floats) -> None:
-            system.u.assign(state + offset * along)
+        def augment(displacement: Floats) -> None:
+            system.u.assign(displacement)
             for term in system.terms:
                 term.augment(system.u)
 
-        stencil.remember(lambda k, offset: augment(offset, moved[k]))
+        stencil.remember(lambda k, offset: augment(state + offset * moved[k]))
         stencil.go_back()
         before = system.remembered()
-        augment(0.0, moved[0])
-        after = system.remembered()
-        stencil.shift_memory(after, before)
+        augment(state)
+        stencil.shift_memory(system.remembered(), before)
 
 
 class Corrections:
@@ -323,11 +322,10 @@ class Corrections:
         affine function. `goals` (p,) are norms of what may be left on the free components. Returns the solutions, and
         what is left on every component; `SolveError` if the known part of the matrix is too far from the whole.
         """
-        pairs = [
-            self._refine(k, partial(left_of, k), solution[k], residual[k], goal)
-            for k, goal in enumerate(goals.tolist())
-        ]
-        return np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
+        solution, residual = solution.copy(), residual.copy()
+        for k, goal in enumerate(goals.tolist()):
+            solution[k], residual[k] = self._refine(k, partial(left_of, k), solution[k], residual[k], goal)
+        return solution, residual
 
     def _refine(
         self, k: int, left_of: Callable[[Floats], Floats], solution: Floats, residual: Floats, goal: float
