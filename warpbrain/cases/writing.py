@@ -22,14 +22,7 @@ from warpbrain.frame import Frame
 from warpbrain.keys import Table
 from warpbrain.mesh import write_mesh
 from warpbrain.physics.mechanism import ClosedSurface, Facts, Mechanism, Removing
-from warpbrain.recordings.base import (
-    DISPLACEMENT,
-    Recording,
-    column_of_time,
-    columns_of_vectors,
-    write_columns,
-    write_triangles,
-)
+from warpbrain.recordings.base import DISPLACEMENT, Recording, write_columns, write_triangles
 
 _HEAD = "# A case of warpbrain. What its tables and keys mean: docs/case-format.md.\n\n"
 
@@ -126,8 +119,7 @@ def _boundary(folder: Path, boundary: Boundary, frame: Frame) -> dict[str, Any]:
 def _history(folder: Path, boundary: Displaced, frame: Frame) -> str:
     """Write displacements over time; their file, relative to the folder."""
     name = _new_file(folder, "boundaries", boundary.name, ".csv")
-    values = columns_of_vectors(DISPLACEMENT, frame.file_lengths(boundary.values))
-    write_columns(folder / name, column_of_time(np.array(boundary.times)) | values)
+    write_columns(folder / name, {"t": np.array(boundary.times), DISPLACEMENT: frame.file_lengths(boundary.values)})
     return name
 
 

@@ -22,8 +22,8 @@ from warpbrain.mesh.vtu import write_vtu
 from warpbrain.problems import Problems
 from warpbrain.recordings.text import collected
 
-#: Columns of a file.
-Columns = dict[str, Floats | tuple[str, ...]]
+#: Columns of a file by name: numbers (n,) or words; of the names of several columns numbers (n, k). None is left out.
+Columns = dict[str | tuple[str, ...], Floats | tuple[str, ...] | None]
 #: Fields of a recording by name, in SI units and RAS axes, and how many SI units one of the file's is, in which `sigma`
 #: is.
 Content = tuple[dict[str, Any], float]
@@ -188,10 +188,15 @@ class Registration:
 
 def write_columns(path: Path, columns: Columns) -> None:
     """Write a table that `warpbrain.recordings.tables.read_table` gives back, numbers with all their digits."""
-    values = [column if isinstance(column, tuple) else column.tolist() for column in columns.values()]
+    table: dict[str, Sequence[Any]] = {}
+    for name, values in columns.items():
+        if isinstance(name, tuple) and values is not None:
+            table |= zip(name, np.transpose(values).tolist(), strict=True)
+        elif isinstance(name, str) and values is not None:
+            table[name] = values if isinstance(values, tuple) else values.tolist()
     with whole_file(path) as scratch, scratch.open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(columns) + "\n")
-        csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC).writerows(zip(*values, strict=True))
+        file.write(",".join(table) + "\n")
+        csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC).writerows(zip(*table.values(), strict=True))
 
 
 def write_triangles(path: Path, points: Floats, faces: Int32s, frame: Frame) -> None:
@@ -200,13 +205,3 @@ def write_triangles(path: Path, points: Floats, faces: Int32s, frame: Frame) -> 
 
     with whole_file(path) as scratch:
         write_vtu(scratch, meshio.Mesh(frame.file_lengths(points), [("triangle", faces)]), frame.axes)
-
-
-def column_of_time(time: Floats | None) -> Columns:
-    """The column t, if there are times."""
-    return {} if time is None else {"t": time}
-
-
-def columns_of_vectors(names: Sequence[str], values: Floats) -> Columns:
-    """Vectors (n, k) as k columns."""
-    return dict(zip(names, np.asarray(values).T, strict=True))

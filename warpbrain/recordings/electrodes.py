@@ -6,6 +6,7 @@ https://bids-specification.readthedocs.io/en/stable/modality-specific-files/intr
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -94,10 +95,9 @@ def _unit(path: Path, problems: Problems) -> float:
 
 def _coordinate_file(path: Path) -> Path | None:
     """The `coordsystem.json` with most of the entities of the file of electrodes, and no other."""
-    entities = set(path.name.lower().removesuffix(ENDING).strip("_").split("_"))
-    sides = []
-    for side in path.parent.glob("*coordsystem.json"):
-        of_side = set(side.name.lower().removesuffix("coordsystem.json").strip("_").split("_")) - {""}
-        if of_side <= entities:
-            sides.append((len(of_side), side))
-    return max(sides)[1] if sides else None
+
+    def entities(file: Path) -> set[str]:
+        return set(re.sub(r"(electrodes\.tsv|coordsystem\.json)$", "", file.name.lower()).split("_")) - {""}
+
+    sides = [side for side in path.parent.glob("*coordsystem.json") if entities(side) <= entities(path)]
+    return max(sides, key=lambda side: (len(entities(side)), side), default=None)

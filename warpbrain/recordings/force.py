@@ -67,5 +67,5 @@ class ForceRecording(Recording):
 
     def columns(self, frame: Frame) -> Columns:
         force = zip(FORCE, frame.directions(self.force).T, strict=True)
-        columns: Columns = {"t": self.time, **{name: values for name, values in force if np.isfinite(values).all()}}
-        return columns if self.torque is None else columns | {"torque": self.torque}
+        recorded = {name: values for name, values in force if np.isfinite(values).all()}
+        return {"t": self.time, **recorded, "torque": self.torque}

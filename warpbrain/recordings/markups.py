@@ -126,10 +126,8 @@ def _position(control: dict[str, Any], number: int, path: Path, problems: Proble
 def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup:
     axes, named = "", False
     columns = COLUMNS.split(",")
-    positions: list[list[float]] = []
-    labels: list[str] = []
-    # of each point the line, its fields, and which of them are its position
-    points_in: list[tuple[int, list[str], list[int]]] = []
+    # of each point the line, its fields, which of them are its position and its label, and the position
+    controls: list[tuple[int, list[str], list[int], list[float]]] = []
     lines = lines_of(text)
     for row, line in enumerate(lines, 1):
         if line.startswith("#"):
@@ -147,19 +145,16 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup:
             except csv.Error as error:
                 problems.add(path, f"row {row}", f"found no fields ({error})")
                 continue
+            where = [columns.index(name) for name in ("x", "y", "z", "label")]
             # rows need not have the columns after the label
-            last = max(columns.index(name) for name in ("x", "y", "z", "label"))
-            if len(fields) <= last:
+            if len(fields) <= max(where):
                 problems.add(path, f"row {row}", f"found {len(fields)} fields, expected {len(columns)}")
                 continue
-            where = [columns.index(name) for name in ("x", "y", "z")]
-            words = [fields[column].strip() for column in where]
+            words = [fields[column].strip() for column in where[:3]]
             if (position := position_of(words)) is None:
                 problems.add(path, f"row {row}", f"found position {shown(','.join(words))}, expected finite numbers")
-                continue
-            positions.append(position)
-            labels.append(fields[columns.index("label")].strip())
-            points_in.append((row - 1, fields, where))
+            else:
+                controls.append((row - 1, fields, where, position))
     if not named:
         cure = "write '# CoordinateSystem = RAS' or LPS as its second line, or save it as .mrk.json"
         problems.add(path, "header", "found no coordinate system", cure)
@@ -168,14 +163,16 @@ def _read_fcsv(path: Path, text: str, problems: Problems) -> Markup:
 
     def moved_text(points: Floats) -> str:
         moved = list(lines)
-        for (at, fields, where), position in zip(points_in, frame.file_lengths(points), strict=True):
-            written = dict(zip(where, (f"{value:.6f}" for value in position), strict=True))
+        for (at, fields, where, _), position in zip(controls, frame.file_lengths(points), strict=True):
+            written = dict(zip(where[:3], (f"{value:.6f}" for value in position), strict=True))
             line = io.StringIO()
             csv.writer(line, lineterminator="").writerow([written.get(k, field) for k, field in enumerate(fields)])
             moved[at] = line.getvalue()
         return "\n".join(moved)
 
-    return Markup(frame.lengths(np.array(positions).reshape(-1, 3)), tuple(labels), moved_text)
+    positions = np.array([position for *_, position in controls]).reshape(-1, 3)
+    labels = tuple(fields[where[3]].strip() for _, fields, where, _ in controls)
+    return Markup(frame.lengths(positions), labels, moved_text)
 
 
 def _axes(value: object, path: Path, place: str, problems: Problems) -> str:

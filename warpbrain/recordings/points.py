@@ -15,17 +15,7 @@ from warpbrain.keys import Key
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.words import length
 from warpbrain.problems import Problems
-from warpbrain.recordings.base import (
-    DISPLACEMENT,
-    POSITION,
-    REFERENCE,
-    Columns,
-    Content,
-    Recording,
-    TrackedPoints,
-    column_of_time,
-    columns_of_vectors,
-)
+from warpbrain.recordings.base import DISPLACEMENT, POSITION, REFERENCE, Columns, Content, Recording, TrackedPoints
 from warpbrain.recordings.inside import check_points_inside, check_possible
 from warpbrain.recordings.tracked_points import tracked_points
 
@@ -86,18 +76,16 @@ class PointsRecording(TrackedPoints, Recording):
             check_points_inside(self, mesh, path, problems)
 
     def columns(self, frame: Frame) -> Columns:
-        columns: Columns = {}
-        if self.ids is not None:
-            if any(not name.strip() or "\n" in name or "\r" in name for name in self.ids):
-                raise InputError(f"recording '{self.name}': an id is empty or has a line break, and cannot be written")
-            columns["id"] = self.ids
-        columns |= column_of_time(self.time) | columns_of_vectors(POSITION, frame.file_lengths(self.points))
-        columns |= columns_of_vectors(DISPLACEMENT, frame.file_lengths(self.displacement))
-        if self.sigmas is not None:
-            columns["sigma"] = self.sigmas / frame.metres
-        if self.weights is not None:
-            columns["weight"] = self.weights
-        return columns
+        if any(not name.strip() or "\n" in name or "\r" in name for name in self.ids or ()):
+            raise InputError(f"recording '{self.name}': an id is empty or has a line break, and cannot be written")
+        return {
+            "id": self.ids,
+            "t": self.time,
+            POSITION: frame.file_lengths(self.points),
+            DISPLACEMENT: frame.file_lengths(self.displacement),
+            "sigma": None if self.sigmas is None else self.sigmas / frame.metres,
+            "weight": self.weights,
+        }
 
 
 def distinct_rows(recording: PointsRecording, rows: Ints) -> tuple[Ints, Floats]:

@@ -14,16 +14,7 @@ from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.mesh import TetMesh
 from warpbrain.problems import Problems
-from warpbrain.recordings.base import (
-    POSITION,
-    REFERENCE,
-    Columns,
-    Content,
-    Recording,
-    column_of_time,
-    columns_of_vectors,
-    write_triangles,
-)
+from warpbrain.recordings.base import POSITION, REFERENCE, Columns, Content, Recording, write_triangles
 from warpbrain.recordings.inside import check_possible, check_surface_near
 from warpbrain.recordings.markups import is_markup, read_markup
 from warpbrain.recordings.surfaces import read_surface_mesh
@@ -87,10 +78,8 @@ class SurfaceRecording(Recording):
         return ".csv" if self.faces is None else ".vtu"
 
     def columns(self, frame: Frame) -> Columns:
-        columns = columns_of_vectors(POSITION, frame.file_lengths(self.points)) | column_of_time(self.time)
-        if self.normals is not None:
-            columns |= columns_of_vectors(NORMAL, frame.directions(self.normals))
-        return columns
+        normals = None if self.normals is None else frame.directions(self.normals)
+        return {POSITION: frame.file_lengths(self.points), "t": self.time, NORMAL: normals}
 
     def _write(self, path: Path, frame: Frame) -> None:
         if self.faces is None:

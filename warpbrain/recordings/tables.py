@@ -11,6 +11,7 @@ import csv
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -24,22 +25,15 @@ from warpbrain.recordings.text import lines_of, read_text, remark_open_end, show
 LARGEST = 1e12
 
 
+@dataclass(frozen=True, eq=False)
 class Table:
-    """A table as it was read: cells that are asked for are checked, and what is wrong is added to `problems`.
+    """A table as it was read: cells that are asked for are checked, and what is wrong is added to `problems`."""
 
-    `header`: names of the columns.
-    `cells`: each as long as the header.
-    `rows`: line in the file of each row, counted from 1.
-    """
-
-    def __init__(
-        self, path: Path, header: list[str], cells: list[list[str]], rows: list[int], problems: Problems
-    ) -> None:
-        self.path = path
-        self.header = header
-        self.rows = rows
-        self._cells = cells
-        self._problems = problems
+    path: Path
+    header: list[str]  # names of the columns
+    cells: list[list[str]]  # each as long as the header
+    rows: list[int]  # line in the file of each row, counted from 1
+    problems: Problems
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -49,16 +43,19 @@ class Table:
 
     def problem(self, index: int, name: str, message: str, cure: str = "") -> None:
         """Note a problem with the value of column `name` in a row, counted from 0."""
-        self._problems.add(self.path, f"row {self.rows[index]}, column {name}", message, cure)
+        self.problems.add(self.path, f"row {self.rows[index]}, column {name}", message, cure)
 
     def has(self, *names: str) -> bool:
         """Whether all these columns are there; each that is not is a problem."""
         missing = [name for name in names if name not in self.header]
         for name in missing:
-            near = _nearest(name, self.header)
+            # people add units to names: "x [mm]", "x_mm"
+            bare = {re.split(r"[^a-z0-9]", column.lower())[0]: column for column in reversed(self.header) if column}
+            plain = bare | {column.lower(): column for column in reversed(self.header) if column}
+            near = get_close_matches(name.lower(), list(plain), n=1, cutoff=0.4)
             columns = ", ".join(self.header[:8]) + (", ..." if len(self.header) > 8 else "")
-            cure = f"is {shown(near)} meant?" if near else ""
-            self._problems.add(self.path, "header", f"found no column '{name}', found {columns[:100]}", cure)
+            cure = f"is {shown(plain[near[0]])} meant?" if near else ""
+            self.problems.add(self.path, "header", f"found no column '{name}', found {columns[:100]}", cure)
         return not missing
 
     def require(self, *names: str) -> None:
@@ -69,18 +66,18 @@ class Table:
     def words(self, name: str) -> tuple[str, ...]:
         """A column as text, none of it empty."""
         column = self.header.index(name)
-        words = tuple(row[column] for row in self._cells)
+        words = tuple(row[column] for row in self.cells)
         for index, word in enumerate(words):
-            if not word and not self._problems.enough:
+            if not word and not self.problems.enough:
                 self.problem(index, name, "found nothing, expected a name")
         return words
 
     def numbers(self, name: str) -> Floats:
         """A column as finite numbers (n,); NaN where there was a problem."""
         column = self.header.index(name)
-        values = np.full(len(self._cells), np.nan)
-        for index, row in enumerate(self._cells):
-            if self._problems.enough:
+        values = np.full(len(self), np.nan)
+        for index, row in enumerate(self.cells):
+            if self.problems.enough:
                 break
             cell = row[column]
             value = _number(cell)
@@ -106,7 +103,7 @@ class Table:
         values = self.numbers(name)
         wrong = values < lowest if itself else values <= lowest
         for index in np.flatnonzero(wrong):
-            if self._problems.enough:
+            if self.problems.enough:
                 break
             limit = f"{lowest:g} or more" if itself else f"more than {lowest:g}"
             self.problem(int(index), name, f"found {values[index]:g}, expected {limit}")
@@ -120,7 +117,7 @@ class Table:
         values = self.numbers("t")
         before: dict[str, int] = {}
         for index in np.flatnonzero(np.isfinite(values)).tolist():
-            if self._problems.enough:
+            if self.problems.enough:
                 break
             key = of[index] if of is not None else ""
             if key in before:
@@ -226,11 +223,3 @@ def position_of(words: Sequence[str]) -> list[float] | None:
     except ValueError:
         return None
     return values if all(abs(value) <= LARGEST for value in values) else None
-
-
-def _nearest(name: str, header: Sequence[str]) -> str | None:
-    # people add units to names: "x [mm]", "x_mm"
-    bare = {re.split(r"[^a-z0-9]", column.lower())[0]: column for column in reversed(header) if column}
-    plain = bare | {column.lower(): column for column in reversed(header) if column}
-    near = get_close_matches(name.lower(), list(plain), n=1, cutoff=0.4)
-    return plain[near[0]] if near else None

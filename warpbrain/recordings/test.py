@@ -14,7 +14,7 @@ from warpbrain.errors import InputError
 from warpbrain.frame import PASCALS, Frame
 from warpbrain.keys import Key
 from warpbrain.problems import Problems
-from warpbrain.recordings.base import Columns, Content, Recording, column_of_time
+from warpbrain.recordings.base import Columns, Content, Recording
 from warpbrain.recordings.tables import Table, read_csv
 
 #: What a test of each mode may have recorded: imposed, response.
@@ -154,7 +154,7 @@ class TestRecording(Recording):
     def columns(self, frame: Frame) -> Columns:
         imposed, response = self.quantities
         unit = frame.metres if imposed == "displacement" else 1.0
-        return column_of_time(self.time) | {imposed: self.imposed / unit, response: self.response}
+        return {"t": self.time, imposed: self.imposed / unit, response: self.response}
 
 
 def nominal_stress(mode: str, stretch: Floats, values: Floats, kind: str) -> Floats:

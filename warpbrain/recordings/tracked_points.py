@@ -15,7 +15,7 @@ from warpbrain.plugins import added_by_packages
 from warpbrain.problems import Problems, Unreadable
 from warpbrain.recordings.base import DISPLACEMENT, POSITION, TrackedPoints
 from warpbrain.recordings.markups import is_markup, paired, read_markup
-from warpbrain.recordings.tables import LARGEST, Table, read_table
+from warpbrain.recordings.tables import LARGEST, read_table
 from warpbrain.recordings.text import collected, lines_of, read_text, require_readable, shown, without_comment
 
 #: Reads a file of the ending that it is registered for (entry points of the group `warpbrain.recordings`, named like
@@ -48,13 +48,11 @@ def tracked_points(path: Path, frame: Frame, moved: Path | None, problems: Probl
         problems.refuse(path, "moved", f"a {ending} file holds where points went; 'moved' goes with 3D Slicer markups")
     if ending == ".csv":
         return _of_csv(path, frame, problems)
-    return _of_tags(path, problems) if ending == ".tag" else _of_package(path, added_readers()[ending], problems)
-
-
-def _of_package(path: Path, read: Reader, problems: Problems) -> TrackedPoints:
+    if ending == ".tag":
+        return _of_tags(path, problems)
     require_readable(path, problems)
     try:
-        tracked = read(path)
+        tracked = added_readers()[ending](path)
     except (ValueError, OSError) as error:
         problems.refuse(path, "", str(error))
     if fault := _fault(tracked):
@@ -83,8 +81,13 @@ def _of_csv(path: Path, frame: Frame, problems: Problems) -> TrackedPoints:
     table = read_table(path, problems, (*POSITION, *DISPLACEMENT, "t", "id", "sigma", "weight"))
     table.require(*POSITION, *DISPLACEMENT)
     ids = table.words("id") if "id" in table else None
-    if ids is not None and "t" not in table:
-        _check_unique(table, ids)
+    first: dict[str, int] = {}
+    for index, name in enumerate(ids if ids is not None and "t" not in table else ()):
+        if name in first:
+            message = f"found {shown(name)} again (row {table.rows[first[name]]})"
+            table.problem(index, "id", f"{message}, expected each id once where there is no time t")
+        elif name:
+            first[name] = index
     return TrackedPoints(
         points=frame.lengths(table.vectors(*POSITION)),
         displacement=frame.lengths(table.vectors(*DISPLACEMENT)),
@@ -111,16 +114,6 @@ def _of_markups(path: Path, moved: Path | None, problems: Problems) -> TrackedPo
     return TrackedPoints(points=start.points, displacement=positions - start.points, ids=start.labels)
 
 
-def _check_unique(table: Table, ids: tuple[str, ...]) -> None:
-    first: dict[str, int] = {}
-    for index, name in enumerate(ids):
-        if name in first:
-            message = f"found {shown(name)} again (row {table.rows[first[name]]})"
-            table.problem(index, "id", f"{message}, expected each id once where there is no time t")
-        elif name:
-            first[name] = index
-
-
 TITLE = "MNI Tag Point File"
 
 
@@ -136,44 +129,42 @@ def _of_tags(path: Path, problems: Problems) -> TrackedPoints:
     lines = lines_of(read_text(path, problems))
     if lines[0].strip() != TITLE:
         problems.refuse(path, "row 1", f"found {shown(lines[0].strip())}, expected '{TITLE}'")
-    state = "Volumes"
-    numbers: list[list[float]] = []
-    labels: list[str] = []
-    for row, line in enumerate(lines[1:], 2):
-        if problems.enough:
-            break
-        content = without_comment(line, "#%").strip()
-        if state == "Volumes" and content:
-            key, _, value = content.partition("=")
-            if key.strip() != "Volumes" or value.strip() != "2;":
-                cure = "landmarks before and after are needed: both volumes of a pair in one file"
-                problems.refuse(path, f"row {row}", f"found {shown(content)}, expected 'Volumes = 2;'", cure)
-            state = "Points"
-        elif state == "Points" and content:
-            key, equals, content = content.partition("=")
-            if key.strip() != "Points" or not equals:
-                problems.refuse(path, f"row {row}", f"found {shown(key.strip())}, expected 'Points ='")
-            state = "records"
-        if state == "records":
-            record = without_comment(content, ";")
-            if record.strip():
-                with suppress(Unreadable):
-                    values, label = _record_of(path, row, record, problems)
-                    numbers.append(values)
-                    labels.append(label)
-            if len(record) < len(content):
-                state = "end"
-                if content[len(record) + 1 :].strip():
-                    problems.add(path, f"row {row}", "found text after the semicolon that ends the points")
-        elif state == "end" and content:
+    rows = [(row, without_comment(line, "#%").strip()) for row, line in enumerate(lines[1:], 2)]
+    rows = [(row, content) for row, content in rows if content]
+    if rows:
+        row, content = rows[0]
+        key, _, value = content.partition("=")
+        if key.strip() != "Volumes" or value.strip() != "2;":
+            cure = "landmarks before and after are needed: both volumes of a pair in one file"
+            problems.refuse(path, f"row {row}", f"found {shown(content)}, expected 'Volumes = 2;'", cure)
+    if len(rows) > 1:
+        row, content = rows[1]
+        key, equals, first = content.partition("=")
+        if key.strip() != "Points" or not equals:
+            problems.refuse(path, f"row {row}", f"found {shown(key.strip())}, expected 'Points ='")
+        rows[1] = row, first
+    records: list[tuple[list[float], str]] = []
+    ended = False
+    for row, content in rows[1:]:
+        if ended:
             problems.add(path, f"row {row}", f"found {shown(content)} after the semicolon that ends the points")
+        if ended or problems.enough:
             break
-    if state != "end":
+        record = without_comment(content, ";")
+        if record.strip():
+            with suppress(Unreadable):
+                records.append(_record_of(path, row, record, problems))
+        ended = len(record) < len(content)
+        if content[len(record) + 1 :].strip():
+            problems.add(path, f"row {row}", "found text after the semicolon that ends the points")
+    if not ended:
         problems.add(path, "", "found no semicolon after the points", "is the file cut off?")
-    elif not numbers and not problems:
+    elif not records and not problems:
         problems.add(path, "", "found no points")
     problems.require_none()
-    frame, (start, end) = Frame("mm", "RAS"), np.split(np.array(numbers), 2, axis=1)
+    labels = [label for _, label in records]
+    start, end = np.split(np.array([values for values, _ in records]), 2, axis=1)
+    frame = Frame("mm", "RAS")
     ids = tuple(labels) if all(labels) and len(set(labels)) == len(labels) else None
     return TrackedPoints(points=frame.lengths(start), displacement=frame.lengths(end - start), ids=ids)
 

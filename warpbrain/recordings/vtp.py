@@ -38,11 +38,11 @@ def read_vtp(path: Path) -> tuple[Floats, Int32s, str | None]:
         if array is None:
             continue
         points.append(file.array(array).astype(np.float64).reshape(-1, 3))
-        for kind, cut in (("Polys", _fans), ("Strips", _strips)):
+        for kind in ("Polys", "Strips"):
             arrays = {each.get("Name"): each for each in piece.findall(f"./{kind}/DataArray")}
             if {"connectivity", "offsets"} <= set(arrays):
                 ids, ends = (file.array(arrays[name]).astype(np.int64) for name in ("connectivity", "offsets"))
-                triangles.append((first + cut(ids, ends)).astype(np.int32))
+                triangles.append((first + _triangles(ids, ends, kind == "Strips")).astype(np.int32))
         first += len(points[-1])
     mark = file.root.find(".//FieldData/Array[@Name='SPACE']")
     axes = None if mark is None else file.array(mark).tobytes().decode("ascii").strip("\0")
@@ -112,19 +112,12 @@ def _take(data: bytes, count: int, coded: bool) -> bytes:
     return content
 
 
-def _fans(ids: Ints, ends: Ints) -> Ints:
+def _triangles(ids: Ints, ends: Ints, strips: bool) -> Ints:
+    """Triangles (k, 3) of fans, or strips, of nodes that end where `ends` says."""
     lengths = np.diff(ends, prepend=0)
     extra = np.maximum(lengths - 2, 0)
     start = np.repeat(ends - lengths, extra)
     step = np.arange(len(start)) - np.repeat(np.cumsum(extra) - extra, extra)
-    return np.stack([ids[start], ids[start + step + 1], ids[start + step + 2]], axis=1)
-
-
-def _strips(ids: Ints, ends: Ints) -> Ints:
-    lengths = np.diff(ends, prepend=0)
-    extra = np.maximum(lengths - 2, 0)
-    step = np.arange(extra.sum()) - np.repeat(np.cumsum(extra) - extra, extra)
-    start = np.repeat(ends - lengths, extra) + step
     # every other triangle of a strip is listed the other way round
-    odd = step % 2
-    return np.stack([ids[start], ids[start + 1 + odd], ids[start + 2 - odd]], axis=1)
+    odd = step % 2 * strips
+    return np.stack([ids[start + step * strips], ids[start + step + 1 + odd], ids[start + step + 2 - odd]], axis=1)
