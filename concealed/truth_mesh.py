@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from warpbrain.cases.building.cleaning import finished
-from warpbrain.cases.building.errors import BuildError
 from warpbrain.cases.building.mmg import Size, fit_size, remesh
 from warpbrain.cases.building.pipeline import RECIPES, discretise, named_mesh
 from warpbrain.cases.building.template import template_anatomy
+from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh, read_mesh, write_mesh
 
 #: How it is made: lattice and largest edge of the first pass and first guess of the last [mm, template], wanted nodes.
@@ -49,7 +49,7 @@ def make_truth_mesh(name: str) -> TetMesh:
     recipe = RECIPES[name]
     cut = remesh(discretise(template_anatomy(), recipe, multi=True, spacing=RECIPE["lattice"]), RECIPE["first_edge"])
     if cut is None:
-        raise BuildError(f"case {name}: MMG could not mesh the finer lattice")
+        raise InputError(f"case {name}: MMG could not mesh the finer lattice")
     good = partial(finished, easier=EASIER)
     return named_mesh(fit_size(cut, Size("nodes", *RECIPE["nodes"]), RECIPE["edge"], good), recipe)
 

@@ -9,25 +9,24 @@ from pathlib import Path
 import numpy as np
 
 from warpbrain.atomic import check_new_folder, check_writable, whole_folder, write_text
-from warpbrain.cases.building.errors import BuildError, require_extra
 from warpbrain.cases.building.label_fields import label_volumes, read_labels
 from warpbrain.cases.building.labels import LabelMesh, mesh_labels
+from warpbrain.cases.building.mmg import require_extra
 from warpbrain.cases.building.node_sets import first_sets
 from warpbrain.cases.building.tissue_names import (
-    OUTSIDE,
+    NO_TISSUE,
     RESECTION,
     VENTRICLE,
-    Assignment,
     Preset,
     assign,
     parse_names,
     preset,
     usual_name,
 )
-from warpbrain.cases.building.volumes import check_volume_in, cm3
 from warpbrain.cases.case_template import case_text
+from warpbrain.cases.parts.anatomy import LARGEST_VOLUME, SMALLEST_VOLUME
 from warpbrain.errors import InputError
-from warpbrain.frame import Frame
+from warpbrain.frame import METRES, Frame
 from warpbrain.mesh import Quality, TetMesh, components, measure, ordered, split_boundary, write_mesh
 from warpbrain.mesh.regions import read_regions
 from warpbrain.mesh.surface import face_vectors
@@ -107,7 +106,13 @@ def start_from_labels(
     assignment = assign(volumes, named, others)
     made = mesh_labels(image, assignment, size, progress)
     sets = first_sets(made.points, made.tetrahedra, made.opens)
-    notes = [*image.notes, *_left_out(volumes, named, others, assignment), *made.notes]
+    notes = [*image.notes]
+    if assignment.outside:
+        out = ", ".join(f"{label} ({volumes[label] / 1000.0:.3g} cm3)" for label in assignment.outside)
+        total = sum(volumes[label] for label in assignment.outside)
+        unnamed = "" if others is None else f"; {len(set(volumes) - set(named))} of them are --others {others}"
+        notes.append(f"outside the mesh: {total / 1000.0:.4g} cm3, labels {out}{unnamed}")
+    notes += made.notes
     tissue = made.tissue.astype(np.int32)
     resected = [number for number, name in assignment.tissues.items() if name == RESECTION]
     taken = {RESECTION: np.isin(tissue, resected)} if resected else {}
@@ -117,7 +122,7 @@ def start_from_labels(
     notes += _unfaithful(made, mesh, tissues)
     if (wanted := made.labelled_cavity * 1e-9) > 0 and abs(cavity / wanted - 1) > FAITHFUL:
         notes.append(
-            f"{VENTRICLE}: {cm3(cavity)} closed in the mesh, {cm3(wanted)} in the labels: it is in part thinner than "
+            f"{VENTRICLE}: {_cm3(cavity)} closed in the mesh, {_cm3(wanted)} in the labels: it is in part thinner than "
             "an element, or opens to the outside; a smaller --size shows more of it"
         )
     _write(folder, mesh, tissues, labels, overwrite)
@@ -154,19 +159,26 @@ def start_from_mesh(
     parse_names(names)  # what is wrong with them is known before anything is read
     named = read_regions(file, frame.unit, array)
     raw = named.mesh
-    check_volume_in(f"{file}: the mesh", raw.volume, frame.unit)
+    _check_volume(file, raw.volume, frame.unit)
     pieces = int(components(raw.tetrahedra).max()) + 1
     if pieces > 1:
-        raise BuildError(f"{file}: expected one body, found {pieces} pieces that share no face")
+        raise InputError(f"{file}: expected one body, found {pieces} pieces that share no face")
     numbers = np.unique(raw.tissue).tolist()
     if numbers[0] < 0:
-        raise BuildError(f"{file}: expected tissue labels of 0 or more, found {numbers[0]}")
+        raise InputError(f"{file}: expected tissue labels of 0 or more, found {numbers[0]}")
     given = parse_names(names, numbers)
     if absent := [str(label) for label in given if label not in numbers]:
         raise InputError(f"--tissue: the mesh has no tissue {', '.join(absent)}; it has {', '.join(map(str, numbers))}")
-    called = _names_in(file, named.names, given)
+    called = dict(given)
+    for label, name in named.names.items():
+        if label in given:
+            continue
+        try:
+            called[label] = usual_name(name)
+        except InputError as error:
+            raise InputError(f"{file}: {error}; --tissue {label}=NAME says what it is") from None
     for label, name in called.items():
-        if name == VENTRICLE or name in OUTSIDE:
+        if name in NO_TISSUE:
             raise InputError(f"--tissue: {label}={name}: the cells of a mesh are all tissue, name what they are")
     points = raw.points * frame.signs
     notes = list(named.notes)
@@ -195,7 +207,7 @@ def _check_folder(folder: Path, overwrite: bool) -> None:
 
 def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path, overwrite: bool) -> None:
     if not mesh.node_sets["base"].any():
-        raise BuildError(f"{source}: found no outer nodes that face down in the lower third: is its z axis up?")
+        raise InputError(f"{source}: found no outer nodes that face down in the lower third: is its z axis up?")
     name = folder.resolve().name
     text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets, RESECTION in mesh.element_sets)
     if overwrite and (folder / CASE_FILE).is_file():
@@ -210,28 +222,22 @@ def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path
         (place / "recordings").mkdir()
 
 
-def _names_in(file: Path, names: Mapping[int, str], given: Mapping[int, str]) -> dict[int, str]:
-    """What the tissues of a mesh are called: as the user says, else as the file does."""
-    called = dict(given)
-    for label, name in names.items():
-        if label not in given:
-            try:
-                called[label] = usual_name(name)
-            except InputError as error:
-                raise InputError(f"{file}: {error}; --tissue {label}=NAME says what it is") from None
-    return called
+def _check_volume(file: Path, volume: float, unit: str) -> None:
+    """`InputError` if a volume [m3], of lengths read in a unit of `METRES`, is no body's: says which unit would do."""
+    if SMALLEST_VOLUME < volume < LARGEST_VOLUME:
+        return
+    hint = "are its lengths in millimetres?"
+    for other, metres in METRES.items():
+        meant = volume * (metres / METRES[unit]) ** 3
+        if SMALLEST_VOLUME < meant < LARGEST_VOLUME:
+            hint = f"in {other} it would be {_cm3(meant)}: --units {other}"
+    expected = f"{_cm3(SMALLEST_VOLUME).removesuffix(' cm3')} to {_cm3(LARGEST_VOLUME)}"
+    raise InputError(f"{file}: the mesh has a volume of {_cm3(volume)} in {unit}, expected {expected}; {hint}")
 
 
-def _left_out(
-    volumes: Mapping[int, float], named: Mapping[int, str], others: str | None, assignment: Assignment
-) -> list[str]:
-    """What of the volume is no part of the mesh, label by label."""
-    out = [f"{label} ({volumes[label] / 1000.0:.3g} cm3)" for label in assignment.outside]
-    if not out:
-        return []
-    total = sum(volumes[label] for label in assignment.outside)
-    unnamed = "" if others is None else f"; {len(set(volumes) - set(named))} of them are --others {others}"
-    return [f"outside the mesh: {total / 1000.0:.4g} cm3, labels {', '.join(out)}{unnamed}"]
+def _cm3(volume: float) -> str:
+    """A volume [m3] as users read it."""
+    return f"{volume * 1e6:.4g} cm3"
 
 
 def _unfaithful(made: LabelMesh, mesh: TetMesh, tissues: Mapping[int, str]) -> list[str]:
@@ -241,7 +247,7 @@ def _unfaithful(made: LabelMesh, mesh: TetMesh, tissues: Mapping[int, str]) -> l
         wanted, got = made.labelled[number] * 1e-9, _tissue_volume(mesh, number)
         if abs(got / wanted - 1) > FAITHFUL:
             notes.append(
-                f"{name}: {cm3(got)} in the mesh, {cm3(wanted)} in the labels ({100 * (got / wanted - 1):+.0f} %): "
+                f"{name}: {_cm3(got)} in the mesh, {_cm3(wanted)} in the labels ({100 * (got / wanted - 1):+.0f} %): "
                 "parts are thinner than an element; a smaller --size shows more of them"
             )
         elif made.in_place[number] < IN_PLACE:

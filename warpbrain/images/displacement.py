@@ -29,13 +29,10 @@ class DisplacementField:
         """The same field on another grid."""
         if grid is self.grid:
             return self
-        vectors = np.empty((*grid.shape, 3), dtype=np.float32)
-        # a slice at a time, to bound the memory
-        plane = np.stack(np.meshgrid(*(np.arange(n) for n in grid.shape[1:]), indexing="ij"), axis=-1).reshape(-1, 2)
-        for i in range(grid.shape[0]):
-            places = np.column_stack([np.full(len(plane), i), plane])
-            vectors[i] = self.at(grid.positions(places)).reshape(*grid.shape[1:], 3)
-        return DisplacementField(grid, vectors)
+        vectors = np.empty((grid.count, 3), dtype=np.float32)
+        for part, places in grid.batches():
+            vectors[part] = self.at(grid.positions(places))
+        return DisplacementField(grid, vectors.reshape(*grid.shape, 3))
 
     def at(self, points: ArrayLike) -> Floats:
         """Vectors (n, 3) [mm, RAS] at positions (n, 3) [mm, RAS]."""
@@ -48,13 +45,10 @@ class DisplacementField:
         for first in range(0, len(indices), _BATCH):
             part = slice(first, first + _BATCH)
             # within half a voxel of the border ITK takes the border's value
-            at = np.clip(indices[part], 0.0, last).T
-            outside = ((indices[part] < -0.5) | (indices[part] > last + 0.5)).any(axis=1)
+            inside, at = self.grid.has(indices[part]), np.clip(indices[part], 0.0, last).T
             for axis in range(3):
-                vectors[part, axis] = scipy.ndimage.map_coordinates(
-                    self.vectors[..., axis], at, order=1, mode="nearest"
-                )
-            vectors[part][outside] = 0.0
+                values = scipy.ndimage.map_coordinates(self.vectors[..., axis], at, order=1, mode="nearest")
+                vectors[part, axis] = np.where(inside, values, 0.0)
         return vectors
 
 
@@ -146,22 +140,18 @@ def _errors(field: DisplacementField, back: DisplacementField, tissue: Bools) ->
     return np.asarray(np.linalg.norm(left, axis=1))
 
 
-#: Slices that are worked on at a time, to bound the memory.
-_SLICES = 16
-
-
 def resampled(
     values: NDArray[np.generic], grid: Grid, back: DisplacementField, *, nearest: bool
 ) -> NDArray[np.generic]:
     """Values of an image on a grid (i, j, k), at `x + back(x)` for each voxel `x` of the field's own grid.
 
-    `back` leads from where things are after to where they were before, as `inverse` makes
-    it. `nearest` takes the nearest voxel, as labels need it; else values are interpolated linearly. They keep their
-    type: whole numbers are rounded. They are zero where there was no image, and not a number where most of what is
-    interpolated was none: it does not spread.
+    `back` leads from where things are after to where they were before, as `inverse` makes it. `nearest` takes the
+    nearest voxel, as labels need it; else values are interpolated linearly. They keep their type: whole numbers are
+    rounded. They are zero where there was no image, and not a number where most of what is interpolated was none: it
+    does not spread.
     """
     after = back.grid
-    moved = np.zeros(after.shape, dtype=values.dtype)
+    moved = np.zeros(after.count, dtype=values.dtype)
     # single precision only where it holds every value
     single = np.result_type(values.dtype, np.float32) == np.float32
     source = values if nearest else values.astype(np.float32 if single else np.float64)
@@ -170,14 +160,9 @@ def resampled(
         known = np.isfinite(source).astype(np.float32)
         source = np.where(known > 0, source, 0)
     last = np.array(grid.shape) - 1
-    for first in range(0, after.shape[0], _SLICES):
-        part = slice(first, min(first + _SLICES, after.shape[0]))
-        axes = [np.arange(part.start, part.stop), np.arange(after.shape[1]), np.arange(after.shape[2])]
-        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        was: Floats = after.positions(places) + back.vectors[part].reshape(-1, 3)
-        at = grid.indices(was)
-        inside = ((at >= -0.5) & (at <= last + 0.5)).all(axis=1)
-        at = np.clip(at, 0, last)
+    for part, places in after.batches():
+        at = grid.indices(after.positions(places) + back.vectors.reshape(-1, 3)[part])
+        inside, at = grid.has(at), np.clip(at, 0, last)
         if nearest:
             index = np.floor(at + 0.5).astype(np.int64)
             sampled = source[tuple(np.minimum(index, last).T)]
@@ -188,6 +173,5 @@ def resampled(
                 sampled = np.where(share >= 0.5, sampled / np.maximum(share, 0.5), np.nan)
             if np.issubdtype(values.dtype, np.integer):
                 sampled = np.rint(sampled)
-        shape = (part.stop - part.start, *after.shape[1:])
-        moved[part] = np.where(inside, sampled, 0).astype(values.dtype).reshape(shape)
-    return moved
+        moved[part] = np.where(inside, sampled, 0).astype(values.dtype)
+    return moved.reshape(after.shape)

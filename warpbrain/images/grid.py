@@ -18,6 +18,8 @@ from warpbrain.mesh.quadratic import quadratic_interpolant
 MILLIMETRES = 1000.0
 #: Cosine between axes of voxels from which on they are not at right angles: about 0.06 degrees.
 _SKEW = 1e-3
+#: Voxels of an image that are worked on at a time, to bound the memory.
+_BATCH = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +90,12 @@ class Grid:
         inverse = np.linalg.inv(self.affine)
         return np.asarray(points, dtype=np.float64) @ inverse[:3, :3].T + inverse[:3, 3]
 
+    def batches(self) -> Iterator[tuple[slice, Ints]]:
+        """Which voxels of all, in the order of a raveled array, and their numbers (n, 3): a few at a time."""
+        for first in range(0, self.count, _BATCH):
+            part = slice(first, min(first + _BATCH, self.count))
+            yield part, np.stack(np.unravel_index(np.arange(part.start, part.stop), self.shape), axis=1)
+
     def steps(self, vectors: ArrayLike) -> Floats:
         """Vectors (n, 3) [mm, RAS] in voxels along the grid's axes."""
         return np.asarray(vectors, dtype=np.float64) @ np.linalg.inv(self.affine[:3, :3]).T
@@ -100,8 +108,11 @@ class Grid:
 
     def contains(self, points: ArrayLike) -> Bools:
         """Which positions (n, 3) [mm, RAS] are in a voxel: (n,) bool."""
-        at = self.indices(points)
-        return np.asarray(((at >= -0.5) & (at <= np.array(self.shape) - 0.5)).all(axis=-1))
+        return self.has(self.indices(points))
+
+    def has(self, indices: Floats) -> Bools:
+        """Which voxel numbers (n, 3), not rounded, are those of a voxel: (n,) bool."""
+        return np.asarray(((indices >= -0.5) & (indices <= np.array(self.shape) - 0.5)).all(axis=-1))
 
 
 #: How far outside a tetrahedron a voxel's centre is still inside, as a weight: rounding puts one that lies on a common
@@ -148,12 +159,11 @@ def voxels_inside(mesh: TetMesh, grid: Grid) -> VoxelsInside:
     corners = grid.indices(MILLIMETRES * mesh.points)[mesh.tetrahedra]
     sides = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
     gradients: Floats = np.asarray(np.linalg.inv(sides), dtype=np.float64)
-    parts = list(_batches(corners, gradients, np.array(grid.shape)))
-    voxels = np.concatenate([voxel for voxel, _, _ in parts]) if parts else np.zeros(0, dtype=np.int64)
+    none = np.zeros(0, dtype=np.int64)
+    parts = [(none, none, np.zeros((0, 4))), *_batches(corners, gradients, np.array(grid.shape))]
+    voxels, elements, weights = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     voxels, first = np.unique(voxels, return_index=True)
-    elements = np.concatenate([element for _, element, _ in parts])[first] if parts else voxels
-    weights = np.concatenate([weight for _, _, weight in parts])[first] if parts else np.zeros((0, 4))
-    return VoxelsInside(grid, mesh, voxels, elements, weights)
+    return VoxelsInside(grid, mesh, voxels, elements[first], weights[first])
 
 
 def _batches(corners: Floats, gradients: Floats, shape: Ints) -> Iterator[tuple[Ints, Ints, Floats]]:

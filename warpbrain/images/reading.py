@@ -154,9 +154,23 @@ def _affine(path: Path, image: Any) -> tuple[Floats, list[str]]:
                 f"{path}: does not say where its voxels are (sform and qform code 0): save it again from 3D Slicer or "
                 "with the affine of the image it was made from"
             )
-        if all(codes) and (apart := _apart(header, image.shape)) > _DISAGREEMENT:
-            notes.append(f"sform and qform of {path.name} disagree by up to {apart:.0f} mm: the sform is used")
-        affine[:3] *= _unit(path, header, notes)
+        if all(codes):
+            # at the corners of the image
+            corners = np.array(np.meshgrid(*[(0, n - 1) for n in image.shape[:3]])).reshape(3, -1)
+            difference = header.get_sform() - header.get_qform()
+            apart = np.linalg.norm(difference[:3, :3] @ corners + difference[:3, 3:], axis=0).max()
+            if apart > _DISAGREEMENT:
+                notes.append(f"sform and qform of {path.name} disagree by up to {apart:.0f} mm: the sform is used")
+        try:
+            unit = header.get_xyzt_units()[0]
+        except KeyError:
+            code = int(header["xyzt_units"])
+            raise InputError(
+                f"{path}: unknown unit of length (xyzt_units {code}); expected mm, meter or micron"
+            ) from None
+        if unit not in ("mm", "unknown"):
+            notes.append(f"{path.name} is in units of {unit}: converted to mm")
+        affine[:3] *= _MILLIMETRES[unit]
     return checked_affine(path, affine), notes
 
 
@@ -168,24 +182,6 @@ def checked_affine(path: Path, affine: Floats) -> Floats:
     if not finite or edges.min() == 0 or abs(np.linalg.det(affine[:3, :3])) < 1e-3 * edges.prod():
         raise InputError(f"{path}: its affine is singular or not finite, voxels have no place: {affine[:3].tolist()}")
     return affine
-
-
-def _apart(header: Any, shape: Iterable[int]) -> float:
-    """Largest distance between where sform and qform put the corners of the image, in its units."""
-    corners = np.array(np.meshgrid(*[(0, n - 1) for n in list(shape)[:3]])).reshape(3, -1)
-    difference = header.get_sform() - header.get_qform()
-    return float(np.linalg.norm(difference[:3, :3] @ corners + difference[:3, 3:], axis=0).max())
-
-
-def _unit(path: Path, header: Any, notes: list[str]) -> float:
-    try:
-        unit = header.get_xyzt_units()[0]
-    except KeyError:
-        code = int(header["xyzt_units"])
-        raise InputError(f"{path}: unknown unit of length (xyzt_units {code}); expected mm, meter or micron") from None
-    if unit not in ("mm", "unknown"):
-        notes.append(f"{path.name} is in units of {unit}: converted to mm")
-    return _MILLIMETRES[unit]
 
 
 def _times(shape: Iterable[int]) -> str:

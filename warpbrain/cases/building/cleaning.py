@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.cases.building.errors import BuildError
 from warpbrain.cases.building.lattice import cut
-from warpbrain.cases.building.mmg import Cells, remesh
+from warpbrain.cases.building.mmg import Cells
+from warpbrain.errors import InputError
 from warpbrain.mesh import boundary_faces, pinched_nodes, split_boundary
 from warpbrain.mesh.quality import components, dihedral_angles, measure_arrays
 from warpbrain.mesh.surface import FACES, face_vectors, interface_faces, node_vectors, paired_faces
@@ -18,8 +18,6 @@ from warpbrain.mesh.tet_mesh import signed_volumes
 
 # pieces of a tissue smaller than this [mm3, template] go to their neighbour
 SMALLEST_PIECE = 2000.0
-# largest edge [mm] of the first pass, which only takes out the needles left by the cutting
-FIRST_EDGE = 8.0
 # bars a finished mesh must clear, and what the last step aims at [degrees]
 MIN_DIHEDRAL = 15.0
 FIRST_PERCENTILE = 20.0
@@ -51,7 +49,7 @@ def opened_out(tetrahedra: Ints, inside: Bools) -> Bools:
         if len(touching) == 0:
             return inside
         inside = inside | np.isin(tetrahedra, touching).any(axis=1)
-    raise BuildError("the surface of the brain touches itself, and filling there did not help")
+    raise InputError("the surface of the brain touches itself, and filling there did not help")
 
 
 def cut_body(
@@ -93,14 +91,6 @@ def _in_one_piece(points: Floats, tetrahedra: Ints, region: Bools, notes: list[s
     if share > 1e-4:
         notes.append(f"{what} are left out: {lost / 1000:.3g} cm3 ({100 * share:.2g} %)")
     return region & ~dropped
-
-
-def first_pass(cells: Cells) -> Cells:
-    """Take out the needles that the cutting left."""
-    made = remesh(cells, FIRST_EDGE)
-    if made is None:
-        raise BuildError("MMG could not mesh the cut lattice")
-    return made
 
 
 def finished(cells: Cells, cavities: int | None = 1, easier: float = 0.0) -> Cells | None:

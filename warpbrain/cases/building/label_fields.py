@@ -16,7 +16,6 @@ from scipy import ndimage
 
 from warpbrain.arrays import Bools, Ints, Singles
 from warpbrain.cases.building.tissue_names import Assignment
-from warpbrain.cases.building.volumes import check_volume
 from warpbrain.errors import InputError
 from warpbrain.images.grid import Grid
 from warpbrain.images.reading import Image, labels_of, read_image
@@ -26,6 +25,8 @@ Codes = NDArray[np.uint8]
 OUTSIDE = 0
 #: Tissues are 1, 2, ... in the order of the assignment.
 CAVITY = 255
+#: Volumes of what is labelled in a scan [mm3]: from a small rodent's brain to a phantom larger than any head.
+SMALLEST, LARGEST = 1e3, 1e7
 
 
 def read_labels(path: Path) -> Image:
@@ -64,11 +65,26 @@ def make_regions(image: Image, assignment: Assignment) -> Regions:
 
     `InputError` if the volume is none that a brain can have.
     """
-    codes, grid = _cropped(image, assignment)
+    code_of = {number: code for code, number in enumerate(assignment.tissues, 1)}
+    codes_of = {label: code_of[number] for label, number in assignment.number.items()}
+    codes_of |= dict.fromkeys(assignment.cavity, CAVITY)
+    # the smallest box that holds everything labelled, and a voxel around it
+    box = ndimage.find_objects(np.isin(image.values, list(codes_of)).astype(np.int8))[0]
+    labels = image.values[box]
+    codes: Codes = np.zeros(labels.shape, dtype=np.uint8)
+    for label, code in codes_of.items():
+        codes[labels == label] = code
+    codes = np.pad(codes, 1)
+    affine = image.grid.affine.copy()
+    affine[:3, 3] += affine[:3, :3] @ np.array([side.start - 1 for side in box])
     unit = image.grid.voxel_volume
     counts = np.bincount(codes.ravel(), minlength=256)
     labelled = {int(code): float(counts[code]) * unit for code in np.flatnonzero(counts) if code != OUTSIDE}
-    check_volume(f"{image.path}: what is labelled", sum(labelled.values()) * 1e-9)
+    if not SMALLEST <= (volume := sum(labelled.values())) <= LARGEST:
+        raise InputError(
+            f"{image.path}: what is labelled has a volume of {volume / 1000:.4g} cm3, expected {SMALLEST / 1000:.4g} "
+            f"cm3 to {LARGEST / 1000:.4g} cm3: are its lengths in millimetres?"
+        )
     notes = []
     piece, count = ndimage.label(codes != OUTSIDE)
     if count > 1:
@@ -90,27 +106,7 @@ def make_regions(image: Image, assignment: Assignment) -> Regions:
             f"{ndimage.label(void)[1]} unlabelled voids inside ({np.count_nonzero(void) * unit / 1000:.3g} cm3) are "
             "filled with the nearest label"
         )
-    return Regions(codes, grid, len(assignment.tissues), labelled, tuple(notes))
-
-
-def _cropped(image: Image, assignment: Assignment) -> tuple[Codes, Grid]:
-    """Codes of the smallest box that holds everything labelled and a voxel around it, and the grid of that box."""
-    code = {number: 1 + at for at, number in enumerate(assignment.tissues)}
-    codes_of = {label: code[number] for label, number in assignment.number.items()}
-    codes_of |= dict.fromkeys(assignment.cavity, CAVITY)
-    used = np.isin(image.values, list(codes_of))
-    box = []
-    for axis in range(3):
-        along = np.flatnonzero(used.any(axis=tuple(a for a in range(3) if a != axis)))
-        box.append(slice(int(along[0]), int(along[-1]) + 1))
-    labels = image.values[tuple(box)]
-    codes = np.zeros(labels.shape, dtype=np.uint8)
-    for label, value in codes_of.items():
-        codes[labels == label] = value
-    affine = image.grid.affine.copy()
-    affine[:3, 3] += affine[:3, :3] @ np.array([side.start - 1 for side in box])
-    i, j, k = (n + 2 for n in labels.shape)
-    return np.pad(codes, 1), Grid((i, j, k), affine)
+    return Regions(codes, Grid(codes.shape, affine), len(assignment.tissues), labelled, tuple(notes))
 
 
 # standard deviation of the smoothing: share of the element size, and at least this many voxels along each axis of the

@@ -10,11 +10,11 @@ import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.building.cleaning import crumbs_given_away, cut_body, finished
-from warpbrain.cases.building.errors import BuildError
 from warpbrain.cases.building.label_fields import CAVITY, LabelFields, make_fields, make_regions
 from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
 from warpbrain.cases.building.mmg import Cells, remesh
 from warpbrain.cases.building.tissue_names import Assignment
+from warpbrain.errors import InputError
 from warpbrain.images.reading import Image
 from warpbrain.mesh.surface import EDGES
 
@@ -78,9 +78,17 @@ def mesh_labels(
     regions = make_regions(image, assignment)
     tissue_volume = regions.grid.voxel_volume * float(((regions.codes != 0) & (regions.codes != CAVITY)).sum())
     if tissue_volume == 0:
-        raise BuildError(f"{image.path}: no tissue is left in the largest piece of the labels")
+        raise InputError(f"{image.path}: no tissue is left in the largest piece of the labels")
     chosen = _size_of(tissue_volume, NODES) if size is None else size
-    _check_size(tissue_volume, chosen)
+    nodes = tissue_volume / (TETRAHEDRA_A_NODE * TETRAHEDRON * chosen**3)
+    if nodes > MOST_NODES:
+        least = _size_of(tissue_volume, MOST_NODES)
+        raise InputError(
+            f"--size {chosen:g}: about {nodes:.2g} nodes; {least:.2g} mm would be {MOST_NODES}, the most here"
+        )
+    if nodes < FEWEST_NODES:
+        tissue, most = f"{tissue_volume / 1000:.3g} cm3 of tissue", _size_of(tissue_volume, FEWEST_NODES)
+        raise InputError(f"--size {chosen:g}: too large for {tissue}: at most {most:.2g} mm")
     progress(f"smoothing the labels for elements of {chosen:.3g} mm")
     fields = make_fields(regions, chosen)
     progress("cutting the lattice along the surfaces")
@@ -88,36 +96,22 @@ def mesh_labels(
     notes = [*regions.notes, *lattice_notes]
     progress("meshing")
     made = _made(cells, chosen, notes)
-    numbers = np.array([0, *assignment.tissues])
-    by_number = {code: number for code, number in enumerate(numbers.tolist()) if code}
     return LabelMesh(
         made.points,
         made.tetrahedra,
-        numbers[made.labels],
+        np.array([0, *assignment.tissues])[made.labels],
         chosen,
-        {number: regions.labelled.get(code, 0.0) for code, number in by_number.items()},
+        {number: regions.labelled.get(code, 0.0) for code, number in enumerate(assignment.tissues, 1)},
         regions.labelled.get(CAVITY, 0.0),
-        {number: fields.in_place.get(code, 0.0) for code, number in by_number.items()},
+        {number: fields.in_place.get(code, 0.0) for code, number in enumerate(assignment.tissues, 1)},
         fields,
         tuple(notes),
     )
 
 
 def _size_of(volume: float, nodes: float) -> float:
+    """Size [mm] of elements that fill a volume [mm3] with so many nodes."""
     return float((volume / (nodes * TETRAHEDRA_A_NODE * TETRAHEDRON)) ** (1 / 3))
-
-
-def _check_size(volume: float, size: float) -> None:
-    """`BuildError` if elements of a size [mm] are too many or too few for a volume [mm3]."""
-    nodes = volume / (TETRAHEDRA_A_NODE * TETRAHEDRON * size**3)
-    if nodes > MOST_NODES:
-        least = _size_of(volume, MOST_NODES)
-        raise BuildError(
-            f"--size {size:g}: about {nodes:.2g} nodes; {least:.2g} mm would be {MOST_NODES}, the most here"
-        )
-    if nodes < FEWEST_NODES:
-        most = _size_of(volume, FEWEST_NODES)
-        raise BuildError(f"--size {size:g}: too large for {volume / 1000:.3g} cm3 of tissue: at most {most:.2g} mm")
 
 
 def _without_needles(fields: LabelFields, assignment: Assignment, size: float) -> tuple[Cells, list[str]]:
@@ -128,7 +122,7 @@ def _without_needles(fields: LabelFields, assignment: Assignment, size: float) -
         # MMG gives up on some lattices and not on one that is a little finer
         if (cells := remesh(cut_lattice, FIRST_EDGE * size)) is not None:
             return cells, notes
-    raise BuildError(f"MMG could not mesh the labels with elements of about {size:.3g} mm: try another --size")
+    raise InputError(f"MMG could not mesh the labels with elements of about {size:.3g} mm: try another --size")
 
 
 def _discretised(fields: LabelFields, assignment: Assignment, size: float, spacing: float, notes: list[str]) -> Cells:
@@ -154,7 +148,7 @@ def _discretised(fields: LabelFields, assignment: Assignment, size: float, spaci
     labels = crumbs_given_away(points, tetrahedra, labels, crumb)
     for code, name in enumerate(assignment.tissues.values(), start=1):
         if not (labels == code).any():
-            raise BuildError(
+            raise InputError(
                 f"'{name}' is too small or thin for elements of {size:.3g} mm: choose a smaller --size, or give its "
                 "labels to another tissue"
             )
@@ -166,9 +160,12 @@ def _made(cells: Cells, size: float, notes: list[str]) -> Cells:
     nearly: Cells | None = None
     edge = LARGEST_EDGE * size
     for trial in range(TRIALS):
-        made = remesh(cells, edge)
-        ratio = 1.0 if made is None else _mean_edge(made) / size
-        if made is None or abs(ratio - 1) < NEAR:
+        made, ratio = remesh(cells, edge), 1.0
+        if made is not None:
+            ends = np.unique(np.sort(made.tetrahedra[:, EDGES].reshape(-1, 2), axis=1), axis=0)
+            sides = made.points[ends[:, 0]] - made.points[ends[:, 1]]
+            ratio = float(np.linalg.norm(sides, axis=1).mean()) / size
+        if abs(ratio - 1) < NEAR:
             if made is not None:
                 if (done := finished(made, cavities=None)) is not None:
                     return done
@@ -178,11 +175,6 @@ def _made(cells: Cells, size: float, notes: list[str]) -> Cells:
         else:
             edge /= min(max(ratio, 0.6), 1.6)
     if nearly is None:
-        raise BuildError(f"MMG found no good mesh with elements of about {size:.3g} mm: try another --size")
+        raise InputError(f"MMG found no good mesh with elements of about {size:.3g} mm: try another --size")
     notes.append("some elements are sharper than those of the shipped meshes: another --size may do better")
     return nearly
-
-
-def _mean_edge(cells: Cells) -> float:
-    ends = np.unique(np.sort(cells.tetrahedra[:, EDGES].reshape(-1, 2), axis=1), axis=0)
-    return float(np.linalg.norm(cells.points[ends[:, 0]] - cells.points[ends[:, 1]], axis=1).mean())

@@ -6,28 +6,38 @@ IN OUT OPTIONS`, and the program itself clears up.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from warpbrain.arrays import Floats, Ints
-from warpbrain.cases.building.errors import BuildError
+from warpbrain.errors import InputError
 
 #: Exit status of the child where MMG gave up.
 _GAVE_UP = 3
+
+
+def require_extra(modules: Collection[str] = ("mmgpy", "nilearn", "nibabel", "scipy", "meshio")) -> None:
+    """Stop with a plain sentence if one of the packages that only building needs is missing."""
+    if missing := [module for module in modules if importlib.util.find_spec(module) is None]:
+        raise InputError(
+            f"building meshes needs {', '.join(missing)}, not installed here: pip install 'warpbrain[build]'. "
+            "Running the shipped cases does not need it."
+        )
 
 
 def run_mmg(
     points: Floats, tetrahedra: Ints, labels: Ints, options: dict[str, float]
 ) -> tuple[Floats, Ints, Ints] | None:
     """Remesh points (n, 3), tetrahedra (m, 4) and labels (m,) with options of `mmgpy.MmgMesh3D.remesh`; None where MMG
-    gives up, `BuildError` if the child cannot be run at all."""
+    gives up, `InputError` if the child cannot be run at all."""
     with tempfile.TemporaryDirectory(prefix="warpbrain-mmg-") as folder:
         given, made = Path(folder) / "given.npz", Path(folder) / "made.npz"
         np.savez(given, points=points, tetrahedra=tetrahedra, labels=labels)
@@ -37,7 +47,7 @@ def run_mmg(
             return None
         if done.returncode != 0 or not made.exists():
             message = (done.stderr.strip() or done.stdout.strip() or f"exit status {done.returncode}").splitlines()[-1]
-            raise BuildError(f"MMG could not be run: {message}")
+            raise InputError(f"MMG could not be run: {message}")
         with np.load(made) as result:
             return result["points"], result["tetrahedra"], result["labels"]
 
@@ -130,7 +140,7 @@ def fit_size(cells: Cells, size: Size, edge: float, good: Callable[[Cells], Cell
                 if finished is not None:
                     return finished
         edge = next(e for e in _proposals(seen, goal, edge) if all(abs(e / old - 1) > 4e-4 for old, _ in seen))
-    raise BuildError(f"no mesh with {size.at_least} to {size.at_most} {size.of} in {TRIALS} trials; tried {seen}")
+    raise InputError(f"no mesh with {size.at_least} to {size.at_most} {size.of} in {TRIALS} trials; tried {seen}")
 
 
 def _proposals(seen: list[tuple[float, int]], goal: float, edge: float) -> Iterator[float]:

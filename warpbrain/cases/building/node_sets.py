@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.cases.building.errors import BuildError
+from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.surface import face_vectors, interface_faces, node_vectors, nodes_of, split_boundary
+from warpbrain.mesh.surface import face_vectors, node_vectors, nodes_of, split_boundary
 
 # superior cap: depth under the highest point, and how much the surface there faces up (not the walls of the fissure)
 CAP_DEPTH = 15.0
@@ -33,7 +34,7 @@ def node_sets(points: Floats, tetrahedra: Ints) -> dict[str, Bools]:
     """
     outer, cavities = split_boundary(points, tetrahedra)
     if len(cavities) != 1:
-        raise BuildError(f"expected one cavity, the lateral ventricles; found {len(cavities)} cavities")
+        raise InputError(f"expected one cavity, the lateral ventricles; found {len(cavities)} cavities")
     count = len(points)
     surface = nodes_of(outer, count)
     up = _facing_up(points, outer)
@@ -45,13 +46,6 @@ def node_sets(points: Floats, tetrahedra: Ints) -> dict[str, Bools]:
         "superior": surface & (z > z[surface].max() - CAP_DEPTH) & (up > CAP_FACING),
         "fixed": surface & below & (up < BASE_FACING),
     }
-
-
-def margin(tetrahedra: Ints, resected: Bools, count: int) -> tuple[Bools, Bools]:
-    """Nodes (count,) of the wall a resection leaves, and nodes (count,) that only resected tissue has."""
-    wall = nodes_of(interface_faces(tetrahedra, resected), count)
-    gone = nodes_of(tetrahedra[resected], count) & ~nodes_of(tetrahedra[~resected], count)
-    return wall, gone
 
 
 # the base: what faces down this much, in this lower share of the height
@@ -111,4 +105,4 @@ def with_example_sets(mesh: TetMesh) -> TetMesh:
         "side": mesh.node_sets["surface"] & ~mesh.node_sets["fixed"] & (mesh.points[:, 0] > SIDE_BEYOND),
     }
     ball = np.linalg.norm(middles - CENTRE, axis=1) < RADIUS
-    return TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, {**mesh.node_sets, **nodes}, {"ball": ball})
+    return replace(mesh, node_sets={**mesh.node_sets, **nodes}, element_sets={"ball": ball})

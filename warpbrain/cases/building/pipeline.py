@@ -17,13 +17,13 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Singles
 from warpbrain.atomic import write_text
-from warpbrain.cases.building.cleaning import SMALLEST_PIECE, cut_body, finished, first_pass, small_pieces
-from warpbrain.cases.building.errors import BuildError, require_extra
+from warpbrain.cases.building.cleaning import SMALLEST_PIECE, cut_body, finished, small_pieces
 from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
-from warpbrain.cases.building.mmg import Cells, Size, fit_size
-from warpbrain.cases.building.node_sets import margin, node_sets, with_example_sets
-from warpbrain.cases.building.template import Anatomy, IndividualWarp, anterior_temporal_lobe, template_anatomy
-from warpbrain.mesh import Quality, TetMesh, measure, ordered, split_boundary, write_mesh
+from warpbrain.cases.building.mmg import Cells, Size, fit_size, remesh, require_extra
+from warpbrain.cases.building.node_sets import node_sets, with_example_sets
+from warpbrain.cases.building.template import Anatomy, anterior_temporal_lobe, individual, template_anatomy
+from warpbrain.errors import InputError
+from warpbrain.mesh import Quality, TetMesh, interface_faces, measure, nodes_of, ordered, split_boundary, write_mesh
 from warpbrain.mesh.tet_mesh import signed_volumes
 
 
@@ -112,6 +112,8 @@ GREY, WHITE, RESECTED = 1, 2, 10
 
 # background lattice [mm]: finer than any mesh made from it
 LATTICE = 6.0
+# largest edge [mm] of the first pass, which only takes out the needles left by the cutting
+FIRST_EDGE = 8.0
 
 
 def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], None] = lambda line: None) -> Path:
@@ -124,7 +126,7 @@ def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], 
     Returns the folder written.
     """
     if name not in RECIPES:
-        raise BuildError(f"no case '{name}' can be built; choose from {', '.join(NAMES)}")
+        raise InputError(f"no case '{name}' can be built; choose from {', '.join(NAMES)}")
     require_extra()
     recipe = RECIPES[name]
     folder = Path(out_dir) / name
@@ -139,7 +141,10 @@ def build(name: str, out_dir: str | os.PathLike[str], progress: Callable[[str], 
     for wanted in recipe.meshes:
         if wanted.multi not in start:
             progress(f"cutting the lattice along the surfaces ({'two tissues' if wanted.multi else 'one tissue'})")
-            start[wanted.multi] = first_pass(discretise(anatomy, recipe, wanted.multi))
+            made = remesh(discretise(anatomy, recipe, wanted.multi), FIRST_EDGE)
+            if made is None:
+                raise InputError("MMG could not mesh the cut lattice")
+            start[wanted.multi] = made
         size = wanted.size(tetrahedra)
         progress(f"{wanted.file}: looking for {size.at_least} to {size.at_most} {size.of}")
         cells = fit_size(start[wanted.multi], size, 13.0, finished)
@@ -214,7 +219,7 @@ def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool, spacing: float
         labels[taken & ~small_pieces(points, tetrahedra, taken)] += RESECTED
     points, tetrahedra = compact(points, tetrahedra)
     if recipe.seed is not None:
-        points = IndividualWarp(recipe.seed, INDIVIDUAL_AMPLITUDE)(points)
+        points = individual(points, recipe.seed, INDIVIDUAL_AMPLITUDE)
     return Cells(points, tetrahedra, labels)
 
 
@@ -224,9 +229,9 @@ def named_mesh(cells: Cells, recipe: CaseRecipe) -> TetMesh:
     sets = node_sets(cells.points, tetrahedra)
     elements = {}
     if recipe.resection is not None:
-        wall, gone = margin(tetrahedra, resected, len(cells.points))
-        sets["resection"] = wall
-        sets["fixed"] = sets["fixed"] & ~gone
+        taken, left = (nodes_of(tetrahedra[part], len(cells.points)) for part in (resected, ~resected))
+        sets["resection"] = nodes_of(interface_faces(tetrahedra, resected), len(cells.points))
+        sets["fixed"] = sets["fixed"] & ~(taken & ~left)
         elements["resection"] = resected
     scale = (recipe.volume / signed_volumes(cells.points, tetrahedra).sum()) ** (1 / 3)
     labels = (cells.labels % RESECTED).astype(np.int32)

@@ -18,7 +18,7 @@ import numpy as np
 from scipy import ndimage
 
 from warpbrain.arrays import Bools, Floats, Singles
-from warpbrain.cases.building.errors import BuildError
+from warpbrain.errors import InputError
 from warpbrain.images.grid import Grid
 
 _FOLDER = "datasets/data"
@@ -47,17 +47,17 @@ def _load_maps() -> _Maps:
     # nilearn itself would bring scikit-learn and pandas with it; its files are all that is needed
     spec = importlib.util.find_spec("nilearn")
     if spec is None or not spec.submodule_search_locations:
-        raise BuildError("nilearn is not installed: pip install 'warpbrain[build]'")
+        raise InputError("nilearn is not installed: pip install 'warpbrain[build]'")
     folder = Path(spec.submodule_search_locations[0]) / _FOLDER
     images: dict[str, Any] = {}
     for kind in ("t1", "gm", "wm"):
         path = folder / _FILE.format(kind)
         if not path.is_file():
-            raise BuildError(f"the installed nilearn has no {_FOLDER}/{path.name}; version 0.14.1 has it")
+            raise InputError(f"the installed nilearn has no {_FOLDER}/{path.name}; version 0.14.1 has it")
         images[kind] = nibabel.load(path)
     affine = images["t1"].affine
     if not np.array_equal(affine[:3, :3], np.eye(3)):
-        raise BuildError(f"expected template maps with 1 mm voxels along RAS axes, found affine {affine.tolist()}")
+        raise InputError(f"expected template maps with 1 mm voxels along RAS axes, found affine {affine.tolist()}")
     t1, *maps = (np.pad(np.asarray(images[kind].dataobj), PADDING) for kind in ("t1", "gm", "wm"))
     grey, white = ((values / np.float32(255)).astype(np.float32) for values in maps)
     origin = affine[:3, 3] - PADDING
@@ -234,33 +234,24 @@ WAVES = 24
 STEPS = 32
 
 
-class IndividualWarp:
-    """An individual brain: the template moved by a smooth, invertible deformation of a few millimetres.
+def individual(points: Floats, seed: int, amplitude: float) -> Floats:
+    """Where points (n, 3) [mm] of the template are in an individual brain: (n, 3) [mm].
 
-    It is the flow for unit time of a velocity field that is a sum of long sine waves.
-
-    `seed`: same seed, same deformation. `amplitude`: root mean square displacement in space [mm].
+    The deformation is smooth and invertible: the flow for unit time of a velocity field that is a sum of long sine
+    waves. `seed`: same seed, same deformation. `amplitude`: root mean square displacement in space [mm].
     """
-
-    def __init__(self, seed: int, amplitude: float) -> None:
-        random = np.random.default_rng(seed)
-        direction = random.normal(size=(WAVES, 3))
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        # wavelengths from the shortest to four times that
-        wavelength = SHORTEST_WAVELENGTH * 4 ** random.random(WAVES)
-        self._wave = direction * (2 * np.pi / wavelength)[:, None]
-        self._phase = 2 * np.pi * random.random(WAVES)
-        self._polarisation = random.normal(size=(WAVES, 3))
-        # mean square of a unit sine is one half
-        self._polarisation *= amplitude / np.sqrt((self._polarisation**2).sum() / 2)
-
-    def __call__(self, points: Floats) -> Floats:
-        """Where points (n, 3) [mm] go: (n, 3) [mm]."""
-        moved = np.array(points, dtype=np.float64)
-        for _ in range(STEPS):
-            half = moved + self._velocity(moved) / (2 * STEPS)
-            moved += self._velocity(half) / STEPS
-        return moved
-
-    def _velocity(self, points: Floats) -> Floats:
-        return np.asarray(np.sin(points @ self._wave.T + self._phase) @ self._polarisation)
+    random = np.random.default_rng(seed)
+    direction = random.normal(size=(WAVES, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    # wavelengths from the shortest to four times that
+    wavelength = SHORTEST_WAVELENGTH * 4 ** random.random(WAVES)
+    wave = direction * (2 * np.pi / wavelength)[:, None]
+    phase = 2 * np.pi * random.random(WAVES)
+    polarisation = random.normal(size=(WAVES, 3))
+    # mean square of a unit sine is one half
+    polarisation *= amplitude / np.sqrt((polarisation**2).sum() / 2)
+    moved = np.array(points, dtype=np.float64)
+    for _ in range(STEPS):
+        half = moved + np.sin(moved @ wave.T + phase) @ polarisation / (2 * STEPS)
+        moved += np.sin(half @ wave.T + phase) @ polarisation / STEPS
+    return moved

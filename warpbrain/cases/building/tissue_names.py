@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
@@ -17,6 +17,7 @@ from warpbrain.errors import InputError
 #: Names that are no tissue: an open cavity inside the body, and what lies outside of it.
 VENTRICLE = "ventricle"
 OUTSIDE = ("ignore", "background")
+NO_TISSUE = (VENTRICLE, *OUTSIDE)
 #: Labels that become tissues of their own without being named; more need `--tissue`.
 MOST_UNNAMED = 8
 #: Tissues of one mesh.
@@ -68,7 +69,7 @@ def parse_names(arguments: Sequence[str], there: Collection[int] | None = None) 
         usual = usual_name(name)
         named = [first] if ends[2] is None else sorted(n for n in there or () if first <= n <= last)
         if there is not None and not named:
-            raise InputError(f"--tissue: there is no label in {labels}, but {_listed(sorted(there))}")
+            raise InputError(f"--tissue: there is no label in {labels}, but {', '.join(map(str, sorted(there)))}")
         for number in named:
             if number in names:
                 raise InputError(f"--tissue: label {number} is named twice, '{names[number]}' and '{name}'")
@@ -79,7 +80,7 @@ def parse_names(arguments: Sequence[str], there: Collection[int] | None = None) 
 def usual_name(name: str) -> str:
     """The name in the form that is used throughout: ``"gray"`` and ``"GREY_MATTER"`` are ``"grey matter"``."""
     low = " ".join(re.split(r"[\s_-]+", name.lower().strip(" _-")))
-    if low == VENTRICLE or low in OUTSIDE:
+    if low in NO_TISSUE:
         return low
     # a misspelt cavity would be meshed as a solid
     if re.search("ventric|csf|fluid", low):
@@ -104,7 +105,8 @@ def assign(volumes: Mapping[int, float], names: Mapping[int, str], others: str |
     `InputError` if a name was given to a label that is not there, a label is left without one, or there is no tissue.
     """
     if absent := [label for label in names if label not in volumes]:
-        raise InputError(f"--tissue: the volume has no label {_listed(absent)}; it has {_listed(sorted(volumes))}")
+        none, some = (", ".join(map(str, labels)) for labels in (absent, sorted(volumes)))
+        raise InputError(f"--tissue: the volume has no label {none}; it has {some}")
     complete = dict(names)
     left = [label for label in volumes if label not in names]
     if others is not None:
@@ -113,42 +115,28 @@ def assign(volumes: Mapping[int, float], names: Mapping[int, str], others: str |
         complete = {label: f"tissue {label}" for label in left}
     elif left:
         unnamed = "that --tissue does not name" if names else "and --tissue does not say which tissue each is"
+        shown = ", ".join(f"{label} ({volumes[label] / 1000:.3g} cm3)" for label in left[:_LISTED])
+        more = f" and {len(left) - _LISTED} more" if len(left) > _LISTED else ""
+        largest = zip(sorted(left, key=lambda label: -volumes[label]), ("grey", "white", VENTRICLE), strict=False)
         raise InputError(
-            f"the volume has {len(left)} labels {unnamed}: {_with_volumes(volumes, left)}. For example "
-            f"--tissue {_example(volumes, left)}; --others ignore leaves out what --tissue does not name"
+            f"the volume has {len(left)} labels {unnamed}: {shown}{more}. For example --tissue "
+            f"{','.join(f'{label}={name}' for label, name in largest)}; --others ignore leaves out what --tissue does "
+            "not name"
         )
     number: dict[str, int] = {}
     for label, name in complete.items():
         number.setdefault(name, label)
-    tissues = {n: name for name, n in sorted(number.items(), key=lambda pair: pair[1]) if not _special(name)}
+    tissues = {n: name for name, n in sorted(number.items(), key=lambda pair: pair[1]) if name not in NO_TISSUE}
     if not tissues:
         raise InputError("--tissue: no label is left that is a tissue")
     if len(tissues) > MOST_TISSUES:
         raise InputError(f"--tissue: {len(tissues)} tissues are more than {MOST_TISSUES}: give several labels one name")
     return Assignment(
         tissues,
-        {label: number[name] for label, name in complete.items() if not _special(name)},
+        {label: number[name] for label, name in complete.items() if name not in NO_TISSUE},
         tuple(label for label, name in complete.items() if name == VENTRICLE),
         tuple(label for label, name in complete.items() if name in OUTSIDE),
     )
-
-
-def _special(name: str) -> bool:
-    return name == VENTRICLE or name in OUTSIDE
-
-
-def _listed(labels: Iterable[int]) -> str:
-    return ", ".join(str(label) for label in labels)
-
-
-def _with_volumes(volumes: Mapping[int, float], labels: Sequence[int]) -> str:
-    shown = ", ".join(f"{label} ({volumes[label] / 1000:.3g} cm3)" for label in labels[:_LISTED])
-    return shown + (f" and {len(labels) - _LISTED} more" if len(labels) > _LISTED else "")
-
-
-def _example(volumes: Mapping[int, float], labels: Sequence[int]) -> str:
-    largest = sorted(labels, key=lambda label: -volumes[label])
-    return ",".join(f"{label}={name}" for label, name in zip(largest, ("grey", "white", VENTRICLE), strict=False))
 
 
 @dataclass(frozen=True)
