@@ -8,10 +8,10 @@ import pytest
 from segmentations import CENTRE, NAMES, ellipsoids, grid_affine, volume_of, write_ellipsoids, write_labels
 from shapes import box
 
-from warpbrain.cases.case_template import MU, OTHER_MU, case_text
 from warpbrain.cases.checking import NOTHING_ACTS, check_case
+from warpbrain.cases.parts.tissues import OTHER_MU
 from warpbrain.cases.reading import read_case
-from warpbrain.cases.starting import start_from_labels, start_from_mesh
+from warpbrain.cases.starting import MU, case_text, start_from_labels, start_from_mesh
 from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.mesh import TetMesh, write_mesh

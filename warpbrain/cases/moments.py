@@ -74,10 +74,7 @@ class Moments:
     @classmethod
     def recorded(cls, case: Case, roles: Iterable[str] = ("fit", "check")) -> Moments:
         """At which recordings of some roles are compared with a state; at the end alone where one goes on by itself."""
-        if goes_on(case):
-            return cls.of(case, ())
-        wanted = set(roles)
-        return cls.of(case, recorded_times(case, wanted))
+        return cls.of(case, () if goes_on(case) else recorded_times(case, roles))
 
     def number(self, time: float) -> int:
         """The number of the case at one of the times."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
+from jinja2 import Environment
 
 from warpbrain.atomic import check_new_folder, check_writable, whole_folder, write_text
 from warpbrain.cases.building.label_fields import label_volumes, read_labels
@@ -23,8 +26,8 @@ from warpbrain.cases.building.tissue_names import (
     preset,
     usual_name,
 )
-from warpbrain.cases.case_template import case_text
 from warpbrain.cases.parts.anatomy import LARGEST_VOLUME, SMALLEST_VOLUME
+from warpbrain.cases.parts.tissues import DENSITY, OTHER_MU
 from warpbrain.errors import InputError
 from warpbrain.frame import METRES, Frame
 from warpbrain.mesh import Quality, TetMesh, components, measure, ordered, split_boundary, write_mesh
@@ -36,6 +39,8 @@ CASE_FILE = "case.toml"
 FAITHFUL = 0.10
 # what share of the voxels of a tissue must lie in that tissue of the mesh before it is said that most do not
 IN_PLACE = 0.5
+#: Shear moduli [Pa] of the shipped cases, the paper's reference for its multi-tissue phantom.
+MU = {"grey matter": 1370.0, "white matter": 1000.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,6 +262,20 @@ def _unfaithful(made: LabelMesh, mesh: TetMesh, tissues: Mapping[int, str]) -> l
 
 def _tissue_volume(mesh: TetMesh, number: int) -> float:
     return float(mesh.volumes[mesh.tissue == number].sum())
+
+
+def case_text(name: str, source: str, tissues: Mapping[int, str], cavities: bool, resected: bool = False) -> str:
+    """Text of a `case.toml` that can be run as it is, made from `new_case.txt`: of a mesh that was made from the file
+    `source`, names of its tissues by number, whether it has the node set `ventricle`, and the element set `resection`,
+    which is then taken out."""
+    environment = Environment(trim_blocks=True, keep_trailing_newline=True)
+    # a string as TOML writes it: as JSON does, but for one control character that JSON leaves alone
+    environment.filters["quoted"] = lambda text: json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    template = environment.from_string((files("warpbrain.cases") / "new_case.txt").read_text(encoding="utf-8"))
+    return template.render(
+        name=name, source=source, tissues=tissues, cavities=cavities, resected=resected, moduli=MU, other=OTHER_MU,
+        density=DENSITY,
+    )  # fmt: skip
 
 
 def _cavity_volume(mesh: TetMesh) -> float:

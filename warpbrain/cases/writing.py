@@ -16,13 +16,12 @@ from warpbrain.atomic import output_folder, safe_name, write_text
 from warpbrain.cases.boundary import Boundary, Contact, Displaced
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.format.tables import BODY, BOUNDARY, CASE, MECHANISM, PRIOR, RECORDING, TISSUE
-from warpbrain.cases.specimen import Specimen
 from warpbrain.errors import InputError, require_kind
 from warpbrain.frame import Frame
 from warpbrain.keys import Table
 from warpbrain.mesh import write_mesh
 from warpbrain.physics.mechanism import ClosedSurface, Facts, Mechanism, Removing
-from warpbrain.recordings.base import DISPLACEMENT, Recording, write_columns, write_triangles
+from warpbrain.recordings.base import DISPLACEMENT, Columns, Recording, write_columns, write_triangles
 
 _HEAD = "# A case of warpbrain. What its tables and keys mean: docs/case-format.md.\n\n"
 
@@ -54,9 +53,15 @@ def write_case(folder: str | os.PathLike[str], case: Case) -> Path:
         raise InputError(f"{target}: there is a case already; write to another folder")
     output_folder(folder)
     frame = case.frame
-    tables: dict[str, Any] = {"case": _head(case)}
+    given = {**vars(case), "registration": None, "units": frame.unit, "axes": frame.axes}
+    tables: dict[str, Any] = {"case": _values(CASE, "", given, frame)}
+    if case.registration is not None:
+        shift, turn = case.registration.shift, case.registration.turn
+        tables["case"]["registration"] = {"mm": shift / 0.001, "degrees": math.degrees(turn)}
     if case.specimen is not None:
-        tables["specimen"] = _specimen(case.specimen, frame)
+        x, y, z = (length / frame.metres for length in case.specimen.size)
+        size = {"radius": 0.5 * x, "height": z} if case.specimen.shape == "cylinder" else {"size": [x, y, z]}
+        tables["specimen"] = {"shape": case.specimen.shape, **size, "grips": case.specimen.grips}
     else:
         name = Path(case.mesh_file).with_suffix(".vtu").name
         tables["mesh"] = {"file": name, "tissue": "tissue"}
@@ -85,21 +90,6 @@ def _values(table: Table, variant: str, given: Mapping[str, Any], frame: Frame) 
     return {name: key.in_file(given[name], frame) for name, key in keys.items() if given.get(name) not in (None, ())}
 
 
-def _head(case: Case) -> dict[str, Any]:
-    given = {**vars(case), "registration": None, "units": case.frame.unit, "axes": case.frame.axes}
-    head = _values(CASE, "", given, case.frame)
-    if case.registration is not None:
-        shift, turn = case.registration.shift, case.registration.turn
-        head["registration"] = {"mm": shift / 0.001, "degrees": math.degrees(turn)}
-    return head
-
-
-def _specimen(specimen: Specimen, frame: Frame) -> dict[str, Any]:
-    x, y, z = (length / frame.metres for length in specimen.size)
-    shape = {"radius": 0.5 * x, "height": z} if specimen.shape == "cylinder" else {"size": [x, y, z]}
-    return {"shape": specimen.shape, **shape, "grips": specimen.grips}
-
-
 def _tissue(tissue: Tissue, frame: Frame) -> dict[str, Any]:
     law = {"mu": PRIOR} if tissue.law is None else {key: getattr(tissue.law, key) for key in tissue.law.keys}
     given = {**vars(tissue), **law, "prior": tissue.prior or None}
@@ -110,17 +100,14 @@ def _tissue(tissue: Tissue, frame: Frame) -> dict[str, Any]:
 def _boundary(folder: Path, boundary: Boundary, frame: Frame) -> dict[str, Any]:
     given: dict[str, Any] = {"kind": boundary.kind, **vars(boundary)}
     if isinstance(boundary, Displaced):
-        given["value"] = _history(folder, boundary, frame) if boundary.has_history else boundary.values[0]
+        given["value"] = boundary.values[0]
+        if boundary.has_history:
+            given["value"] = _new_file(folder, "boundaries", boundary.name, ".csv")
+            columns: Columns = {"t": np.array(boundary.times), DISPLACEMENT: frame.file_lengths(boundary.values)}
+            write_columns(folder / given["value"], columns)
     if isinstance(boundary, Contact):
         given["surface"] = _surface(folder, boundary.surface, boundary.name, frame)
     return {"name": boundary.name, "nodes": boundary.nodes} | _values(BOUNDARY, boundary.kind, given, frame)
-
-
-def _history(folder: Path, boundary: Displaced, frame: Frame) -> str:
-    """Write displacements over time; their file, relative to the folder."""
-    name = _new_file(folder, "boundaries", boundary.name, ".csv")
-    write_columns(folder / name, {"t": np.array(boundary.times), DISPLACEMENT: frame.file_lengths(boundary.values)})
-    return name
 
 
 def _surface(folder: Path, surface: ClosedSurface, name: str, frame: Frame) -> str:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpbrain.arrays import Floats, Int32s, Ints
+from warpbrain.arrays import Floats, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh.free_surfaces import faces_of_set
 from warpbrain.mesh.tet_mesh import TetMesh
@@ -159,7 +159,13 @@ def compare_surface(recording: SurfaceRecording, mesh: TetMesh, u: ArrayLike, ro
     residuals, reverse = [], []
     for moved in (mesh.points, mesh.points + np.asarray(u, dtype=np.float64)):
         residuals.append(points - closest_points(points, moved, faces).position)
-        reverse.append(Error.of(_to_recorded(moved[members], points, recording.faces)))
+        if recording.faces is None:
+            from scipy.spatial import cKDTree
+
+            back = np.asarray(cKDTree(points).query(moved[members])[0])
+        else:
+            back = closest_points(moved[members], points, recording.faces).distance
+        reverse.append(Error.of(back))
     # noise along a surface is not seen: one component of three is left
     compared = _comparison(recording, rows, residuals[0], residuals[1], recording.sigma)
     return replace(compared, reverse_before=reverse[0], reverse_after=reverse[1])
@@ -197,11 +203,3 @@ def joined(parts: Sequence[Comparison]) -> Comparison:
     )
     noise = float(np.sqrt(sum(squares) / len(rows))) if len(squares) == len(parts) else None
     return replace(parts[-1], rows=rows, residuals_before=before, residuals_after=after, noise=noise)
-
-
-def _to_recorded(nodes: Floats, points: Floats, faces: Int32s | None) -> Floats:
-    if faces is not None:
-        return closest_points(nodes, points, faces).distance
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(points).query(nodes)[0])

@@ -67,5 +67,5 @@ class ForceRecording(Recording):
 
     def columns(self, frame: Frame) -> Columns:
         force = zip(FORCE, frame.directions(self.force).T, strict=True)
-        recorded = {name: values for name, values in force if np.isfinite(values).all()}
+        recorded: Columns = {name: values for name, values in force if np.isfinite(values).all()}
         return {"t": self.time, **recorded, "torque": self.torque}

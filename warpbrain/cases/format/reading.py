@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,18 +47,17 @@ class Reading:
     `table`: what it may say.
     `values`: what the file has there.
     `where`: how a message calls it: ``"tissue.1"``, ``"boundary 2"``.
-    `problems`: where faults go.
     """
 
-    def __init__(self, table: Table, values: Any, context: Context, where: str, problems: Problems) -> None:
-        self.context, self.where, self.problems = context, where, problems
+    def __init__(self, table: Table, values: Any, context: Context, where: str) -> None:
+        self.context, self.where = context, where
         self._good: dict[str, Any] = {}
         self._named: set[str] = set(values) if isinstance(values, dict) else set()
         #: Which of the table's variants it is; None if that cannot be told.
         self.variant: str | None = None
         self.keys = table.keys_of("")
         if not isinstance(values, dict):
-            problems.add(context.file, f"[{where}]", f"expected a table, found {short(values)}")
+            context.problems.add(context.file, f"[{where}]", f"expected a table, found {short(values)}")
             return
         if table.by is None:
             self.variant = ""
@@ -69,7 +68,11 @@ class Reading:
         self.keys = table.keys_of(self.variant or "")
         for name, value in values.items():
             if name not in self.keys:
-                self._refuse(table, name)
+                if name not in table.all_keys():
+                    self.problem(name, "unknown key", nearest(name, self.keys))
+                elif table.by is not None and self.variant is not None:  # else it is not known what it belongs to
+                    takes = ", ".join(key.name for key in table.variants[self.variant]) or "no key of its own"
+                    self.problem(name, f"means nothing with {table.by.name} '{self.variant}'", f"it takes {takes}")
             elif fault := self.keys[name].fault(value):
                 # a unit or axes that look alike are others all the same
                 guess = isinstance(value, str) and name not in ("units", "axes")
@@ -81,19 +84,9 @@ class Reading:
             if key.needed and name not in values:
                 self.problem(name, "missing", key.hint or f"expected {key.expected()}")
 
-    def _refuse(self, table: Table, name: str) -> None:
-        if self.variant is None and name in table.all_keys():
-            return  # what it belongs to is not known: that is the problem, and it is said
-        if self.variant and name in table.all_keys():
-            assert table.by is not None
-            takes = ", ".join(key.name for key in table.variants[self.variant]) or "no key of its own"
-            self.problem(name, f"means nothing with {table.by.name} '{self.variant}'", f"it takes {takes}")
-            return
-        self.problem(name, "unknown key", nearest(name, self.keys))
-
     def problem(self, key: str, message: str, cure: str = "") -> None:
         """Note what is wrong with a key."""
-        self.problems.add(self.context.file, f"[{self.where}] {key}", message, cure)
+        self.context.problems.add(self.context.file, f"[{self.where}] {key}", message, cure)
 
     def named(self, key: str) -> bool:
         """Whether the file has the key, right or wrong."""
@@ -120,10 +113,20 @@ class Reading:
         """The file of the folder that a key names; None, and a problem noted, if there is no such file."""
         if not self.has(key):
             return None
-        path, fault = _file_of(self.context.file.parent, self.get(key))
-        if fault:
-            self.problem(key, fault)
-        return path
+        folder, name = self.context.file.parent, self.get(key)
+        path: Path = folder / name
+        try:
+            if not path.resolve().is_relative_to(folder.resolve()):
+                fault = f"'{name}' leaves the case folder"
+            elif path.is_file():
+                return path
+            else:
+                kind = "a folder" if path.is_dir() else "not a plain file"
+                fault = f"no such file: {path}" + (f" is {kind}" if path.exists() else "")
+        except (OSError, ValueError, RuntimeError) as error:  # a name too long, a link to itself
+            fault = f"no such file: {path} ({error})"
+        self.problem(key, fault)
+        return None
 
     def ramp(self) -> tuple[tuple[float, float], ...] | None:
         """Pairs of time and factor, none if it says nothing; None if they are wrong."""
@@ -135,21 +138,6 @@ class Reading:
                 self.problem("ramp", f"times must increase, found {b:g} s after {a:g} s")
                 return None
         return ramp
-
-
-def _file_of(folder: Path, name: str) -> tuple[Path | None, str]:
-    """The file that a case names: its path and no fault, or no path and what is wrong."""
-    path = folder / name
-    try:
-        if not path.resolve().is_relative_to(folder.resolve()):
-            return None, f"'{name}' leaves the case folder"
-        if not path.exists():
-            return None, f"no such file: {path}"
-        if not path.is_file():
-            return None, f"no such file: {path} is {'a folder' if path.is_dir() else 'not a plain file'}"
-    except (OSError, ValueError, RuntimeError) as error:  # a name too long, a link to itself
-        return None, f"no such file: {path} ({error})"
-    return path, ""
 
 
 @dataclass
@@ -164,22 +152,18 @@ class Context:
 
     def table(self, table: Table, needed: bool = True) -> Reading:
         """Read ``[name]``; one that may be left out is read as an empty table."""
-        problems = self.problems
+        context = self
         if needed and table.name not in self.tables:
             keys = ", ".join(key.name for key in table.keys if key.needed)
-            problems.add(self.file, f"[{table.name}]", "missing", f"a table with {keys}")
-            problems = Problems()
-        return Reading(table, self.tables.get(table.name, {}), self, table.name, problems)
+            self.problems.add(self.file, f"[{table.name}]", "missing", f"a table with {keys}")
+            context = replace(self, problems=Problems())  # that its keys are missing, too, goes without saying
+        return Reading(table, self.tables.get(table.name, {}), context, table.name)
 
     def lists(self, table: Table) -> list[Reading]:
         """Read every ``[[name]]``."""
         values = self.tables.get(table.name, [])
         if not isinstance(values, list):
-            self.problems.add(
-                self.file, f"[[{table.name}]]", f"expected a list of tables, found {short(values)}", "two brackets"
-            )
+            message = f"expected a list of tables, found {short(values)}"
+            self.problems.add(self.file, f"[[{table.name}]]", message, "two brackets")
             return []
-        return [
-            Reading(table, value, self, f"{table.name} {number}", self.problems)
-            for number, value in enumerate(values, 1)
-        ]
+        return [Reading(table, value, self, f"{table.name} {number}") for number, value in enumerate(values, 1)]

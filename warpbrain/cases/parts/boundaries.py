@@ -50,7 +50,7 @@ def _values(table: Reading) -> dict[str, Any] | None:
     values = {key.name: table.si(key.name) for key in keys}
     if "surface" in values:
         path, frame = table.path("surface"), table.context.frame
-        surface = None if path is None else read_closed_surface(path, values["surface"], frame, table.problems)
+        surface = None if path is None else read_closed_surface(path, values["surface"], frame, table.context.problems)
         if surface is None:
             return None
         values["surface"] = surface

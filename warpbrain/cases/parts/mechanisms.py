@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 from warpbrain.cases.format.reading import Context, Reading
@@ -45,22 +44,20 @@ def read_mechanisms(
             facts = Facts(named.mesh, axis, density, tuple(m for m in acting.values() if isinstance(m, Removing)))
             acting[place] = mechanism.of_case(values | {"ramp": ramp}, facts)
         except ParameterError as error:
-            _note(context, table, error)
+            if error.key not in _CURES:
+                table.problem(error.key, str(error))
+            elif error.key not in context.tables.get("case", {}):
+                # of the case, not of this table; a wrong one is a problem already
+                context.problems.add(context.file, f"[case] {error.key}", str(error), _CURES[error.key])
         except InputError as error:
             table.problem("kind", str(error))
-    _require_turns(tables, acting)
-    return tuple(acting[place] for place in sorted(acting))
-
-
-def _require_turns(tables: Sequence[tuple[int, str, Reading]], acting: Mapping[int, Mechanism]) -> None:
-    """Note a problem where loads of a kind of which a case has one at a time act together."""
     for kind in dict.fromkeys(kind for _, kind, _ in tables):
-        of_kind = [(place, table) for place, name, table in tables if name == kind]
-        loads = [acting[place] for place, _ in of_kind if place in acting]
-        one_at_a_time = issubclass(mechanisms()[kind], Load) and not mechanisms()[kind].several
-        if one_at_a_time and len(loads) > 1 and not take_turns(loads):
+        of_kind = [(acting.get(place), table) for place, name, table in tables if name == kind]
+        loads = [load for load, _ in of_kind if load is not None and isinstance(load, Load)]
+        if not mechanisms()[kind].several and len(loads) > 1 and not take_turns(loads):
             cure = "give each a ramp, so that their factors add up to no more than 1 at any time"
             of_kind[-1][1].problem("kind", f"a second '{kind}': it would act twice", cure)
+    return tuple(acting[place] for place in sorted(acting))
 
 
 def _value(table: Reading, named: Named, name: str) -> Any:
@@ -70,12 +67,3 @@ def _value(table: Reading, named: Named, name: str) -> Any:
         return value
     kind = mechanisms()[str(table.variant)].parameters()[name].kind
     return named.look_up(kind, value, lambda: table.path(name))
-
-
-def _note(context: Context, table: Reading, error: ParameterError) -> None:
-    if error.key in _CURES:
-        # of the case, not of this table; a wrong one is a problem already
-        if error.key not in context.tables.get("case", {}):
-            context.problems.add(context.file, f"[case] {error.key}", str(error), _CURES[error.key])
-    else:
-        table.problem(error.key, str(error))

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from warpbrain.cases.case import Tissue
-from warpbrain.cases.case_template import OTHER_MU
 from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import RECORDING
 from warpbrain.cases.parts.named import Named
+from warpbrain.cases.parts.tissues import OTHER_MU
 from warpbrain.cases.specimen import REST, Specimen
 from warpbrain.mesh import MeshInFile
 from warpbrain.recordings.recording import RECORDINGS, Recording, TestRecording
@@ -37,12 +37,22 @@ def read_recordings(
             other = "a case with [specimen]" if kind.of_specimen else "a case with [mesh]"
             table.problem("kind", f"'{table.variant}' belongs to {other}")
             continue
-        recording = _read(table, kind, _given(table, kind, named, in_file, boundaries))
-        if recording is not None:
-            if not specimen and recording.reference is not None and not len(compared_rows(recording)):
-                at = f"{recording.reference:g} s"
-                table.problem("reference", f"no row is of another time than {at}: there is no difference to compare")
-            recordings.append(recording)
+        given = _given(table, kind, named, in_file, boundaries)
+        if given is None:
+            continue
+        if fault := kind.fault_of_keys(given):
+            table.problem(*fault)
+            continue
+        recording = kind.read(frame=context.frame, problems=context.problems, **given)
+        if recording is None:
+            continue
+        for key, fault in recording.without_meaning().items():
+            if table.named(key):
+                table.problem(key, *fault)
+        if not specimen and recording.reference is not None and not len(compared_rows(recording)):
+            at = f"{recording.reference:g} s"
+            table.problem("reference", f"no row is of another time than {at}: there is no difference to compare")
+        recordings.append(recording)
     return tuple(recordings)
 
 
@@ -68,19 +78,6 @@ def _given(
         given[key.name] = value
     sigma = table.get("sigma")
     return given | {"sigma": None if sigma is None else float(sigma)} if right else None
-
-
-def _read(table: Reading, kind: type[Recording], given: dict[str, Any] | None) -> Recording | None:
-    if given is None:
-        return None
-    if fault := kind.fault_of_keys(given):
-        table.problem(*fault)
-        return None
-    recording = kind.read(frame=table.context.frame, problems=table.problems, **given)
-    for key, fault in recording.without_meaning().items() if recording is not None else ():
-        if table.named(key):
-            table.problem(key, *fault)
-    return recording
 
 
 #: A response that is so many times off is not that of another tissue: a unit that is off by 1000 is so of any tissue
