@@ -13,7 +13,6 @@ from segmentations import CENTRE, NAMES, ellipsoids, grid_affine, volume_of, wri
 from warpbrain.cases.building.cleaning import crumbs_given_away
 from warpbrain.cases.building.label_fields import CAVITY, label_volumes, make_fields, make_regions, read_labels
 from warpbrain.cases.building.lattice import bcc_lattice
-from warpbrain.cases.building.node_sets import first_sets
 from warpbrain.cases.building.tissue_names import Assignment, assign, parse_names, preset, presets
 from warpbrain.errors import InputError
 from warpbrain.images.grid import Grid
@@ -344,7 +343,7 @@ def test_a_cavity_may_open_to_the_outside(tmp_path):
     # a channel as wide as the ventricle, to the back
     labels[16:24, :21, 17:23][labels[16:24, :21, 17:23] > 0] = 4
     made = meshed(write_labels(tmp_path / "a.nii", labels, affine), "2=grey,3=grey,4=ventricle")
-    sets = first_sets(made.points, made.tetrahedra, made.opens)
+    sets = made.sets
     assert split_boundary(made.points, made.tetrahedra)[1] == []
     deep = np.linalg.norm((made.points - CENTRE) / (48, 58, 46), axis=1)
     assert (deep[sets["ventricle"]] < 0.8).sum() > 30

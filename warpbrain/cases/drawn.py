@@ -9,6 +9,7 @@ from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.gp.process import Process
 from warpbrain.gp.sampling import DrawnLaws, draw_laws, law_of_curve
+from warpbrain.gp.trained import trained
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def with_prior_draw(case: Case, number: int, seed: int = 0, model: Process | Non
     ('hyperelastic/grey matter', 'hyperelastic/white matter')
     """
     require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
-    asked = _default(model)
+    asked = trained() if model is None else model
     labels = tuple(sorted(case.tissues))
     require_groups(case, labels, asked)
     tissues = [case.tissues[label] for label in labels]
@@ -75,7 +76,7 @@ def with_prior_middle(case: Case, model: Process | None = None) -> FromPrior:
 
     `InputError`: with file, tissue and key, if the model has seen no study of a group.
     """
-    asked = _default(model)
+    asked = trained() if model is None else model
     labels = tuple(label for label, tissue in sorted(case.tissues.items()) if tissue.law is None)
     require_groups(case, labels, asked)
     changed = dict(case.tissues)
@@ -83,12 +84,6 @@ def with_prior_middle(case: Case, model: Process | None = None) -> FromPrior:
         tissue = changed[label]
         changed[label] = replace(tissue, law=law_of_curve(asked, tissue.prior, law=tissue.model).law())
     return FromPrior(replace(case, tissues=changed), asked, labels)
-
-
-def _default(model: Process | None) -> Process:
-    from warpbrain.gp.trained import trained
-
-    return trained() if model is None else model
 
 
 def require_groups(case: Case, labels: Sequence[int], model: Process) -> None:

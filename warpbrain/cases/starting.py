@@ -110,7 +110,6 @@ def start_from_labels(
     named = known | chosen
     assignment = assign(volumes, named, others)
     made = mesh_labels(image, assignment, size, progress)
-    sets = first_sets(made.points, made.tetrahedra, made.opens)
     notes = [*image.notes]
     if assignment.outside:
         out = ", ".join(f"{label} ({volumes[label] / 1000.0:.3g} cm3)" for label in assignment.outside)
@@ -121,7 +120,7 @@ def start_from_labels(
     tissue = made.tissue.astype(np.int32)
     resected = [number for number, name in assignment.tissues.items() if name == RESECTION]
     taken = {RESECTION: np.isin(tissue, resected)} if resected else {}
-    mesh = ordered(TetMesh(made.points * 1e-3, made.tetrahedra.astype(np.int32), tissue, sets, taken))
+    mesh = ordered(TetMesh(made.points * 1e-3, made.tetrahedra.astype(np.int32), tissue, made.sets, taken))
     cavity = _cavity_volume(mesh)
     tissues = dict(assignment.tissues)
     notes += _unfaithful(made, mesh, tissues)

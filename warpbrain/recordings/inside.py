@@ -67,37 +67,31 @@ def check_points_inside(recording: TrackedPoints, mesh: TetMesh, path: Path, pro
     If most points are outside, that is one problem, and its cure says so if a factor of 1000 or the signs of RAS and
     LPS would bring most of them inside.
     """
-    place = locate(mesh.points, mesh.tetrahedra, recording.points)
+    points = recording.points
+    place = locate(mesh.points, mesh.tetrahedra, points)
     far = np.flatnonzero(place.distance > place.edge)
-    inside = len(far) <= len(place) / 2
-    if inside and recording.time is None and len(place) > 3 and _is_dot(recording.points, mesh):
-        size = 1000.0 * float(np.ptp(recording.points, axis=0).max())
-        problems.add(
-            path,
-            "",
-            f"all {len(place)} points lie within {size:.3g} mm of each other, a dot in the body",
-            "multiplied by 1000 they would not: is one of mesh and recording in m, the other in mm?",
-        )
-        return
-    if len(far) == 0:
-        return
     far = far[np.argsort(-place.distance[far], kind="stable")]
-    cure = "" if inside else _mistake(recording.points[far], mesh)
+    inside = len(far) <= len(place) / 2
+    if inside and recording.time is None and len(place) > 3 and _is_dot(points, mesh):
+        size = 1000.0 * float(np.ptp(points, axis=0).max())
+        message = f"all {len(place)} points lie within {size:.3g} mm of each other, a dot in the body"
+        cure = "multiplied by 1000 they would not: is one of mesh and recording in m, the other in mm?"
+        problems.add(path, "", message, cure)
+        return
+    cure = "" if inside else _mistake(points[far], mesh)
     cure = cure or 'check units and axes, or write outside = "nearest" for this recording'
+    farthest: dict[str, int] = {}
+    for row in (far if inside else far[:1]).tolist():
+        name = f"point {row + 1}" if recording.ids is None else f"id {shown(recording.ids[row])}"
+        farthest.setdefault(name, row)
+    head = f"the farthest of {len(far)} of {len(place)} points outside: " if len(far) > 1 else ""
     with collected(path, problems) as of_file:
-        named: set[str] = set()
-        for row in far if inside else far[:1]:
-            place_name = _name(recording, int(row))
-            if place_name in named:
-                continue
-            head = f"the farthest of {len(far)} of {len(place)} points outside: " if not named and len(far) > 1 else ""
-            named.add(place_name)
-            x, y, z = 1000.0 * recording.points[row]
-            at = f"({x:.4g}, {y:.4g}, {z:.4g}) mm RAS"
+        for name, row in farthest.items():
+            x, y, z = 1000.0 * points[row]
+            at = f"({x:.4g}, {y:.4g}, {z:.4g}) mm RAS is {1000.0 * place.distance[row]:.4g} mm outside the mesh"
             limit = f"expected within one edge length, {1000.0 * place.edge[row]:.3g} mm"
-            of_file.add(
-                path, place_name, f"{head}{at} is {1000.0 * place.distance[row]:.4g} mm outside the mesh, {limit}", cure
-            )
+            of_file.add(path, name, f"{head}{at}, {limit}", cure)
+            head = ""
 
 
 def _is_dot(points: Floats, mesh: TetMesh) -> bool:
@@ -127,10 +121,6 @@ def check_surface_near(
             + (", all within a dot" if dot else ""),
             cure.replace("most are inside", "they are near") or "check units and axes",
         )
-
-
-def _name(recording: TrackedPoints, row: int) -> str:
-    return f"point {row + 1}" if recording.ids is None else f"id {shown(recording.ids[row])}"
 
 
 def _mistake(points: Floats, mesh: TetMesh) -> str:

@@ -83,7 +83,10 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh:
     if whole is not None and not whole.search(head):
         raise ValueError("its header is cut off")
     if path.suffix.lower() == ".stl":
-        _check_stl(path, head)
+        count = int.from_bytes(head[_STL_HEADER - 4 : _STL_HEADER], "little")
+        there = (path.stat().st_size - _STL_HEADER) / _STL_TRIANGLE
+        if not head.lstrip().startswith(b"solid") and len(head) >= _STL_HEADER and there != count:
+            raise ValueError(f"its header says {count} triangles, its bytes are {there:.10g}")
     with np.errstate(all="ignore"), patience(path):
         raw = read_vtu(path) if path.suffix.lower() == ".vtu" else meshio.read(path)
     foreign = {block.type for block in raw.cells} - {*_WITHOUT_AREA, *_WITH_AREA}
@@ -102,16 +105,6 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh:
     if axes is None and (mark := _SPACE.search(head[:2048])):
         axes = mark.group(1).decode()
     return SurfaceMesh(points, faces if len(faces) else None, axes)
-
-
-def _check_stl(path: Path, head: bytes) -> None:
-    """`ValueError` if the number of triangles in the header of a binary file is not that of its bytes."""
-    if head.lstrip().startswith(b"solid") or len(head) < _STL_HEADER:
-        return
-    count = int.from_bytes(head[_STL_HEADER - 4 : _STL_HEADER], "little")
-    there = (path.stat().st_size - _STL_HEADER) / _STL_TRIANGLE
-    if there != count:
-        raise ValueError(f"its header says {count} triangles, its bytes are {there:.10g}")
 
 
 def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh:

@@ -13,6 +13,7 @@ from warpbrain.cases.building.cleaning import crumbs_given_away, cut_body, finis
 from warpbrain.cases.building.label_fields import CAVITY, LabelFields, make_fields, make_regions
 from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
 from warpbrain.cases.building.mmg import Cells, remesh
+from warpbrain.cases.building.node_sets import first_sets
 from warpbrain.cases.building.tissue_names import Assignment
 from warpbrain.errors import InputError
 from warpbrain.images.reading import Image
@@ -52,20 +53,13 @@ class LabelMesh:
     points: Floats  # (n, 3) [mm, RAS]
     tetrahedra: Ints  # (m, 4)
     tissue: Ints  # (m,), numbers of the assignment
-    size: float  # wanted mean edge [mm]
+    sets: dict[str, Bools]  # of nodes, see `first_sets`
     #: Volume [mm3] of the labels of each tissue, by number, and of the cavities.
     labelled: dict[int, float]
     labelled_cavity: float
     #: Share of the voxels of each tissue that lie in that tissue of the mesh, before the cutting.
     in_place: dict[int, float]
-    fields: LabelFields
     notes: tuple[str, ...]  # what was mended, left out or not reached
-
-    def opens(self, centres: Floats, normals: Floats) -> Bools:
-        """Whether outer faces, of centres (b, 3) [mm] and outward normals (b, 3), are walls of a cavity that opens."""
-        beyond = centres + BEYOND * self.size * normals
-        cavity, body = (self.fields.grid.sampled(field, beyond) for field in (self.fields.cavity, self.fields.body))
-        return (cavity > 0) & (body > 0)
 
 
 def mesh_labels(
@@ -96,15 +90,21 @@ def mesh_labels(
     notes = [*regions.notes, *lattice_notes]
     progress("meshing")
     made = _made(cells, chosen, notes)
+
+    def opens(centres: Floats, normals: Floats) -> Bools:
+        """Whether outer faces are walls of a cavity that opens to the outside."""
+        beyond = centres + BEYOND * chosen * normals
+        cavity, body = (fields.grid.sampled(field, beyond) for field in (fields.cavity, fields.body))
+        return (cavity > 0) & (body > 0)
+
     return LabelMesh(
         made.points,
         made.tetrahedra,
         np.array([0, *assignment.tissues])[made.labels],
-        chosen,
+        first_sets(made.points, made.tetrahedra, opens),
         {number: regions.labelled.get(code, 0.0) for code, number in enumerate(assignment.tissues, 1)},
         regions.labelled.get(CAVITY, 0.0),
         {number: fields.in_place.get(code, 0.0) for code, number in enumerate(assignment.tissues, 1)},
-        fields,
         tuple(notes),
     )
 

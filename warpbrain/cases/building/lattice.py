@@ -16,22 +16,16 @@ def bcc_lattice(lower: Floats, upper: Floats, spacing: float) -> tuple[Floats, I
     neighbouring centres and the opposite edge on the face between them."""
     cells = np.maximum(np.ceil((upper - lower) / spacing).astype(int), 1)
     corners = cells + 1
-    index = np.stack(np.meshgrid(*(np.arange(n) for n in corners), indexing="ij"), axis=-1).reshape(-1, 3)
-    middle = np.stack(np.meshgrid(*(np.arange(n) for n in cells), indexing="ij"), axis=-1).reshape(-1, 3)
+    index, middle = (np.ascontiguousarray(np.indices(shape).reshape(3, -1).T) for shape in (corners, cells))
     points = np.concatenate([lower + spacing * index, lower + spacing * (middle + 0.5)])
-
-    def corner(ijk: Ints) -> Ints:
-        return np.asarray(np.ravel_multi_index(tuple(ijk.T), tuple(corners)))
-
-    def centre(ijk: Ints) -> Ints:
-        return np.asarray(len(index) + np.ravel_multi_index(tuple(ijk.T), tuple(cells)))
-
+    corner = np.arange(len(index)).reshape(corners)
+    centre = len(index) + np.arange(len(middle)).reshape(cells)
     tetrahedra = []
     for axis in range(3):
         step, side, up = np.roll(np.eye(3, dtype=np.int64), -axis, axis=0)
         first = middle[middle[:, axis] < cells[axis] - 1]
-        square = [corner(first + step + offset) for offset in (0 * step, side, side + up, up)]
-        a, b = centre(first), centre(first + step)
+        square = [corner[tuple((first + step + offset).T)] for offset in (0 * step, side, side + up, up)]
+        a, b = centre[tuple(first.T)], centre[tuple((first + step).T)]
         tetrahedra += [np.stack([a, b, square[k], square[(k + 1) % 4]], axis=1) for k in range(4)]
     return points, np.concatenate(tetrahedra)
 

@@ -56,58 +56,42 @@ def _read_specimen(context: Context) -> Specimen | None:
 
 
 def _read_mesh(context: Context, path: Path, tissue: str | None) -> MeshInFile | None:
+    """The mesh, if it is one body of a size that a body can have."""
+    problems, frame = context.problems, context.frame
     try:
-        in_file = read_mesh_file(path, context.frame.unit, tissue)
+        in_file = read_mesh_file(path, frame.unit, tissue)
     except MeshError as error:
         for message in error.messages:
-            context.problems.add(path, "", message.removeprefix(f"{path}: "))
+            problems.add(path, "", message.removeprefix(f"{path}: "))
         return None
     if ends_inside_a_number(path):
-        context.problems.remark(path, "the last line ends in a number without a line break: is the file cut off?")
+        problems.remark(path, "the last line ends in a number without a line break: is the file cut off?")
     mesh = in_file.mesh
-    if not np.all(context.frame.signs > 0):
+    if not np.all(frame.signs > 0):
         # both axes conventions are right-handed: turning two axes keeps the orientation of the elements
-        turned = {name: context.frame.directions(vectors) for name, vectors in mesh.element_vectors.items()}
-        mesh = replace(mesh, points=context.frame.directions(mesh.points), element_vectors=turned)
+        turned = {name: frame.directions(vectors) for name, vectors in mesh.element_vectors.items()}
+        mesh = replace(mesh, points=frame.directions(mesh.points), element_vectors=turned)
     if left := in_file.file_nodes - len(mesh.points):
-        context.problems.remark(
-            path, f"tetrahedra of second order: their corners are used, {left} nodes on edges are not"
-        )
-    return _sound(context, path, replace(in_file, mesh=mesh))
-
-
-def _sound(context: Context, path: Path, in_file: MeshInFile) -> MeshInFile | None:
-    """The mesh, if it is one body of a size that a body can have."""
-    mesh, problems = in_file.mesh, context.problems
+        problems.remark(path, f"tetrahedra of second order: their corners are used, {left} nodes on edges are not")
     volume = mesh.volume
     if not SMALLEST_VOLUME < volume < LARGEST_VOLUME:
-        unit = context.frame.unit
-        other = next(name for name in METRES if name != unit)
-        converted = 1e6 * volume * (METRES[other] / METRES[unit]) ** 3
-        problems.add(
-            path,
-            "",
-            f"the volume is {1e6 * volume:.4g} cm3 if lengths are in {unit}, which no brain, phantom or specimen has",
-            f'with [case] units = "{other}" it would be {converted:.4g} cm3',
-        )
+        other = next(name for name in METRES if name != frame.unit)
+        converted = 1e6 * volume * (METRES[other] / frame.metres) ** 3
+        volume_told = f"the volume is {1e6 * volume:.4g} cm3 if lengths are in {frame.unit}"
+        cure = f'with [case] units = "{other}" it would be {converted:.4g} cm3'
+        problems.add(path, "", f"{volume_told}, which no brain, phantom or specimen has", cure)
         return None
     pairs = coincident_nodes(mesh.points)
     if len(pairs):
         a, b = in_file.node_numbers[pairs[0]]
-        problems.add(
-            path,
-            f"node {a}",
-            f"{len(pairs)} pair(s) of nodes are at the same place (first {a} and {b}): the body is torn there",
-            "merge them and number the tetrahedra anew",
-        )
+        message = f"{len(pairs)} pair(s) of nodes are at the same place (first {a} and {b}): the body is torn there"
+        problems.add(path, f"node {a}", message, "merge them and number the tetrahedra anew")
     try:
         faces = boundary_faces(mesh.tetrahedra)
     except ValueError as error:
         problems.add(path, "", f"{error}: the surface is not closed", "tetrahedra may not overlap")
         return None
     if len(pinched := pinched_nodes(faces)):
-        problems.remark(
-            path,
-            f"the surface touches itself at {len(pinched)} node(s), first at node {in_file.node_numbers[pinched[0]]}",
-        )
-    return in_file
+        first = in_file.node_numbers[pinched[0]]
+        problems.remark(path, f"the surface touches itself at {len(pinched)} node(s), first at node {first}")
+    return replace(in_file, mesh=mesh)
