@@ -126,12 +126,8 @@ def as_case(case: Case | str | os.PathLike[str], tissue: str = "multi") -> Case:
 
 
 def _existing(name: str) -> Path:
-    path = Path(name)
-    try:
-        there = bool(name) and path.exists()
-    except (OSError, ValueError):  # a name that no file can have
-        there = False
-    if not there:
+    # false, too, of a name that no file can have
+    if not os.path.exists(name):
         hint = nearest(name, SHIPPED, f"there are: {', '.join(SHIPPED)}")
         raise InputError(f"case '{name}': no such case and no such folder ({hint})")
-    return path
+    return Path(name)

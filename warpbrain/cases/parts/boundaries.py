@@ -81,12 +81,9 @@ def check_faces(context: Context, left: TetMesh, boundaries: tuple[Boundary, ...
     for boundary in boundaries:
         if boundary.on_faces and not len(faces_of(left, left.node_sets[boundary.nodes])):
             wall = boundary.nodes in left.element_sets
-            context.problems.add(
-                context.file,
-                f"[[boundary]] '{boundary.name}' nodes",
-                f"node set '{boundary.nodes}' holds no face of the surface, which '{boundary.kind}' acts on",
-                f"take out '{boundary.nodes}' by a [[mechanism]] resection" if wall else "",
-            )
+            message = f"node set '{boundary.nodes}' holds no face of the surface, which '{boundary.kind}' acts on"
+            cure = f"take out '{boundary.nodes}' by a [[mechanism]] resection" if wall else ""
+            context.problems.add(context.file, f"[[boundary]] '{boundary.name}' nodes", message, cure)
 
 
 def check_together(context: Context, mesh: TetMesh, boundaries: tuple[Boundary, ...]) -> None:
@@ -97,9 +94,8 @@ def check_together(context: Context, mesh: TetMesh, boundaries: tuple[Boundary, 
         shared = int((mesh.node_sets[a.nodes] & mesh.node_sets[b.nodes]).sum())
         if shared and not (isinstance(a, Displaced) and a.values == b.values and a.times == b.times):
             verb = "fixes" if isinstance(a, Fixed) else "displaces"
-            context.problems.add(
-                context.file, "[[boundary]]", f"'{a.name}' {verb} {shared} nodes that '{b.name}' displaces"
-            )
+            message = f"'{a.name}' {verb} {shared} nodes that '{b.name}' displaces"
+            context.problems.add(context.file, "[[boundary]]", message)
     part = components(mesh.tetrahedra)
     if part.max() == 0:
         return

@@ -81,9 +81,12 @@ class Named:
         has.
         """
         if kind == "element set" or (kind == "node set" and name not in self.mesh.node_sets):
-            self._take_tissue(name)
-        if kind == "node set" and name not in self.mesh.node_sets and name in self.mesh.element_sets:
-            self._add_nodes(name, wall_nodes(self.mesh, name))
+            labels = [label for label, tissue in self.tissues.items() if tissue.name == name]
+            if labels and name not in self.mesh.element_sets:
+                members = np.isin(self.mesh.tissue, labels)
+                self.mesh = replace(self.mesh, element_sets={**self.mesh.element_sets, name: members})
+            if kind == "node set" and name in self.mesh.element_sets:
+                self._add_nodes(name, wall_nodes(self.mesh, name))
         if kind == "surface":
             path = path_of()
             return None if path is None else read_closed_surface(path, name, self.frame, self.problems)
@@ -97,12 +100,6 @@ class Named:
 
     def _add_nodes(self, name: str, members: Bools) -> None:
         self.mesh = self.mesh.with_node_sets({**self.mesh.node_sets, name: members})
-
-    def _take_tissue(self, name: str) -> None:
-        labels = [label for label, tissue in self.tissues.items() if tissue.name == name]
-        if labels and name not in self.mesh.element_sets:
-            members = np.isin(self.mesh.tissue, labels)
-            self.mesh = replace(self.mesh, element_sets={**self.mesh.element_sets, name: members})
 
 
 def _read_members(path: Path, in_file: MeshInFile, problems: Problems) -> Bools | None:
@@ -147,12 +144,9 @@ def read_closed_surface(path: Path, name: str, frame: Frame, problems: Problems)
         surface = read_surface_mesh(path, wrong)
         if surface.faces is None:
             wrong.refuse(path, "", "found points only, expected a surface of triangles")
-        edges = open_edges(surface.faces)
-        if len(edges):
-            message = (
-                f"the surface is not closed: {len(edges)} edge(s) do not belong to two triangles, first that of the "
-                f"points {edges[0][0]} and {edges[0][1]}"
-            )
+        if len(edges := open_edges(surface.faces)):
+            first = f"first that of the points {edges[0][0]} and {edges[0][1]}"
+            message = f"the surface is not closed: {len(edges)} edge(s) do not belong to two triangles, {first}"
             wrong.refuse(path, "", message, "contact needs an inside: close the surface")
         points = Frame(frame.unit, surface.axes or frame.axes).lengths(surface.points)
     return None if wrong else ClosedSurface(name, points, surface.faces)
@@ -164,20 +158,18 @@ def read_directions(path: Path, mesh: TetMesh, frame: Frame, problems: Problems)
     A .csv has the columns x, y and z; an .npy is an array (m, 3); a mesh file has the same tetrahedra and one array of
     three columns.
     """
-    readers = {".csv": _directions_in_table, ".npy": _directions_in_array}
+    ending, columns = path.suffix.lower(), ("x", "y", "z")
     with collected(path, problems) as wrong:
-        vectors = readers.get(path.suffix.lower(), _directions_in_mesh)(path, mesh, wrong)
+        if ending == ".csv":
+            table = read_table(path, wrong, columns)
+            table.require(*columns)
+            vectors = table.vectors(*columns)
+        else:
+            vectors = (_directions_in_array if ending == ".npy" else _directions_in_mesh)(path, mesh, wrong)
         if not wrong and vectors.shape != (len(mesh.tetrahedra), 3):
             shape = " x ".join(map(str, vectors.shape))
             wrong.add(path, "", f"found {shape} numbers, expected {len(mesh.tetrahedra)} x 3: a row for each element")
     return None if wrong else frame.directions(vectors)
-
-
-def _directions_in_table(path: Path, _mesh: TetMesh, problems: Problems) -> Floats:
-    columns = ("x", "y", "z")
-    table = read_table(path, problems, columns)
-    table.require(*columns)
-    return table.vectors(*columns)
 
 
 def _directions_in_array(path: Path, mesh: TetMesh, problems: Problems) -> Floats:

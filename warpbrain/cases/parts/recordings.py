@@ -94,18 +94,20 @@ def check_magnitudes(
     """Note tests whose response is far from what the declared tissue would answer at small strain."""
     laws = [tissue.law for tissue in tissues.values() if tissue.law is not None]
     mu = laws[0].shear_modulus if laws else OTHER_MU
+    # of a shear modulus of 1 Pa; in torsion the shear grows from the axis to the rim
+    moduli = {"axial": 2.0 * (1.0 + nu), "shear": 1.0, "torsion": 0.75}
+    moduli |= {"confined": 2.0 * (1.0 - nu) / (1.0 - 2.0 * nu), "biaxial": 2.0 * (1.0 + nu) / (1.0 - nu)}
     tables = context.tables.get("recording", [])
     for recording in recordings:
         if not isinstance(recording, TestRecording):
             continue
-        strain = specimen.strain_of(recording.mode, recording.quantities[0], recording.imposed) - REST[recording.mode]
-        factor = mu * _response_to_one_pascal(specimen, nu, recording)
-        strained = np.abs(strain)[strain != 0.0]
-        if not strained.size:
-            continue
-        rows = np.abs(strain) <= max(_SMALL, float(strained.min()))
+        mode, (imposed, answer) = recording.mode, recording.quantities
+        strain = specimen.strain_of(mode, imposed, recording.imposed) - REST[mode]
+        rows = np.abs(strain) <= max(_SMALL, float(np.abs(strain)[strain != 0.0].min(initial=np.inf)))
+        # the answer to a strain of 1 of a linear elastic specimen
+        factor = mu * moduli[mode] / specimen.stress_unit(answer)
         expected, response = factor * strain[rows], recording.response[rows]
-        if not response.any():
+        if not expected.any() or not response.any():
             continue
         times = float(np.sqrt(response @ response / (expected @ expected)))
         if 1.0 / _OFF < times < _OFF:
@@ -116,27 +118,11 @@ def check_magnitudes(
             # what is no table is a problem that was noted when it was read
             if isinstance(table, dict) and table.get("name") == recording.name
         )
-        message = (
-            f"the {recording.quantities[1]} is {times:.2g} times what the declared tissue (mu = {mu:g} Pa) answers"
-        )
-        if recording.quantities[1] != "stress":
-            context.problems.add(
-                context.file, f"[recording {number}] file", message, "forces are in N, torques in N m, lengths in units"
-            )
+        message = f"the {answer} is {times:.2g} times what the declared tissue (mu = {mu:g} Pa) answers"
+        if answer != "stress":
+            cure = "forces are in N, torques in N m, lengths in units"
+            context.problems.add(context.file, f"[recording {number}] file", message, cure)
             continue
         other = "kPa" if times < 1.0 else "Pa"
         cure = f'perhaps unit = "{other}"' if other != unit else "is mu in Pa?"
         context.problems.add(context.file, f"[recording {number}] unit", f"{message} if it is in {unit}", cure)
-
-
-def _response_to_one_pascal(specimen: Specimen, nu: float, recording: TestRecording) -> float:
-    """The response to a strain of 1 of a linear elastic specimen with a shear modulus of 1 Pa."""
-    moduli = {
-        "axial": 2.0 * (1.0 + nu),
-        "shear": 1.0,
-        # the shear grows from the axis to the rim
-        "torsion": 0.75,
-        "confined": 2.0 * (1.0 - nu) / (1.0 - 2.0 * nu),
-        "biaxial": 2.0 * (1.0 + nu) / (1.0 - nu),
-    }
-    return moduli[recording.mode] / specimen.stress_unit(recording.quantities[1])
