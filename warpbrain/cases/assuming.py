@@ -12,7 +12,7 @@ from warpbrain.cases.format.tables import MECHANISM
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.composition import require_composable, require_left
-from warpbrain.physics.mechanism import Facts, Mechanism, ParameterError, ParameterSpec, Removing
+from warpbrain.physics.mechanism import Facts, ParameterError, ParameterSpec, Removing
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.problems import Problems, nearest
 
@@ -58,22 +58,24 @@ def _with(case: Case, said: str) -> Case:
     known = mechanisms()
     if kind not in known:
         raise InputError(f"no mechanism '{kind}': {nearest(kind, known)}")
-    mechanism, keys = known[kind], MECHANISM.keys_of(kind)
+    mechanism, specs, keys = known[kind], known[kind].parameters(), MECHANISM.keys_of(kind)
     values: dict[str, Any] = {}
     named = Named(case.mesh, case.tissues, case.frame, Problems())
     for part in rest.split(",") if rest else []:
         word, equals, text = part.partition("=")
-        key = _key(mechanism, word)
+        matching = [key for key in specs if key == word] or [key for key in specs if key.endswith(f"_{word}")]
+        if len(matching) != 1:
+            raise InputError(f"no key '{word}' of {kind}: expected one of {', '.join(specs)}")
+        key = matching[0]
         if not equals or key in values:
             raise InputError(f"{part}: expected KEY=VALUE, each key once")
-        spec = mechanism.parameters()[key]
-        value = keys[key].in_si(_value(spec, key, text), case.frame)
-        values[key] = named.look_up(spec.kind, value, partial(Path, value)) if isinstance(value, str) else value
+        value = keys[key].in_si(_value(specs[key], key, text), case.frame)
+        values[key] = named.look_up(specs[key].kind, value, partial(Path, value)) if isinstance(value, str) else value
         if named.problems:
             raise InputError(f"{key}: {named.problems.found[0]}")
     missing = [key for key in mechanism.required() if key not in values]
     if missing:
-        spec = mechanism.parameters()[missing[0]]
+        spec = specs[missing[0]]
         raise InputError(f"{missing[0]} is missing{f' [{spec.unit}]' if spec.unit else ''}: {spec.doc}")
     others = tuple(there for there in case.mechanisms if mechanism.several or there.kind != kind)
     removing = tuple(there for there in others if isinstance(there, Removing))
@@ -81,14 +83,6 @@ def _with(case: Case, said: str) -> Case:
     acting = (*others, mechanism.of_case(values, facts))
     require_composable(acting, require_left(acting, named.mesh))
     return replace(case, mesh=named.mesh, mechanisms=acting)
-
-
-def _key(mechanism: type[Mechanism], word: str) -> str:
-    keys = list(mechanism.parameters())
-    matching = [key for key in keys if key == word] or [key for key in keys if key.endswith(f"_{word}")]
-    if len(matching) != 1:
-        raise InputError(f"no key '{word}' of {mechanism.kind}: expected one of {', '.join(keys)}")
-    return matching[0]
 
 
 def _value(spec: ParameterSpec, key: str, text: str) -> Any:

@@ -159,20 +159,15 @@ def voxels_inside(mesh: TetMesh, grid: Grid) -> VoxelsInside:
     corners = grid.indices(MILLIMETRES * mesh.points)[mesh.tetrahedra]
     sides = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
     gradients: Floats = np.asarray(np.linalg.inv(sides), dtype=np.float64)
-    none = np.zeros(0, dtype=np.int64)
-    parts = [(none, none, np.zeros((0, 4))), *_batches(corners, gradients, np.array(grid.shape))]
-    voxels, elements, weights = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    voxels, first = np.unique(voxels, return_index=True)
-    return VoxelsInside(grid, mesh, voxels, elements[first], weights[first])
-
-
-def _batches(corners: Floats, gradients: Floats, shape: Ints) -> Iterator[tuple[Ints, Ints, Floats]]:
-    """Voxels in the boxes around tetrahedra (m, 4, 3) that are in these, a batch of tetrahedra at a time."""
+    shape = np.array(grid.shape)
+    # all voxels in the boxes around tetrahedra, a batch of tetrahedra at a time
     low = np.maximum(np.ceil(corners.min(axis=1) - _WEIGHT), 0).astype(np.int64)
     high = np.minimum(np.floor(corners.max(axis=1) + _WEIGHT), shape - 1).astype(np.int64)
     sizes = np.maximum(high - low + 1, 0)
     counts = sizes.prod(axis=1)
     batches = np.cumsum(counts) // _PAIRS
+    none = np.zeros(0, dtype=np.int64)
+    parts = [(none, none, np.zeros((0, 4)))]
     for batch in np.unique(batches[counts > 0]):
         which = np.flatnonzero((batches == batch) & (counts > 0))
         element = np.repeat(which, counts[which])
@@ -185,5 +180,7 @@ def _batches(corners: Floats, gradients: Floats, shape: Ints) -> Iterator[tuple[
         weights[:, 1:] = np.einsum("kij,kj->ki", gradients[element], index - corners[element, 0])
         weights[:, 0] = 1.0 - weights[:, 1:].sum(axis=1)
         within = (weights >= -_WEIGHT).all(axis=1)
-        index = index[within]
-        yield (index[:, 0] * shape[1] + index[:, 1]) * shape[2] + index[:, 2], element[within], weights[within]
+        parts.append((np.ravel_multi_index(tuple(index[within].T), grid.shape), element[within], weights[within]))
+    voxels, elements, weights = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    voxels, first = np.unique(voxels, return_index=True)
+    return VoxelsInside(grid, mesh, voxels, elements[first], weights[first])

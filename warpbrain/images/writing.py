@@ -49,7 +49,13 @@ def write_volume(path: Path, values: NDArray[Any], grid: Grid, intent: int = 0) 
     become real ones."""
     import nibabel
 
-    image: Any = nibabel.Nifti1Image(values.astype(_type_for(values)), grid.affine)
+    # of all types that hold the values one that every reader of NIfTI has
+    kind = {"bool": "uint8", "float16": "float32"}.get(values.dtype.name, values.dtype.name)
+    if kind in ("int64", "uint64"):
+        limits = np.iinfo(np.int32)
+        fits = not values.size or (values.min() >= limits.min and values.max() <= limits.max)
+        kind = "int32" if fits else "float64"
+    image: Any = nibabel.Nifti1Image(values.astype(kind), grid.affine)
     image.header.set_xyzt_units("mm")
     image.header["intent_code"] = intent
     for place in (image.set_sform, image.set_qform):
@@ -61,12 +67,3 @@ def write_volume(path: Path, values: NDArray[Any], grid: Grid, intent: int = 0) 
         gzip.GzipFile("", "wb", _EFFORT, stream, mtime=0) as packed,
     ):
         packed.write(image.to_bytes())
-
-
-def _type_for(values: NDArray[Any]) -> np.dtype[Any]:
-    """The type of values, or of all that hold them one that every reader of NIfTI has."""
-    if values.dtype.name in ("int64", "uint64"):
-        limits = np.iinfo(np.int32)
-        fits = not values.size or (values.min() >= limits.min and values.max() <= limits.max)
-        return np.dtype(np.int32 if fits else np.float64)
-    return np.dtype({"bool": "uint8", "float16": "float32"}.get(values.dtype.name, values.dtype))

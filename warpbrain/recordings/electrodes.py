@@ -73,7 +73,13 @@ def read_electrodes(path: Path, problems: Problems) -> Markup:
 
 def _unit(path: Path, problems: Problems) -> float:
     """Metres of one unit of a file; that its coordinate system cannot be used is a problem."""
-    side = _coordinate_file(path)
+
+    def entities(file: Path) -> set[str]:
+        return set(re.sub(r"(electrodes\.tsv|coordsystem\.json)$", "", file.name.lower()).split("_")) - {""}
+
+    # the file with most of the entities of the file of electrodes, and no other
+    sides = [side for side in path.parent.glob("*coordsystem.json") if entities(side) <= entities(path)]
+    side = max(sides, key=lambda side: (len(entities(side)), side), default=None)
     if side is None:
         problems.remark(path, "no coordsystem.json beside it: positions are taken for mm in scanner coordinates (RAS)")
         return _METRES["mm"]
@@ -91,13 +97,3 @@ def _unit(path: Path, problems: Problems) -> float:
     if not isinstance(unit, str) or unit not in _METRES:
         problems.refuse(side, f"{kind}CoordinateUnits", f"found {shown(unit)}, expected one of {', '.join(_METRES)}")
     return _METRES[unit]
-
-
-def _coordinate_file(path: Path) -> Path | None:
-    """The `coordsystem.json` with most of the entities of the file of electrodes, and no other."""
-
-    def entities(file: Path) -> set[str]:
-        return set(re.sub(r"(electrodes\.tsv|coordsystem\.json)$", "", file.name.lower()).split("_")) - {""}
-
-    sides = [side for side in path.parent.glob("*coordsystem.json") if entities(side) <= entities(path)]
-    return max(sides, key=lambda side: (len(entities(side)), side), default=None)

@@ -64,7 +64,11 @@ def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> 
     distance = np.zeros(len(xyz))
     if len(inside):
         members[inside] = tets[owner[inside]]
-        weights[inside] = _shape_functions(corners[owner[inside]], xyz[inside])
+        # elimination with pivots leaves a small residual however flat the tetrahedron is, where the inverse would not
+        sides = corners[owner[inside], 1:] - corners[owner[inside], :1]
+        away = (xyz[inside] - corners[owner[inside], 0])[..., None]
+        weights[inside, 1:] = np.linalg.solve(sides.transpose(0, 2, 1), away)[..., 0]
+        weights[inside, 0] = 1.0 - weights[inside, 1:].sum(axis=1)
     if len(outside):
         single = paired_faces(tets)[1]
         tetrahedron, local = single // 4, single % 4
@@ -117,11 +121,3 @@ def _containing(corners: Floats, points: Floats) -> Ints:
         first = first[d[first] > best[which[first]]]
         element[which[first]], best[which[first]] = candidates[first], d[first]
     return element
-
-
-def _shape_functions(corners: Floats, points: Floats) -> Floats:
-    """Weights (n, 4) whose sum of corners (n, 4, 3) is the point, however flat the tetrahedron is."""
-    # elimination with pivots leaves a small residual where the inverse would not
-    sides = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
-    w = np.linalg.solve(sides, (points - corners[:, 0])[..., None])[..., 0]
-    return np.concatenate([1.0 - w.sum(axis=1, keepdims=True), w], axis=1)

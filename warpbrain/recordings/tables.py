@@ -154,11 +154,13 @@ def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table:
         if not header:
             separator = next((mark for mark in ",;\t" if mark in content), ",")
         try:
-            fields = _split(content, separator)
+            quoted = csv.reader([content], delimiter=separator, strict=True, skipinitialspace=True)
+            words = next(quoted) if '"' in content else content.split(separator)
         except csv.Error:
             problems.add(path, f"row {number}", "found a quotation mark that is not closed, or one inside a field")
             broken += 1
             continue
+        fields = [word.strip() for word in words]
         if not header:
             header = fields
             _check_header(path, number, header, known, problems)
@@ -197,13 +199,6 @@ def read_csv(path: Path, problems: Problems, known: Sequence[str]) -> Table:
     if path.suffix.lower() != ".csv":
         problems.refuse(path, "", f"found ending {shown(path.suffix)}, expected .csv")
     return read_table(path, problems, known)
-
-
-def _split(line: str, separator: str) -> list[str]:
-    if '"' not in line:
-        return [field.strip() for field in line.split(separator)]
-    reader = csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True)
-    return [field.strip() for field in next(reader)]
 
 
 def _number(cell: str) -> float | None:

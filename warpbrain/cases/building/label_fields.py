@@ -150,34 +150,29 @@ def make_fields(regions: Regions, size: float) -> LabelFields:
     def shares(code: int) -> Singles:
         return np.pad(_resampled(regions.codes == code, blocks, splits), [(m, m) for m in margin])
 
-    def smooth(share: Singles) -> Singles:
-        return np.asarray(ndimage.gaussian_filter(share, sigma, truncate=4.0))
-
-    codes = range(1, regions.tissues + 1)
-    tissues, volumes = [], []
+    codes = (*range(1, regions.tissues + 1), CAVITY)
+    smoothed: list[Singles] = []
+    volumes: list[float] = []
     for code in codes:
         share = shares(code)
         volumes.append(float(share.sum(dtype=np.float64)))
-        tissues.append(smooth(share))
-    hollow = shares(CAVITY)
-    fluid = smooth(hollow)
-    hollow_volume = float(hollow.sum(dtype=np.float64))
+        smoothed.append(np.asarray(ndimage.gaussian_filter(share, sigma, truncate=4.0)))
+    *tissues, fluid = smoothed
     solid = np.sum(tissues, axis=0, dtype=np.float32)
-    body = _levelled(solid + fluid, np.ones(solid.shape, dtype=bool), sum(volumes) + hollow_volume)
+    body = _levelled(solid + fluid, np.ones(solid.shape, dtype=bool), sum(volumes))
     inside = body > 0
     # by majority among what is inside, so that the wall of a cavity that opens meets the outer surface squarely
-    cavity = _levelled(fluid / np.maximum(solid + fluid, np.float32(1e-3)), inside, hollow_volume)
+    cavity = _levelled(fluid / np.maximum(solid + fluid, np.float32(1e-3)), inside, volumes[-1])
     tissue = inside & (cavity <= 0)
-    weights = _balanced([field[tissue] for field in tissues], volumes)
+    weights = _balanced([field[tissue] for field in tissues], volumes[:-1])
     for field, weight in zip(tissues, weights, strict=True):
         field *= np.float32(weight)
     in_place = {}
     ruling = np.argmax(tissues, axis=0)
-    for code in (*codes, CAVITY):
-        share = hollow if code == CAVITY else shares(code)
+    for code, volume in zip(codes, volumes, strict=True):
         ruled = inside & (cavity > 0) if code == CAVITY else tissue & (ruling == code - 1)
-        if (total := float(share.sum(dtype=np.float64))) > 0:
-            in_place[code] = float(share[ruled].sum(dtype=np.float64)) / total
+        if volume > 0:
+            in_place[code] = float(shares(code)[ruled].sum(dtype=np.float64)) / volume
     return LabelFields(body, cavity, tissues, Grid(body.shape, affine), in_place)
 
 

@@ -57,7 +57,7 @@ class Reading:
         self.variant: str | None = None
         self.keys = table.keys_of("")
         if not isinstance(values, dict):
-            context.problems.add(context.file, f"[{where}]", f"expected a table, found {short(values)}")
+            context.problem(f"[{where}]", f"expected a table, found {short(values)}")
             return
         if table.by is None:
             self.variant = ""
@@ -86,7 +86,7 @@ class Reading:
 
     def problem(self, key: str, message: str, cure: str = "") -> None:
         """Note what is wrong with a key."""
-        self.context.problems.add(self.context.file, f"[{self.where}] {key}", message, cure)
+        self.context.problem(f"[{self.where}] {key}", message, cure)
 
     def named(self, key: str) -> bool:
         """Whether the file has the key, right or wrong."""
@@ -150,12 +150,16 @@ class Context:
     frame: Frame = field(default_factory=Frame)  # of every file in the folder
     mesh: TetMesh | None = None  # the whole anatomy; None if it could not be read
 
+    def problem(self, place: str, message: str, cure: str = "") -> None:
+        """Note what is wrong at a place of the `case.toml`."""
+        self.problems.add(self.file, place, message, cure)
+
     def table(self, table: Table, needed: bool = True) -> Reading:
         """Read ``[name]``; one that may be left out is read as an empty table."""
         context = self
         if needed and table.name not in self.tables:
             keys = ", ".join(key.name for key in table.keys if key.needed)
-            self.problems.add(self.file, f"[{table.name}]", "missing", f"a table with {keys}")
+            self.problem(f"[{table.name}]", "missing", f"a table with {keys}")
             context = replace(self, problems=Problems())  # that its keys are missing, too, goes without saying
         return Reading(table, self.tables.get(table.name, {}), context, table.name)
 
@@ -164,6 +168,6 @@ class Context:
         values = self.tables.get(table.name, [])
         if not isinstance(values, list):
             message = f"expected a list of tables, found {short(values)}"
-            self.problems.add(self.file, f"[[{table.name}]]", message, "two brackets")
+            self.problem(f"[[{table.name}]]", message, "two brackets")
             return []
         return [Reading(table, value, self, f"{table.name} {number}") for number, value in enumerate(values, 1)]

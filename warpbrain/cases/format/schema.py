@@ -30,7 +30,9 @@ def case_schema() -> dict[str, Any]:
     """The schema (JSON Schema, draft 2020-12)."""
     properties = {table.name: _table(table) for table in TABLES}
     for law, variant in zip(TISSUE.variants, properties["tissue"]["oneOf"], strict=True):
-        variant["anyOf"] = _laws(law)
+        # a tissue has all parameters of its law, or leaves them to the generative model
+        given = {"required": list(LAWS[law].keys), "properties": {"mu": {"not": {"const": PRIOR}}}}
+        variant["anyOf"] = [given, {"required": ["mu", "prior"], "properties": {"mu": {"const": PRIOR}}}]
     properties["tissue"] = {
         "type": "object",
         "description": TISSUE.doc,
@@ -48,12 +50,6 @@ def case_schema() -> dict[str, Any]:
         "oneOf": [{"required": ["mesh"]}, {"required": ["specimen"]}],
         "additionalProperties": False,
     }
-
-
-def _laws(name: str) -> list[dict[str, Any]]:
-    """A tissue has all parameters of its law, or leaves them to the generative model."""
-    given = {"required": list(LAWS[name].keys), "properties": {"mu": {"not": {"const": PRIOR}}}}
-    return [given, {"required": ["mu", "prior"], "properties": {"mu": {"const": PRIOR}}}]
 
 
 def _table(table: Table) -> dict[str, Any]:

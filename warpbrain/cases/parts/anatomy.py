@@ -25,7 +25,7 @@ def read_anatomy(context: Context) -> tuple[str, MeshInFile | None, Specimen | N
     if "specimen" in context.tables:
         specimen = _read_specimen(context)
         if "mesh" in context.tables:
-            context.problems.add(context.file, "[mesh]", "means nothing with [specimen], whose shape is meshed")
+            context.problem("[mesh]", "means nothing with [specimen], whose shape is meshed")
         if specimen is None:
             return "", None, None
         mesh = specimen.mesh()

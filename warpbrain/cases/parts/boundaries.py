@@ -83,7 +83,7 @@ def check_faces(context: Context, left: TetMesh, boundaries: tuple[Boundary, ...
             wall = boundary.nodes in left.element_sets
             message = f"node set '{boundary.nodes}' holds no face of the surface, which '{boundary.kind}' acts on"
             cure = f"take out '{boundary.nodes}' by a [[mechanism]] resection" if wall else ""
-            context.problems.add(context.file, f"[[boundary]] '{boundary.name}' nodes", message, cure)
+            context.problem(f"[[boundary]] '{boundary.name}' nodes", message, cure)
 
 
 def check_together(context: Context, mesh: TetMesh, boundaries: tuple[Boundary, ...]) -> None:
@@ -95,7 +95,7 @@ def check_together(context: Context, mesh: TetMesh, boundaries: tuple[Boundary, 
         if shared and not (isinstance(a, Displaced) and a.values == b.values and a.times == b.times):
             verb = "fixes" if isinstance(a, Fixed) else "displaces"
             message = f"'{a.name}' {verb} {shared} nodes that '{b.name}' displaces"
-            context.problems.add(context.file, "[[boundary]]", message)
+            context.problem("[[boundary]]", message)
     part = components(mesh.tetrahedra)
     if part.max() == 0:
         return
@@ -108,8 +108,7 @@ def check_together(context: Context, mesh: TetMesh, boundaries: tuple[Boundary, 
         cells = mesh.tetrahedra[part == number]
         if not held[cells].any():
             first = int(np.flatnonzero(part == number)[0])
-            context.problems.add(
-                context.file,
+            context.problem(
                 "[mesh]",
                 f"the mesh is in {len(sizes)} parts that no face connects, and nothing holds the one of {len(cells)} "
                 f"tetrahedra (first: tetrahedron {first})",

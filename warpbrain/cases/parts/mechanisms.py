@@ -48,7 +48,7 @@ def read_mechanisms(
                 table.problem(error.key, str(error))
             elif error.key not in context.tables.get("case", {}):
                 # of the case, not of this table; a wrong one is a problem already
-                context.problems.add(context.file, f"[case] {error.key}", str(error), _CURES[error.key])
+                context.problem(f"[case] {error.key}", str(error), _CURES[error.key])
         except InputError as error:
             table.problem("kind", str(error))
     for kind in dict.fromkeys(kind for _, kind, _ in tables):

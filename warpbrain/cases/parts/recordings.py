@@ -121,8 +121,8 @@ def check_magnitudes(
         message = f"the {answer} is {times:.2g} times what the declared tissue (mu = {mu:g} Pa) answers"
         if answer != "stress":
             cure = "forces are in N, torques in N m, lengths in units"
-            context.problems.add(context.file, f"[recording {number}] file", message, cure)
+            context.problem(f"[recording {number}] file", message, cure)
             continue
         other = "kPa" if times < 1.0 else "Pa"
         cure = f'perhaps unit = "{other}"' if other != unit else "is mu in Pa?"
-        context.problems.add(context.file, f"[recording {number}] unit", f"{message} if it is in {unit}", cure)
+        context.problem(f"[recording {number}] unit", f"{message} if it is in {unit}", cure)

@@ -25,17 +25,17 @@ def read_tissues(context: Context) -> dict[int, Tissue]:
     """Tissues by label, as far as they are right."""
     values = context.tables.get("tissue")
     if values is None:
-        context.problems.add(context.file, "[tissue]", "missing", "one table [tissue.LABEL] for each label of the mesh")
+        context.problem("[tissue]", "missing", "one table [tissue.LABEL] for each label of the mesh")
         return {}
     if not isinstance(values, dict):
-        context.problems.add(context.file, "[tissue]", f"expected a table, found {short(values)}")
+        context.problem("[tissue]", f"expected a table, found {short(values)}")
         return {}
     tissues: dict[int, Tissue] = {}
     labels: set[int] = set()
     for key, value in values.items():
         if not re.fullmatch("0|[1-9][0-9]{0,9}", key):
             message = " ".join(f"tissue labels are whole numbers, found '{key}'".split())
-            context.problems.add(context.file, f"[tissue.{key}]", message, "[tissue.1]")
+            context.problem(f"[tissue.{key}]", message, "[tissue.1]")
             continue
         labels.add(int(key))
         tissue = _read_tissue(Reading(TISSUE, value, context, f"tissue.{key}"), key)
@@ -44,18 +44,15 @@ def read_tissues(context: Context) -> dict[int, Tissue]:
     if context.mesh is not None:
         there = set(context.mesh.labels)
         for label in sorted(there - labels):
-            place, cure = f"[tissue.{label}]", "add the table"
-            message = (
-                f"missing, but the mesh has tissue {label} ({int((context.mesh.tissue == label).sum())} tetrahedra)"
-            )
             if label < 0:
-                place, cure = "[tissue]", "number the labels of the mesh anew"
                 message = f"the mesh has tissue {label}, expected labels from 0"
-            context.problems.add(context.file, place, message, cure)
+                context.problem("[tissue]", message, "number the labels of the mesh anew")
+                continue
+            message = f"missing, but the mesh has tissue {label} ({(context.mesh.tissue == label).sum()} tetrahedra)"
+            context.problem(f"[tissue.{label}]", message, "add the table")
         for label in sorted(labels - there):
             known = ", ".join(map(str, sorted(there)))
-            message = f"the mesh has no tissue {label}"
-            context.problems.add(context.file, f"[tissue.{label}]", message, f"it has {known}")
+            context.problem(f"[tissue.{label}]", f"the mesh has no tissue {label}", f"it has {known}")
     return tissues
 
 
@@ -78,7 +75,7 @@ def _read_tissue(table: Reading, label: str) -> Tissue | None:
         try:
             law = None if wrong else kind(**{key: table.si(key) for key in kind.keys})
         except InputError as error:
-            table.context.problems.add(table.context.file, f"[{table.where}]", str(error))
+            table.context.problem(f"[{table.where}]", str(error))
             wrong = list(kind.keys)
     if table.has("accuracy") and table.has("prior"):
         table.problem("accuracy", "means nothing beside a prior, which says how well moduli are known", "leave one out")
