@@ -6,7 +6,7 @@ without memory is where it is then; so every time of a case is a case of its own
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -72,9 +72,9 @@ class Moments:
         return cls(series, tuple(case_at(case, time) for time in first), numbers)
 
     @classmethod
-    def recorded(cls, case: Case, roles: Iterable[str] = ("fit", "check")) -> Moments:
-        """At which recordings of some roles are compared with a state; at the end alone where one goes on by itself."""
-        return cls.of(case, () if goes_on(case) else recorded_times(case, roles))
+    def recorded(cls, case: Case) -> Moments:
+        """At which recordings are compared with a state; at the end alone where one goes on by itself."""
+        return cls.of(case, () if goes_on(case) else recorded_times(case, ("fit", "check")))
 
     def number(self, time: float) -> int:
         """The number of the case at one of the times."""
@@ -86,12 +86,11 @@ def goes_on(case: Case) -> bool:
     return any(mechanism.changes_by_itself for mechanism in case.mechanisms)
 
 
-def recorded_times(case: Case, roles: Iterable[str]) -> tuple[float, ...]:
+def recorded_times(case: Case, roles: Collection[str]) -> tuple[float, ...]:
     """Times [s] of the rows of recordings that are compared, and of their references, increasing."""
-    wanted, times = set(roles), set()
+    times: set[float] = set()
     for recording in case.recordings:
-        rows = compared_rows(recording) if recording.role in wanted else ()
-        if len(rows):
+        if recording.role in roles and len(rows := compared_rows(recording)):
             times |= set(times_of(recording)[rows].tolist())
             times |= set() if recording.reference is None else {recording.reference}
     return tuple(sorted(times))

@@ -68,10 +68,10 @@ def examine_case(path: Path, problems: Problems) -> Case | None:
     context.mesh = None if in_file is None else in_file.mesh
     tissues = read_tissues(context)
     density, poisson, heterogeneity = read_body(context)
-    named = None if in_file is None else Named(in_file.mesh, tissues, context.frame, problems)
-    boundaries = read_boundaries(context, named, in_file)
+    named = None if in_file is None else Named(in_file.mesh, tissues, context.frame, problems, in_file)
+    boundaries = read_boundaries(context, named)
     mechanisms = read_mechanisms(context, named, axis, density)
-    recordings = read_recordings(context, named, in_file, {boundary.name for boundary in boundaries})
+    recordings = read_recordings(context, named, {boundary.name for boundary in boundaries})
     if named is None:
         return None
     # with the sets and vectors that keys name

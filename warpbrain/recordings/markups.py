@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,9 +63,9 @@ def paired(start: Markup, end: Markup, path: Path, moved: Path, problems: Proble
         if not all(markup.labels):
             at = markup.labels.index("")
             problems.add(file, f"point {at + 1}", "found no label, expected one: points are paired by label")
-        for label in sorted({label for label in markup.labels if label and markup.labels.count(label) > 1}):
-            count = markup.labels.count(label)
-            problems.add(file, f"label {shown(label)}", f"found it {count} times, expected it once")
+        for label, count in sorted(Counter(filter(None, markup.labels)).items()):
+            if count > 1:
+                problems.add(file, f"label {shown(label)}", f"found it {count} times, expected it once")
     for markup, other, file, partner in ((start, end, path, moved), (end, start, moved, path)):
         for label in sorted(set(markup.labels) - set(other.labels) - {""}):
             problems.add(file, f"label {shown(label)}", f"found no point of this label in {partner.name}")

@@ -11,17 +11,17 @@ from warpbrain.cases.boundary import BOUNDARIES, Boundary, Displaced, Fixed
 from warpbrain.cases.format.reading import Context, Reading
 from warpbrain.cases.format.tables import BOUNDARY
 from warpbrain.cases.parts.named import Named, read_closed_surface
-from warpbrain.mesh import MeshInFile, TetMesh, components, faces_of
+from warpbrain.mesh import TetMesh, components, faces_of
 from warpbrain.recordings.tables import read_table
 from warpbrain.recordings.text import collected
 
 
-def read_boundaries(context: Context, named: Named | None, in_file: MeshInFile | None) -> tuple[Boundary, ...]:
+def read_boundaries(context: Context, named: Named | None) -> tuple[Boundary, ...]:
     """Boundaries in the order of the file, as far as they are right."""
     boundaries: list[Boundary] = []
     names: set[str] = set()
     for table in context.lists(BOUNDARY):
-        nodes = None if named is None or in_file is None else named.nodes(table, in_file)
+        nodes = None if named is None else named.nodes(table)
         name = table.get("name") or table.get("nodes") or ""
         if name in names:
             table.problem("name", f"a second boundary '{name}'", "recordings name boundaries: give each its own")

@@ -42,19 +42,19 @@ class Named:
     tissues: Mapping[int, Tissue]
     frame: Frame  # of the files
     problems: Problems
+    in_file: MeshInFile | None = None  # how the file of the mesh numbers its nodes, which files may name
 
-    def nodes(self, table: Reading, in_file: MeshInFile) -> str | None:
-        """Name of the node set that the key `nodes` of a table names; None, and a problem noted, if there is none.
-
-        `in_file`: how the file of the mesh numbers its nodes.
-        """
+    def nodes(self, table: Reading) -> str | None:
+        """Name of the node set that the key `nodes` of a table names; None, and a problem noted, if there is none."""
         if not table.has("nodes"):
             return None
         name: str = table.get("nodes")
         if name.lower().endswith(".csv"):
             path = table.path("nodes")
-            members = None if path is None else _read_members(path, in_file, self.problems)
-            if path is None or members is None:
+            if path is None or self.in_file is None:
+                return None
+            members = _read_members(path, self.in_file, self.problems)
+            if members is None:
                 return None
             name = path.stem
             while not np.array_equal(self.mesh.node_sets.get(name, members), members):

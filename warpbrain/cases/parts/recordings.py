@@ -13,14 +13,11 @@ from warpbrain.cases.format.tables import RECORDING
 from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.tissues import OTHER_MU
 from warpbrain.cases.specimen import REST, Specimen
-from warpbrain.mesh import MeshInFile
 from warpbrain.recordings.recording import RECORDINGS, Recording, TestRecording
 from warpbrain.recordings.times import compared_rows
 
 
-def read_recordings(
-    context: Context, named: Named | None, in_file: MeshInFile | None, boundaries: set[str]
-) -> tuple[Recording, ...]:
+def read_recordings(context: Context, named: Named | None, boundaries: set[str]) -> tuple[Recording, ...]:
     """Recordings in the order of the file, as far as they are right; a force names one of the `boundaries`."""
     recordings: list[Recording] = []
     names: set[str] = set()
@@ -37,7 +34,7 @@ def read_recordings(
             other = "a case with [specimen]" if kind.of_specimen else "a case with [mesh]"
             table.problem("kind", f"'{table.variant}' belongs to {other}")
             continue
-        given = _given(table, kind, named, in_file, boundaries)
+        given = _given(table, kind, named, boundaries)
         if given is None:
             continue
         if fault := kind.fault_of_keys(given):
@@ -56,9 +53,7 @@ def read_recordings(
     return tuple(recordings)
 
 
-def _given(
-    table: Reading, kind: type[Recording], named: Named | None, in_file: MeshInFile | None, boundaries: set[str]
-) -> dict[str, Any] | None:
+def _given(table: Reading, kind: type[Recording], named: Named | None, boundaries: set[str]) -> dict[str, Any] | None:
     """Path and keys as `Recording.read` takes them; None, and problems noted, if something of them is wrong."""
     given: dict[str, Any] = {"path": table.path("file")}
     given |= {key: table.get(key) for key in ("name", "file", "role")}
@@ -66,7 +61,7 @@ def _given(
     for key in kind.keys:
         value = table.si(key.name)
         if key.name == "nodes":
-            value = None if named is None or in_file is None else named.nodes(table, in_file)
+            value = None if named is None else named.nodes(table)
         elif key.name == "boundary" and value is not None and value not in boundaries:
             known = ", ".join(f"'{known}'" for known in sorted(boundaries)) or "none"
             table.problem("boundary", f"no [[boundary]] is called '{value}' (there are: {known})")
