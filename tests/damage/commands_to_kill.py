@@ -106,7 +106,8 @@ def _examples(mesh: object) -> object:
 _PIPELINE = "warpbrain.cases.building.pipeline."
 #: What needs the extra `build`, too: what is killed is the writing.
 _BUILDING: tuple[tuple[str, Callable[..., object]], ...] = (
-    *((_PIPELINE + name, _nothing) for name in ("template_anatomy", "discretise", "first_pass", "fit_size")),
+    *((_PIPELINE + name, _nothing) for name in ("template_anatomy", "discretise", "fit_size")),
+    (_PIPELINE + "remesh", lambda _cells, _edge: block()),
     (_PIPELINE + "require_extra", _nothing),
     (_PIPELINE + "versions", dict),
     (_PIPELINE + "named_mesh", lambda _cells, _recipe: block()),
