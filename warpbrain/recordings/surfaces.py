@@ -56,9 +56,8 @@ def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh:
 
             with patience(path):
                 points, faces, axes = read_vtp(path)
-            raw = SurfaceMesh(points, faces if len(faces) else None, axes)
         else:
-            raw = _from_meshio(path, problems)
+            points, faces, axes = _from_meshio(path, problems)
     except Unreadable:
         raise
     except Exception as error:  # whatever the parsers raise
@@ -67,16 +66,43 @@ def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh:
         problems.refuse(path, "", f"found no surface mesh ({detail})", cure)
     if ends_inside_a_number(path):
         problems.remark(path, "the last line ends in a number without a line break: is the file cut off?")
-    return _checked(raw, path, problems)
+    count = len(points)
+    if count == 0:
+        problems.refuse(path, "", "found no points")
+    bad = np.flatnonzero(~(np.abs(points) <= LARGEST).all(axis=1))
+    if len(bad):
+        message = f"found a coordinate that is not finite ({len(bad)} such points in all)"
+        problems.refuse(path, f"point {bad[0]}", message)
+    if axes not in (None, *AXES):
+        problems.refuse(path, "SPACE", f"found {shown(axes)}, expected RAS or LPS")
+    if not len(faces):
+        return SurfaceMesh(points, None, axes)
+    wrong = np.flatnonzero(((faces < 0) | (faces >= count)).any(axis=1))
+    if len(wrong):
+        what = "a face" if len(wrong) == 1 else f"{len(wrong)} faces"
+        message = f"found {what} with points that are not there (there are {count})"
+        problems.refuse(path, f"face {wrong[0]}", message)
+    corner = points[faces]
+    sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    sound = np.linalg.norm(normal, axis=1) > 1e-12 * sides**2
+    if not sound.any():
+        problems.refuse(path, "", "found faces without area only")
+    if not sound.all():
+        problems.remark(path, f"{np.count_nonzero(~sound)} of {len(faces)} faces have no area and are left out")
+    used, numbers = np.unique(faces[sound], return_inverse=True)
+    if len(used) < count:
+        problems.remark(path, f"{count - len(used)} of {count} points belong to no face and are left out")
+    return SurfaceMesh(points[used], numbers.reshape(-1, 3).astype(np.int32), axes)
 
 
-def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh:
+def _from_meshio(path: Path, problems: Problems) -> tuple[Floats, Int32s, str | None]:
+    """Points (n, 3), triangles (k, 3) and the axes that the file states, as `read_vtp`."""
     import meshio
 
     if path.suffix.lower() not in meshio.extension_to_filetypes:
-        problems.refuse(
-            path, "", f"found ending {shown(path.suffix)}, expected .csv, .vtp, .stl, .ply, .obj, .vtu, ..."
-        )
+        expected = ".csv, .vtp, .stl, .ply, .obj, .vtu, ..."
+        problems.refuse(path, "", f"found ending {shown(path.suffix)}, expected {expected}")
     with path.open("rb") as file:
         head = file.read(2**16)
     whole = _WHOLE_HEADER.get(path.suffix.lower())
@@ -97,44 +123,10 @@ def _from_meshio(path: Path, problems: Problems) -> SurfaceMesh:
         if block.type in _WITH_AREA:
             corners = np.asarray(block.data)[:, : _CORNERS.get(block.type)]
             fans += [corners[:, [0, i, i + 1]] for i in range(1, corners.shape[1] - 1)]
-    faces = np.concatenate(fans)
     points = np.asarray(raw.points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
         problems.refuse(path, "", f"found points of shape {points.shape}, expected (n, 3)")
     axes = axes_of_vtu(path) if path.suffix.lower() == ".vtu" else None
     if axes is None and (mark := _SPACE.search(head[:2048])):
         axes = mark.group(1).decode()
-    return SurfaceMesh(points, faces if len(faces) else None, axes)
-
-
-def _checked(raw: SurfaceMesh, path: Path, problems: Problems) -> SurfaceMesh:
-    points, faces = raw.points, raw.faces
-    count = len(points)
-    if count == 0:
-        problems.refuse(path, "", "found no points")
-    bad = np.flatnonzero(~(np.abs(points) <= LARGEST).all(axis=1))
-    if len(bad):
-        message = f"found a coordinate that is not finite ({len(bad)} such points in all)"
-        problems.refuse(path, f"point {bad[0]}", message)
-    if raw.axes not in (None, *AXES):
-        problems.refuse(path, "SPACE", f"found {shown(raw.axes)}, expected RAS or LPS")
-    if faces is None:
-        return raw
-    wrong = np.flatnonzero(((faces < 0) | (faces >= count)).any(axis=1))
-    if len(wrong):
-        what = "a face" if len(wrong) == 1 else f"{len(wrong)} faces"
-        message = f"found {what} with points that are not there (there are {count})"
-        problems.refuse(path, f"face {wrong[0]}", message)
-    corner = points[faces]
-    sides = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    sound = np.linalg.norm(normal, axis=1) > 1e-12 * sides**2
-    if not sound.any():
-        problems.refuse(path, "", "found faces without area only")
-    if not sound.all():
-        problems.remark(path, f"{np.count_nonzero(~sound)} of {len(faces)} faces have no area and are left out")
-    faces = faces[sound]
-    used, numbers = np.unique(faces, return_inverse=True)
-    if len(used) < count:
-        problems.remark(path, f"{count - len(used)} of {count} points belong to no face and are left out")
-    return SurfaceMesh(points[used], numbers.reshape(-1, 3).astype(np.int32), raw.axes)
+    return points, np.concatenate(fans), axes
