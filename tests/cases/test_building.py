@@ -13,7 +13,7 @@ from drawn_for_commit import one_for_this_commit
 pytest.importorskip("scipy")
 
 from warpbrain.cases.building.cleaning import open_angles
-from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
+from warpbrain.cases.building.lattice import bcc_lattice, cut
 from warpbrain.cases.building.mmg import Cells, Size
 from warpbrain.cases.building.pipeline import NAMES, build
 from warpbrain.cases.building.template import anterior_temporal_lobe, individual
@@ -22,6 +22,11 @@ from warpbrain.mesh import boundary_faces, dihedral_angles, pinched_nodes, read_
 from warpbrain.mesh.tet_mesh import signed_volumes
 
 ZERO, TWO = np.zeros(3), np.full(3, 2.0)
+
+
+def lattice(spacing: float) -> Cells:
+    points, tets = bcc_lattice(ZERO, TWO, spacing)
+    return Cells(points, tets, np.ones(len(tets), dtype=np.int64))
 
 
 def sphere(radius: float):
@@ -38,49 +43,46 @@ def test_lattice_is_regular():
     points, tets = bcc_lattice(ZERO, TWO, 0.5)
     np.testing.assert_allclose(signed_volumes(points, tets), 0.5**3 / 12)
     np.testing.assert_allclose(np.sort(dihedral_angles(points, tets)), np.tile([60.0] * 4 + [90.0] * 2, (len(tets), 1)))
-    points, tets = compact(points, tets)
-    assert len(pinched_nodes(boundary_faces(tets))) == 0
+    assert len(pinched_nodes(boundary_faces(lattice(0.5).compact().tetrahedra))) == 0
 
 
 def test_cut_finds_the_surface_and_keeps_the_volume():
     points, tets = bcc_lattice(ZERO, TWO, 0.2)
     whole = signed_volumes(points, tets).sum()
-    points, tets, labels, inside = cut(points, tets, np.arange(len(tets)), sphere(0.6))
-    volumes = signed_volumes(points, tets)
+    made, inside = cut(Cells(points, tets, np.arange(len(tets))), sphere(0.6))
+    volumes = signed_volumes(made.points, made.tetrahedra)
     assert (volumes > 0).all()
     assert volumes.sum() == pytest.approx(whole)
-    assert labels.max() < len(tets)
-    ball_points, ball = compact(points, tets[inside])
+    assert made.labels.max() < len(tets)
+    ball = made.part(inside).compact()
     # discretisation: flat faces in edges of 0.2, for a radius of 0.6, leave out 3.6 %
     assert volumes[inside].sum() == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.05)
-    surface = np.unique(boundary_faces(ball))
+    surface = np.unique(boundary_faces(ball.tetrahedra))
     # nodes lie on the sphere, but for those that were so near that they were taken to be on it
-    np.testing.assert_allclose(np.linalg.norm(ball_points[surface] - 1, axis=1), 0.6, atol=0.2 * 0.07)
+    np.testing.assert_allclose(np.linalg.norm(ball.points[surface] - 1, axis=1), 0.6, atol=0.2 * 0.07)
 
 
 def test_cut_conforms():
-    points, tets = bcc_lattice(ZERO, TWO, 0.25)
-    outside = len(boundary_faces(tets))
-    points, tets, _, inside = cut(points, tets, np.zeros(len(tets), dtype=np.int64), sphere(0.5))
+    whole = lattice(0.25)
+    made, inside = cut(whole, sphere(0.5))
     # a face that does not meet its neighbour would be boundary
-    assert len(boundary_faces(tets)) == outside
-    assert len(split_boundary(points, tets[~inside])[1]) == 1
+    assert len(boundary_faces(made.tetrahedra)) == len(boundary_faces(whole.tetrahedra))
+    assert len(split_boundary(made.points, made.tetrahedra[~inside])[1]) == 1
 
 
 def test_cut_that_meets_nothing_changes_nothing():
-    points, tets = bcc_lattice(ZERO, TWO, 0.5)
-    cut_points, cut_tets, _, inside = cut(points, tets, np.zeros(len(tets), dtype=np.int64), sphere(9.0))
-    np.testing.assert_array_equal(cut_points, points)
-    np.testing.assert_array_equal(cut_tets, tets)
+    whole = lattice(0.5)
+    made, inside = cut(whole, sphere(9.0))
+    np.testing.assert_array_equal(made.points, whole.points)
+    np.testing.assert_array_equal(made.tetrahedra, whole.tetrahedra)
     assert inside.all()
 
 
 def test_open_angles_opens_them_and_keeps_the_shape():
-    points, tets = bcc_lattice(ZERO, TWO, 0.3)
-    points, tets, labels, inside = cut(points, tets, np.ones(len(tets), dtype=np.int64), sphere(0.7))
-    points, tets = compact(points, tets[inside])
+    made, inside = cut(lattice(0.3), sphere(0.7))
+    before = made.part(inside).compact()
+    points, tets = before.points, before.tetrahedra
     assert dihedral_angles(points, tets).min() < 10
-    before = Cells(points, tets, labels[inside])
     after = open_angles(before, 20.0)
     assert dihedral_angles(after.points, tets).min() > 2 * dihedral_angles(points, tets).min()
     assert (signed_volumes(after.points, tets) > 0).all()
@@ -109,10 +111,9 @@ def test_resection_sides_mirror_each_other():
 
 
 def test_size_counts_what_it_says():
-    points, tets = bcc_lattice(ZERO, TWO, 1.0)
-    cells = Cells(points, tets, np.ones(len(tets), dtype=np.int64))
-    assert Size("nodes", 1, 2).count(cells) == len(points)
-    assert Size("tetrahedra", 1, 2).count(cells) == len(tets)
+    cells = lattice(1.0)
+    assert Size("nodes", 1, 2).count(cells) == len(cells.points)
+    assert Size("tetrahedra", 1, 2).count(cells) == len(cells.tetrahedra)
 
 
 def test_unknown_case_is_named():

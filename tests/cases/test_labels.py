@@ -13,6 +13,7 @@ from segmentations import CENTRE, NAMES, ellipsoids, grid_affine, volume_of, wri
 from warpbrain.cases.building.cleaning import crumbs_given_away
 from warpbrain.cases.building.label_fields import CAVITY, label_volumes, make_fields, make_regions, read_labels
 from warpbrain.cases.building.lattice import bcc_lattice
+from warpbrain.cases.building.mmg import Cells
 from warpbrain.cases.building.tissue_names import Assignment, assign, parse_names, preset, presets
 from warpbrain.errors import InputError
 from warpbrain.images.grid import Grid
@@ -271,9 +272,9 @@ def test_crumbs_go_to_the_neighbour_they_touch_most():
     labels = np.where(x < 4, 1, 2)
     crumb = (abs(x - 5) < 0.8) & (abs(y - 4) < 0.8) & (abs(z - 4) < 0.8)
     inner = crumb & (abs(x - 5) < 0.4) & (abs(y - 4) < 0.4) & (abs(z - 4) < 0.4)
-    given = crumbs_given_away(points, tets, np.where(inner, 4, np.where(crumb, 3, labels)), 10.0)
+    given = crumbs_given_away(Cells(points, tets, np.where(inner, 4, np.where(crumb, 3, labels))), 10.0)
     np.testing.assert_array_equal(given, labels)
-    np.testing.assert_array_equal(crumbs_given_away(points, tets, labels, 10.0), labels)
+    np.testing.assert_array_equal(crumbs_given_away(Cells(points, tets, labels), 10.0), labels)
 
 
 # the mesh

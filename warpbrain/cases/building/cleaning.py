@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
 
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.cases.building.lattice import cut
+from warpbrain.cases.building.lattice import Field, cut
 from warpbrain.cases.building.mmg import Cells
 from warpbrain.errors import InputError
 from warpbrain.mesh import boundary_faces, pinched_nodes, split_boundary
@@ -24,21 +23,18 @@ FIRST_PERCENTILE = 20.0
 WANTED_DIHEDRAL = 22.0
 
 
-def small_pieces(
-    points: Floats, tetrahedra: Ints, region: Bools, keep_largest: bool = False, smallest: float = SMALLEST_PIECE
-) -> Bools:
+def small_pieces(cells: Cells, region: Bools, keep_largest: bool = False, smallest: float = SMALLEST_PIECE) -> Bools:
     """The tetrahedra of a region (m,) in its face-connected pieces smaller than `smallest` [mm3]: (m,) bool.
 
     With `keep_largest` those of all pieces but the largest, whatever their size.
     """
     members = np.flatnonzero(region)
-    if len(members) == 0:
-        return np.zeros(len(tetrahedra), dtype=bool)
-    piece = components(tetrahedra[members])
-    volume = np.bincount(piece, weights=signed_volumes(points, tetrahedra[members]))
-    small = np.arange(len(volume)) != volume.argmax() if keep_largest else volume < smallest
-    result = np.zeros(len(tetrahedra), dtype=bool)
-    result[members[small[piece]]] = True
+    result = np.zeros(len(region), dtype=bool)
+    if len(members):
+        piece = components(cells.tetrahedra[members])
+        volume = np.bincount(piece, weights=signed_volumes(cells.points, cells.tetrahedra[members]))
+        small = np.arange(len(volume)) != volume.argmax() if keep_largest else volume < smallest
+        result[members[small[piece]]] = True
     return result
 
 
@@ -52,42 +48,34 @@ def opened_out(tetrahedra: Ints, inside: Bools) -> Bools:
     raise InputError("the surface of the brain touches itself, and filling there did not help")
 
 
-def cut_body(
-    points: Floats,
-    tetrahedra: Ints,
-    labels: Ints,
-    body: Callable[[Floats], Floats],
-    cavity: Callable[[Floats], Floats],
-    smallest: float,
-    notes: list[str],
-) -> tuple[Floats, Ints, Ints]:
+def cut_body(cells: Cells, body: Field, cavity: Field, smallest: float, notes: list[str]) -> Cells:
     """What of a lattice is inside a body and outside of its cavities, by fields that are positive in these: cut along
     their surfaces, in one piece, and touching itself nowhere.
 
     Cavities below a volume [mm3] are filled, as are pockets outside that the lattice pinched off; what a user should
     know of it is noted.
     """
-    points, tetrahedra, labels, inside = cut(points, tetrahedra, labels, body)
-    pockets = small_pieces(points, tetrahedra, ~inside, keep_largest=True)
-    if (filled := float(signed_volumes(points, tetrahedra[pockets]).sum())) > smallest / 2:
+    cells, inside = cut(cells, body)
+    pockets = small_pieces(cells, ~inside, keep_largest=True)
+    if (filled := _volume(cells, pockets)) > smallest / 2:
         notes.append(f"clefts narrower than an element close: {filled / 1000:.3g} cm3 of outside become tissue")
     inside = inside | pockets
-    inside = _in_one_piece(points, tetrahedra, inside, notes, "pieces that hang together by less than an element")
-    inside = opened_out(tetrahedra, inside)
-    tetrahedra, labels = tetrahedra[inside], labels[inside]
-
-    points, tetrahedra, labels, fluid = cut(points, tetrahedra, labels, cavity)
-    fluid &= ~small_pieces(points, tetrahedra, fluid, smallest=smallest)
-    tissue = _in_one_piece(points, tetrahedra, ~fluid, notes, "pieces of tissue that float in a cavity")
-    tissue = opened_out(tetrahedra, tissue)
-    return points, tetrahedra[tissue], labels[tissue]
+    inside = _in_one_piece(cells, inside, notes, "pieces that hang together by less than an element")
+    cells, fluid = cut(cells.part(opened_out(cells.tetrahedra, inside)), cavity)
+    fluid &= ~small_pieces(cells, fluid, smallest=smallest)
+    tissue = _in_one_piece(cells, ~fluid, notes, "pieces of tissue that float in a cavity")
+    return cells.part(opened_out(cells.tetrahedra, tissue))
 
 
-def _in_one_piece(points: Floats, tetrahedra: Ints, region: Bools, notes: list[str], what: str) -> Bools:
+def _volume(cells: Cells, region: Bools) -> float:
+    return float(signed_volumes(cells.points, cells.tetrahedra[region]).sum())
+
+
+def _in_one_piece(cells: Cells, region: Bools, notes: list[str], what: str) -> Bools:
     """The largest piece of a region; what is dropped is noted if it can be seen."""
-    dropped = small_pieces(points, tetrahedra, region, keep_largest=True)
-    lost = float(signed_volumes(points, tetrahedra[dropped]).sum())
-    share = lost / float(signed_volumes(points, tetrahedra[region]).sum())
+    dropped = small_pieces(cells, region, keep_largest=True)
+    lost = _volume(cells, dropped)
+    share = lost / _volume(cells, region)
     if share > 1e-4:
         notes.append(f"{what} are left out: {lost / 1000:.3g} cm3 ({100 * share:.2g} %)")
     return region & ~dropped
@@ -109,10 +97,10 @@ def finished(cells: Cells, cavities: int | None = 1, easier: float = 0.0) -> Cel
     return better if sound else None
 
 
-def crumbs_given_away(points: Floats, tetrahedra: Ints, labels: Ints, smallest: float) -> Ints:
+def crumbs_given_away(cells: Cells, smallest: float) -> Ints:
     """Labels (m,) without face-connected pieces of one label below a volume [mm3], of a mesh in one piece [mm]: these
     have the label of the larger piece with which they share the most area, starting with those that touch one."""
-    labels = labels.copy()
+    points, tetrahedra, labels = cells.points, cells.tetrahedra, cells.labels.copy()
     volumes = signed_volumes(points, tetrahedra)
     pairs, _ = paired_faces(tetrahedra)
     owner = pairs // 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.building.cleaning import crumbs_given_away, cut_body, finished
 from warpbrain.cases.building.label_fields import CAVITY, LabelFields, make_fields, make_regions
-from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
+from warpbrain.cases.building.lattice import bcc_lattice, cut
 from warpbrain.cases.building.mmg import Cells, remesh
 from warpbrain.cases.building.node_sets import first_sets
 from warpbrain.cases.building.tissue_names import Assignment
@@ -133,26 +133,23 @@ def _discretised(fields: LabelFields, assignment: Assignment, size: float, spaci
     lower, upper = body_voxels.min(axis=0), body_voxels.max(axis=0)
     points, tetrahedra = bcc_lattice(lower - 1.5 * spacing, upper + 1.5 * spacing, spacing)
     # its least value is that of the far outside
-    near = sampled(fields.body, points) > 0.8 * float(fields.body.min())
-    points, tetrahedra = compact(points, tetrahedra[near[tetrahedra].any(axis=1)])
-    labels = np.zeros(len(tetrahedra), dtype=np.int64)
-
-    body, cavity = partial(sampled, fields.body), partial(sampled, fields.cavity)
-    points, tetrahedra, labels = cut_body(points, tetrahedra, labels, body, cavity, crumb, notes)
+    near = sampled(fields.body, points)[tetrahedra].max(axis=1) > 0.8 * float(fields.body.min())
+    cells = Cells(points, tetrahedra, np.zeros(len(tetrahedra), dtype=np.int64))
+    cells = cells.part(near).compact()
+    cells = cut_body(cells, partial(sampled, fields.body), partial(sampled, fields.cavity), crumb, notes)
     for code in range(1, len(fields.tissues)):
-        rest = np.max(fields.tissues[code:], axis=0)
-        ahead = fields.tissues[code - 1] - rest
-        points, tetrahedra, labels, first = cut(points, tetrahedra, labels, partial(sampled, ahead))
-        labels[first & (labels == 0)] = code
-    labels[labels == 0] = len(fields.tissues)
-    labels = crumbs_given_away(points, tetrahedra, labels, crumb)
+        ahead = fields.tissues[code - 1] - np.max(fields.tissues[code:], axis=0)
+        cells, first = cut(cells, partial(sampled, ahead))
+        cells.labels[first & (cells.labels == 0)] = code
+    cells.labels[cells.labels == 0] = len(fields.tissues)
+    labels = crumbs_given_away(cells, crumb)
     for code, name in enumerate(assignment.tissues.values(), start=1):
         if not (labels == code).any():
             raise InputError(
                 f"'{name}' is too small or thin for elements of {size:.3g} mm: choose a smaller --size, or give its "
                 "labels to another tissue"
             )
-    return Cells(*compact(points, tetrahedra), labels)
+    return replace(cells, labels=labels).compact()
 
 
 def _made(cells: Cells, size: float, notes: list[str]) -> Cells:

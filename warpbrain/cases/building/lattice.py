@@ -7,7 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.cases.building.mmg import Cells
 from warpbrain.mesh.surface import EDGES
+
+#: From positions (k, 3) to values (k,).
+Field = Callable[[Floats], Floats]
 
 
 def bcc_lattice(lower: Floats, upper: Floats, spacing: float) -> tuple[Floats, Ints]:
@@ -34,22 +38,17 @@ def bcc_lattice(lower: Floats, upper: Floats, spacing: float) -> tuple[Floats, I
 SNAP = 0.06
 
 
-def cut(
-    points: Floats, tetrahedra: Ints, labels: Ints, field: Callable[[Floats], Floats]
-) -> tuple[Floats, Ints, Ints, Bools]:
-    """Split every edge that crosses the zero level, there.
+def cut(cells: Cells, field: Field) -> tuple[Cells, Bools]:
+    """Split every edge at which a field crosses its zero level, there; pieces have the labels of what they are of.
 
-    `points` (n, 3), `tetrahedra` (m, 4).
-    `labels` (m,): handed down to the pieces.
-    `field`: from positions (k, 3) to values (k,).
-
-    Returns points, tetrahedra and labels of the cut mesh, conforming and positively oriented if the given one is, and
-    for each tetrahedron whether the field is positive there.
+    Returns the cut mesh, conforming and positively oriented if the given one is, and for each tetrahedron whether the
+    field is positive there.
 
     Bisecting an edge splits every tetrahedron around it in two, which keeps the mesh conforming whatever the order.
     Here the crossed edges are bisected in order of their number. One tetrahedron has at most four of them and each
     piece inherits those that are left, so four rounds over all tetrahedra at once do all of it.
     """
+    points, tetrahedra, labels = cells.points, cells.tetrahedra, cells.labels
     value = field(points)
     edges = np.unique(np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1), axis=0)
     crossed = edges[value[edges[:, 0]] * value[edges[:, 1]] < 0]
@@ -69,10 +68,10 @@ def cut(
     # all four nodes on the surface: decided by what the field says in the middle
     flat = total == 0
     total[flat] = field(points[tetrahedra[flat]].mean(axis=1))
-    return points, tetrahedra, labels, total > 0
+    return Cells(points, tetrahedra, labels), total > 0
 
 
-def _roots(points: Floats, edges: Ints, value: Floats, field: Callable[[Floats], Floats]) -> Floats:
+def _roots(points: Floats, edges: Ints, value: Floats, field: Field) -> Floats:
     """Where along each edge the field vanishes, 0 to 1, by bisection: safe where the field levels off."""
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     positive = value[edges[:, 0]] > 0
@@ -101,9 +100,3 @@ def _bisect_first(tetrahedra: Ints, labels: Ints, key: Ints, count: int) -> tupl
     keep = np.ones(len(tetrahedra), dtype=bool)
     keep[split] = False
     return np.concatenate([tetrahedra[keep], *halves]), np.concatenate([labels[keep], labels[split], labels[split]])
-
-
-def compact(points: Floats, tetrahedra: Ints) -> tuple[Floats, Ints]:
-    """Drop the nodes that no tetrahedron uses."""
-    used, inverse = np.unique(tetrahedra, return_inverse=True)
-    return points[used], inverse.reshape(tetrahedra.shape)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpbrain.arrays import Floats, Ints
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import InputError
 
 #: Exit status of the child where MMG gave up.
@@ -89,6 +89,15 @@ class Cells:
     points: Floats
     tetrahedra: Ints
     labels: Ints
+
+    def part(self, chosen: Bools) -> Cells:
+        """Some of the tetrahedra (m,), and all points."""
+        return Cells(self.points, self.tetrahedra[chosen], self.labels[chosen])
+
+    def compact(self) -> Cells:
+        """The same without points that no tetrahedron uses."""
+        used, inverse = np.unique(self.tetrahedra, return_inverse=True)
+        return Cells(self.points[used], inverse.reshape(self.tetrahedra.shape), self.labels)
 
 
 @dataclass(frozen=True)

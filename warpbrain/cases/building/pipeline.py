@@ -7,7 +7,7 @@ import json
 import os
 import platform
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Floats, Singles
+from warpbrain.arrays import Singles
 from warpbrain.atomic import write_text
 from warpbrain.cases.building.cleaning import SMALLEST_PIECE, cut_body, finished, small_pieces
-from warpbrain.cases.building.lattice import bcc_lattice, compact, cut
+from warpbrain.cases.building.lattice import Field, bcc_lattice, cut
 from warpbrain.cases.building.mmg import Cells, Size, fit_size, remesh, require_extra
 from warpbrain.cases.building.node_sets import node_sets, with_example_sets
 from warpbrain.cases.building.template import Anatomy, anterior_temporal_lobe, individual, template_anatomy
@@ -196,31 +196,28 @@ def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool, spacing: float
     """The lattice, with cubes of a spacing [mm, template], cut along every surface, `multi`: along the interface of
     grey and white matter, too. Labels are grey 1 and white 2, plus 10 in resected tissue."""
 
-    def sampled(field: Singles) -> Callable[[Floats], Floats]:
+    def sampled(field: Singles) -> Field:
         return partial(anatomy.grid.sampled, field)
 
     inside, origin = np.argwhere(anatomy.brain > 0), anatomy.grid.affine[:3, 3]
     lower, upper = (origin + end for end in (inside.min(axis=0) - spacing, inside.max(axis=0) + spacing))
     points, tetrahedra = bcc_lattice(lower, upper, spacing)
-    tetrahedra = tetrahedra[(sampled(anatomy.brain)(points)[tetrahedra] > -0.3).any(axis=1)]
-    points, tetrahedra = compact(points, tetrahedra)
-    labels = np.full(len(tetrahedra), GREY, dtype=np.int64)
-
-    surfaces = sampled(anatomy.brain), sampled(anatomy.ventricle)
-    points, tetrahedra, labels = cut_body(points, tetrahedra, labels, *surfaces, SMALLEST_PIECE, [])
+    cells = Cells(points, tetrahedra, np.full(len(tetrahedra), GREY, dtype=np.int64))
+    near = sampled(anatomy.brain)(points)[tetrahedra].max(axis=1) > -0.3
+    cells = cells.part(near).compact()
+    cells = cut_body(cells, sampled(anatomy.brain), sampled(anatomy.ventricle), SMALLEST_PIECE, [])
     if multi:
-        points, tetrahedra, labels, white = cut(points, tetrahedra, labels, sampled(anatomy.white))
-        white = white & ~small_pieces(points, tetrahedra, white)
-        white |= small_pieces(points, tetrahedra, ~white)
-        labels[white] = WHITE
+        cells, white = cut(cells, sampled(anatomy.white))
+        white = white & ~small_pieces(cells, white)
+        white |= small_pieces(cells, ~white)
+        cells.labels[white] = WHITE
     if recipe.resection is not None:
-        lobe = partial(anterior_temporal_lobe, side=recipe.resection)
-        points, tetrahedra, labels, taken = cut(points, tetrahedra, labels, lobe)
-        labels[taken & ~small_pieces(points, tetrahedra, taken)] += RESECTED
-    points, tetrahedra = compact(points, tetrahedra)
-    if recipe.seed is not None:
-        points = individual(points, recipe.seed, INDIVIDUAL_AMPLITUDE)
-    return Cells(points, tetrahedra, labels)
+        cells, taken = cut(cells, partial(anterior_temporal_lobe, side=recipe.resection))
+        cells.labels[taken & ~small_pieces(cells, taken)] += RESECTED
+    cells = cells.compact()
+    if recipe.seed is None:
+        return cells
+    return replace(cells, points=individual(cells.points, recipe.seed, INDIVIDUAL_AMPLITUDE))
 
 
 def named_mesh(cells: Cells, recipe: CaseRecipe) -> TetMesh:
