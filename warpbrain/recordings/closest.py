@@ -20,17 +20,18 @@ PAIRS = 1_000_000
 
 
 class Spheres:
-    """Which of some spheres points touch: a search among millions of triangles or tetrahedra becomes one among dozens.
+    """Spheres (m,) around triangles or tetrahedra: which of these points can touch, dozens instead of millions.
 
     They are sorted by size so that few large ones do not widen the search for all others.
 
-    `centres` (m, 3). `radii` (m,).
+    `corners` (m, k, 3).
     """
 
-    def __init__(self, centres: Floats, radii: Floats) -> None:
+    def __init__(self, corners: Floats) -> None:
         from scipy.spatial import cKDTree
 
-        self._centres, self._radii = centres, radii
+        self.centres = centres = corners.mean(axis=1)
+        self.radii = radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
         self._all = cKDTree(centres)
         # each class spans a factor of two; what is a thousand times smaller than the largest is one class
         sizes = np.floor(np.log2(np.maximum(radii, radii.max() / 1024.0 + np.finfo(float).tiny)))
@@ -41,7 +42,7 @@ class Spheres:
 
     def nearest(self, points: Floats, count: int) -> Ints:
         """The `count` spheres, or all if there are fewer, whose centres are nearest to each point: (n, count)."""
-        count = min(count, len(self._radii))
+        count = min(count, len(self.radii))
         return np.asarray(self._all.query(points, k=count)[1], dtype=np.int64).reshape(len(points), count)
 
     def touching(self, points: Floats, reach: Floats) -> Iterator[tuple[Ints, Ints]]:
@@ -56,8 +57,8 @@ class Spheres:
                 neighbours = tree.query_ball_point(points[chosen], within[chosen], return_sorted=False)
                 which = np.repeat(chosen, counts[chosen])
                 spheres = ids[np.fromiter(chain.from_iterable(neighbours), dtype=np.int64, count=len(which))]
-                apart = np.linalg.norm(points[which] - self._centres[spheres], axis=1)
-                near = apart <= (reach[which] + self._radii[spheres]) * (1.0 + 1e-9)
+                apart = np.linalg.norm(points[which] - self.centres[spheres], axis=1)
+                near = apart <= (reach[which] + self.radii[spheres]) * (1.0 + 1e-9)
                 yield which[near], spheres[near]
 
 
@@ -92,21 +93,29 @@ def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
     if len(triangles) == 0:
         raise InputError("a surface without faces has no closest points")
     corners = np.asarray(vertices, dtype=np.float64)[triangles]
-    centres = corners.mean(axis=1)
-    radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
-    spheres = Spheres(centres, radii)
+    spheres = Spheres(corners)
+    centres, radii = spheres.centres, spheres.radii
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
     # the normal of a sliver points anywhere: it has none, and counts as a sphere
-    normals = (
-        np.where(length > 1e-8 * radii**2, 1.0, 0.0)[:, None] * normals / np.where(length > 0.0, length, 1.0)[:, None]
-    )
+    normals /= np.where(length > 1e-8 * radii**2, length, np.inf)[:, None]
     near = spheres.nearest(xyz, 4)
     face = np.zeros(len(xyz), dtype=np.int64)
     distance = np.full(len(xyz), np.inf)
     weights = np.zeros((len(xyz), 3))
+
+    def improve(which: Ints, candidates: Ints) -> None:
+        """Take over the candidates that are closer than the best so far; a tie goes to the smaller number."""
+        barycentric, apart = closest_on_triangles(xyz[which], corners[candidates])
+        order = np.lexsort((candidates, apart, which))
+        first = order[np.append(True, which[order][1:] != which[order][:-1])] if len(order) else order
+        at = which[first]
+        closer = (apart[first] < distance[at]) | ((apart[first] == distance[at]) & (candidates[first] < face[at]))
+        first, at = first[closer], at[closer]
+        face[at], distance[at], weights[at] = candidates[first], apart[first], barycentric[first]
+
     for column in near.T:
-        _improve(np.arange(len(xyz)), column, xyz, corners, face, distance, weights)
+        improve(np.arange(len(xyz)), column)
     # whatever is closer than the best so far touches the sphere of that radius
     for which, candidates in spheres.touching(xyz, distance.copy()):
         # and, being flat, the disc in that sphere, which leaves few where the surface is far away
@@ -115,20 +124,6 @@ def closest_points(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
         aside = np.sqrt(np.maximum(np.einsum("ij,ij->i", offset, offset) - height**2, 0.0)) - radii[candidates]
         reach = distance[which] + 1e-6 * (distance[which] + radii[candidates])
         near_enough = np.hypot(height, np.maximum(aside, 0.0)) <= reach
-        which, candidates = which[near_enough], candidates[near_enough]
-        _improve(which, candidates, xyz, corners, face, distance, weights)
+        improve(which[near_enough], candidates[near_enough])
     position = np.einsum("ni,nij->nj", weights, corners[face])
     return ClosestPoints(position, face.astype(np.int32), weights, distance)
-
-
-def _improve(
-    which: Ints, candidates: Ints, points: Floats, corners: Floats, face: Ints, distance: Floats, weights: Floats
-) -> None:
-    """Take over, in place, the candidates that are closer than the best so far; a tie goes to the smaller number."""
-    barycentric, apart = closest_on_triangles(points[which], corners[candidates])
-    order = np.lexsort((candidates, apart, which))
-    first = order[np.append(True, which[order][1:] != which[order][:-1])] if len(order) else order
-    at = which[first]
-    closer = (apart[first] < distance[at]) | ((apart[first] == distance[at]) & (candidates[first] < face[at]))
-    first, at = first[closer], at[closer]
-    face[at], distance[at], weights[at] = candidates[first], apart[first], barycentric[first]

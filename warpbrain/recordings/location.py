@@ -86,8 +86,7 @@ def locate(mesh_points: ArrayLike, tetrahedra: ArrayLike, points: ArrayLike) -> 
 
 def _containing(corners: Floats, points: Floats) -> Ints:
     """Number of a tetrahedron (m, 4, 3) that each point is in, -1 if it is in none."""
-    centres = corners.mean(axis=1)
-    spheres = Spheres(centres, np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1))
+    spheres = Spheres(corners)
     element = np.full(len(points), -1, dtype=np.int64)
 
     def depth(which: Ints, candidates: Ints) -> Floats:
