@@ -15,6 +15,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 import hypothesis
 import pytest
 import warp as wp
+from drawn_for_commit import ALL
 from verification_rows import Row, Rows
 
 from warpbrain.kernels.module import PRECISIONS, Precision
@@ -35,6 +36,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--verification-rows"):
+        os.environ[ALL] = "1"
     config.stash[ROWS] = Rows()
 
 

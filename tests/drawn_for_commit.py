@@ -1,9 +1,11 @@
-"""Slow tests of which others run with every commit."""
+"""Slow tests of which others run with every commit; all of them where the table of verification is written."""
 
 from __future__ import annotations
 
 import hashlib
+import os
 import subprocess
+from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 from typing import TypeVar
@@ -11,10 +13,14 @@ from typing import TypeVar
 import numpy as np
 
 T = TypeVar("T")
+#: Variable of the environment of all processes of tests, set by `--verification-rows`.
+ALL = "ALL_SLOW_TESTS"
 
 
 def drawn_for_this_commit(of: int, count: int) -> list[int]:
     """So many of the numbers below `of`: others with every commit, or with every day where there is no repository."""
+    if ALL in os.environ:
+        return list(range(of))
     command = ["git", "rev-parse", "HEAD"]
     try:
         version = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, check=True).stdout
@@ -24,6 +30,11 @@ def drawn_for_this_commit(of: int, count: int) -> list[int]:
     return sorted(np.random.default_rng(seed).choice(of, count, replace=False).tolist())
 
 
-def one_for_this_commit(of: list[T]) -> list[T]:
-    """One of some parameters of a test that takes minutes with each, in a list."""
-    return [of[number] for number in drawn_for_this_commit(len(of), 1)]
+def one_for_this_commit(of: Sequence[T]) -> list[T]:
+    """One of some parameters of a test that takes long with each, in a list."""
+    return some_for_this_commit(of, 1)
+
+
+def some_for_this_commit(of: Sequence[T], count: int) -> list[T]:
+    """So many of some parameters of a test that takes long with each, in their order."""
+    return [of[number] for number in drawn_for_this_commit(len(of), count)]

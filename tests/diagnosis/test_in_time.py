@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drawn_for_commit import one_for_this_commit
 from slow_block import CAUSES, PERMEABILITY, TIMES, write_slow
 
 from warpbrain.arrays import Floats
@@ -44,7 +45,10 @@ def draining(tmp_path_factory: pytest.TempPathFactory) -> Case:
 
 
 # some ten seconds of a processor each; what moves when is tested without, too, and in test_courses.py
-@pytest.fixture(scope="module", params=[pytest.param(name, marks=pytest.mark.slow(10)) for name in CAUSES])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.slow(10)) for name in one_for_this_commit([*CAUSES])],
+)
 def diagnosed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Diagnosis]:
     if request.param == "drainage":
         case = request.getfixturevalue("draining")

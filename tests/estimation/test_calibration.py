@@ -14,11 +14,12 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from drawn_for_commit import some_for_this_commit
 from scipy.stats import binom, kstest
 from simulated_draws import Setting, ranks
 
 #: One process has the ranks of all settings, where tests are spread one by one.
-pytestmark = [pytest.mark.slow(240), pytest.mark.xdist_group("calibration")]
+pytestmark = [pytest.mark.slow(110), pytest.mark.xdist_group("calibration")]
 
 PROBABILITIES = (0.5, 0.9, 0.95)
 DRAWS = 60
@@ -33,6 +34,8 @@ SETTINGS = (
     Setting("round", 2, 0.8, 0.1),
     Setting("block", 2, 0.4, 0.1, registration=True),
 )
+#: Of which two run with each commit.
+DRAWN = some_for_this_commit(SETTINGS, 2)
 OTHER_ELEMENTS = (Setting("block", 1, None, 0.1, other_elements=True),)
 
 
@@ -52,12 +55,15 @@ def drawn() -> dict[Setting, np.ndarray]:
     """Ranks of every setting, as many settings at once as there are cores."""
     every = (*SETTINGS, *OTHER_ELEMENTS)
     with ProcessPoolExecutor(min(len(every), os.cpu_count() or 1), get_context("spawn")) as pool:
-        counts = [DRAWS_OF_OTHER_ELEMENTS if setting.other_elements else DRAWS for setting in every]
-        jobs = [pool.submit(ranks, *job) for job in zip(every, counts, range(SEED, SEED + len(every)), strict=True)]
-        return {setting: job.result() for setting, job in zip(every, jobs, strict=True)}
+        jobs = {
+            setting: pool.submit(ranks, setting, DRAWS_OF_OTHER_ELEMENTS if setting.other_elements else DRAWS, seed)
+            for seed, setting in enumerate(every, SEED)
+            if setting in DRAWN or setting.other_elements
+        }
+        return {setting: job.result() for setting, job in jobs.items()}
 
 
-@pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)
+@pytest.mark.parametrize("setting", DRAWN, ids=lambda setting: setting.name)
 def test_intervals_cover_as_often_as_they_say(setting, drawn, verify) -> None:
     for probability in PROBABILITIES:
         worst = max(excess(count, DRAWS, probability, 0.999) for count in covered(drawn[setting], probability))
@@ -84,14 +90,14 @@ def test_intervals_with_the_error_of_the_mesh_are_not_too_narrow(setting, drawn,
         )
 
 
-@pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)
+@pytest.mark.parametrize("setting", DRAWN, ids=lambda setting: setting.name)
 def test_ranks_are_uniform(setting, drawn) -> None:
     for column in drawn[setting].T:
         assert kstest(column, "uniform").pvalue > 1e-3
 
 
 def test_intervals_of_all_settings_together_cover(drawn, verify) -> None:
-    together = np.concatenate([drawn[setting].T.ravel() for setting in SETTINGS])
+    together = np.concatenate([drawn[setting].T.ravel() for setting in DRAWN])
     for probability in PROBABILITIES:
         outside = excess(int(covered(together, probability)), len(together), probability, 0.99)
         verify(

@@ -9,7 +9,7 @@ from synthetic import WHITE
 from synthetic import block as layered
 
 from warpbrain.cases.case import Case
-from warpbrain.cases.moments import Moments
+from warpbrain.cases.moments import Moments, recorded_times
 from warpbrain.estimation.estimate import Estimation
 from warpbrain.estimation.forward import Forward
 from warpbrain.estimation.likelihood import Likelihood
@@ -40,7 +40,7 @@ def case(truth: Case) -> Case:
 
 
 def test_derivatives_over_times_are_differences(case: Case, verify) -> None:
-    moments = Moments.recorded(case, ("fit",))
+    moments = Moments.of(case, recorded_times(case, ("fit",)))
     assert len(moments.cases) == 2
     forward = Forward(case, THETA, "cpu", moments=moments)
     mode = PriorMode(1.0, Gaussian(THETA, np.eye(1)), np.full(1, -np.inf), np.full(1, np.inf))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drawn_for_commit import one_for_this_commit
 from gel import block_of_gel, with_beads
 
 from warpbrain.diagnosis.diagnose import diagnose
@@ -18,7 +19,7 @@ LENGTH, HEIGHT, NOISE, POINTS = 0.1, 0.03, 2e-4, 45
 
 
 @pytest.mark.slow(30)
-@pytest.mark.parametrize("mesh_error", [False, True])
+@pytest.mark.parametrize("mesh_error", one_for_this_commit([False, True]))
 def test_its_weight_is_found(mesh_error: bool) -> None:
     """With the mesh taken for exact, and with its error as it is found."""
     sides = LENGTH, HEIGHT, HEIGHT

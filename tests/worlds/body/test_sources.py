@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from drawn_for_commit import one_for_this_commit
 from gel import block_of_gel, with_beads
 from shapes import box
 
@@ -147,7 +148,7 @@ class Sideways(Load):
 
 
 @pytest.mark.slow(10)
-@pytest.mark.parametrize("density", [(3000.0, 0.0, 0.0), (0.0, -4000.0, 0.0)])
+@pytest.mark.parametrize("density", one_for_this_commit([(3000.0, 0.0, 0.0), (0.0, -4000.0, 0.0)]))
 def test_a_force_throughout_the_body_is_not_called_by_a_name(density):
     side, noise = 0.1, 3e-4
     case = block_of_gel((6, 6, 6), (side, side, side), axis=2, mu=1000.0, gravity_axis=(0.0, 0.0, -1.0))
