@@ -43,8 +43,8 @@ def test_a_search_that_stays_where_it_is_ends(sign: float) -> None:
         return Fit(rounds[-1])
 
     fitter: Any = SimpleNamespace(_update=update)
-    found, ended = Fitter._with_sizes(fitter, search, -np.inf, resizing=False)
-    assert len(rounds) == 3 and ended and found.log_evidence == pytest.approx(410.0)
+    found = Fitter._converged(fitter, search, -np.inf)
+    assert len(rounds) == 3 and found.log_evidence == pytest.approx(410.0)
 
 
 @pytest.mark.parametrize("rounding", [-1e-12, 1e-12])

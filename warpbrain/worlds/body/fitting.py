@@ -61,8 +61,7 @@ _MATTERS = 0.3
 #: Change of the columns of laws that is none [standard deviations of the noise, all sensors together].
 _UNSEEN = 1e-3
 #: How often the sizes of effects are looked at anew, and by how much [nats] the linear model must say that others are
-#: better, of the mesh's error and of the stiffness field, too, or fits would go back and forth between sizes that are
-#: about as probable: by more than a sum over a few sizes is larger than the largest of its terms.
+#: better: by more than a sum over a few sizes is larger than the largest of its terms.
 _RESIZED, _BETTER = 4, 2.0
 #: How often at most a search goes on with laws, error of the mesh, gross errors and noise of its result.
 _ROUNDS = 8
@@ -264,8 +263,6 @@ class FitSearch:
         self._U, self.columns = scaled(self._U, factor), scaled(self.columns, factor)
         field = self._layout.field_of_nonlinear
         self._solved = [(np.where(field, at / factor, at), u) for at, u in self._solved]
-        # what shapes do from here on undoes nothing: the objective is another one
-        self._shape_change = np.zeros_like(self._shape_change)
         self._renew(self.residual)
 
     def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> None:
@@ -315,8 +312,7 @@ class FitSearch:
         """The fit at its best point."""
         q = self._U.shape[1]
         linear = self.residual + self.columns @ self.z
-        known = self._marginal
-        columns, evidence = evidence_of(self._base, self.columns, linear, known.sizes, known.scale, _BETTER)
+        columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.sizes, self._marginal.scale)
         nuisances = self._base.nuisances
         of_field = self._layout.field_size / nuisances.field_sizes.relative[evidence.sizes.field]
         part, z = nuisances.part(UNKNOWN_MESH), nuisances.with_field(self.z[None], of_field)[0]
@@ -573,7 +569,36 @@ class Fitter:
         search.start(starts, nearby or self.base.state)
         if subset is None:
             search.backtrack_to_base()
-        return self._converged(search, wanted)
+        best = self._converged(search, wanted)
+        for _ in range(_RESIZED):
+            resized = self._resized(best)
+            if resized is None:
+                break
+            best = resized
+        return best
+
+    def _resized(self, fit: Refit) -> Refit | None:
+        """The fit with one effect at another of its sizes, if its log evidence is larger; None otherwise.
+
+        A size is left out where the linear model expects no more of it than of one whose fit was no better.
+        """
+        # by effect, the gain that the linear model expected of a size whose fit was no better
+        not_reached: dict[int, float] = {}
+        for number, factor, gain in _better_sizes(fit):
+            if gain < not_reached.get(number, -np.inf) + _BETTER:
+                continue
+            resized = self._continued(fit.scaled(number, factor), fit.log_evidence)
+            if resized is not None and resized.log_evidence > fit.log_evidence:
+                return resized
+            not_reached[number] = gain
+        return None
+
+    def _continued(self, begun: Refit, wanted: float) -> Refit | None:
+        """The fit that a search from a point comes to; None if it fails. `wanted`: see `fit`."""
+        try:
+            return self._converged(self._begun_at(begun, begun.effects), wanted)
+        except CANNOT_BE_FITTED:
+            return None
 
     def _begun_at(self, refit: Refit, effects: tuple[Effect, ...], about: Linearisation | None = None) -> FitSearch:
         """A search with effects at the coordinates of a fit; see `begin`."""
@@ -582,45 +607,7 @@ class Fitter:
         return search
 
     def _converged(self, search: FitSearch, wanted: float) -> Refit:
-        """The fit that a search comes to; `wanted`: see `fit`.
-
-        Which size of an effect is the most probable in the linear model about the base is no matter of the fit: there
-        tissue is as soft as the base's, and what is far from linear needs more or less of a load. The prior of many
-        coefficients would cost tens of nats. So the search goes on with another size where the linear model about a
-        point that is nearly the best says so, unless no more comes of it.
-        """
-        fit, ended = self._with_sizes(search, wanted)
-        for _ in range(_RESIZED):
-            resized = self._resized(fit, wanted)
-            if resized is None:
-                break
-            search, fit, ended = resized
-        return fit if ended else self._with_sizes(search, wanted, resizing=False)[0]
-
-    def _resized(self, fit: Refit, wanted: float) -> tuple[FitSearch, Refit, bool] | None:
-        """A better fit with an effect of another of its sizes, as `_with_sizes`, and its search; None if there is none.
-
-        What was not gained with one size is not with another of which no more is expected.
-        """
-        not_gained: dict[int, float] = {}
-        for number, gain, begun in _better_sizes(fit):
-            if gain < not_gained.get(number, -np.inf) + _BETTER:
-                continue
-            try:
-                search = self._begun_at(begun, begun.effects)
-                resized, ended = self._with_sizes(search, max(wanted, fit.log_evidence))
-            except CANNOT_BE_FITTED:
-                continue
-            if resized.log_evidence > fit.log_evidence:
-                return search, resized, ended
-            not_gained[number] = gain
-        return None
-
-    def _with_sizes(self, search: FitSearch, wanted: float, resizing: bool = True) -> tuple[Refit, bool]:
-        """The best point of a search with effects of the sizes that they have, and whether it has ended there.
-
-        `wanted`: see `fit`. `resizing`: stop near to the best point where another size seems better.
-        """
+        """The fit that a search comes to, with effects of the sizes that they have; `wanted`: see `fit`."""
         enough, best, least, worse = _ROUGHLY, None, np.inf, 0
         for number in range(_ROUNDS):
             search.minimise(_ENOUGH if number == _ROUNDS - 1 else enough)
@@ -628,14 +615,10 @@ class Fitter:
             expected = search.expected_gain()
             # of all that is left of a renewal that is taken in part
             gain = expected / search.taken**2
-            converged = enough == _ENOUGH and gain < _ENOUGH
-            if not converged:
-                fit = replace(fit, unreached=gain, converged=False)
-            if resizing and not converged and gain < _BETTER and _better_sizes(fit):
-                return fit, False
-            if converged:
+            if enough == _ENOUGH and gain < _ENOUGH:
                 best = fit
                 break
+            fit = replace(fit, unreached=gain, converged=False)
             # a search that ends where it began has the same evidence but for rounding, which must not tell how to go on
             better = best is None or fit.log_evidence > best.log_evidence + _ENOUGH
             worse = 0 if better or gain < least - _ENOUGH else worse + 1
@@ -646,7 +629,7 @@ class Fitter:
         assert best is not None
         if not np.isfinite(best.log_evidence):
             raise FloatingPointError("its evidence is not a number")
-        return best, True
+        return best
 
     def begin(self, effects: tuple[Effect, ...], refit: Refit, about: Linearisation | None) -> Refit:
         """State, residual and Laplace evidence with other effects at the coordinates of a fit, before any iteration.
@@ -673,12 +656,16 @@ class Fitter:
         return fit
 
 
-def _better_sizes(fit: Refit) -> list[tuple[int, float, Refit]]:
+def _better_sizes(fit: Refit) -> list[tuple[int, float, float]]:
     """Other sizes of larger log evidence in the linear model about a fit, those nearest to the present ones first.
 
-    Of each the number of the effect, the gain [nats], and the same point with that size.
+    Of each the number of the effect, the factor on its size, and the gain [nats].
+
+    Which size is the most probable in the linear model about the base is no matter of the fit: there tissue is as
+    soft as the base's, and what is far from linear needs more or less of a load. The prior of many coefficients
+    would cost tens of nats.
     """
-    better = []
+    better: list[tuple[int, float, float]] = []
     parts = column_slices(fit.effects, fit.columns.shape[1] - width_of(fit.effects))
     for number, (effect, part) in enumerate(zip(fit.effects, parts, strict=True)):
         factors = np.asarray(effect.sizes) / effect.size
@@ -688,7 +675,5 @@ def _better_sizes(fit: Refit) -> list[tuple[int, float, Refit]]:
         cause = Cause("", (Place(fit.columns[:, part]),), 0.0, factors)
         [logs] = Blocks(others, fit.linear, [cause]).log_factors()
         gains = logs - logs[np.argmin(np.abs(factors - 1.0))]
-        for factor, gain in zip(factors.tolist(), gains.tolist(), strict=True):
-            if gain > _BETTER:
-                better.append((abs(np.log(factor)), number, gain, fit.scaled(number, factor)))
-    return [(number, gain, begun) for _, number, gain, begun in sorted(better, key=lambda each: each[0])]
+        better += [(number, *each) for each in zip(factors.tolist(), gains.tolist(), strict=True) if each[1] > _BETTER]
+    return sorted(better, key=lambda each: abs(np.log(each[1])))
