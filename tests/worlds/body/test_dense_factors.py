@@ -5,6 +5,7 @@ import pytest
 import warp as wp
 from scipy.sparse import csr_array, eye_array, random_array
 
+from warpbrain.simulation.factors import SparseFactors
 from warpbrain.worlds.body import factors as module
 from warpbrain.worlds.body.factors import DenseFactors, Factors, dense_factors
 
@@ -32,7 +33,7 @@ def test_they_answer_as_those_on_the_host(gpu, monkeypatch):
     monkeypatch.setattr(module, "_TOGETHER_ON_GPU", 32)
     matrix, rng = _matrix()
     ours, host = Factors(matrix, gpu), Factors(matrix)
-    assert ours._dense is not None and host._dense is None
+    assert isinstance(ours._factors, DenseFactors) and isinstance(host._factors, SparseFactors)
     columns = rng.normal(size=(60, 75))
     found = ours.solve(columns)
     assert found.flags.f_contiguous
