@@ -19,10 +19,11 @@ from warpbrain.report.diagnosis.description import describe
 from warpbrain.report.diagnosis.page import page_of, pictures_of
 from warpbrain.report.diagnosis.text import diagnosis_lines
 from warpbrain.report.files import read_state, write_summary
+from warpbrain.terminal.memory import keep_freed_memory
 from warpbrain.terminal.quiet import start_warp_quietly
 from warpbrain.terminal.record import Record
 from warpbrain.terminal.result_folder import choose_folder, results_in
-from warpbrain.threads import beside, keep_freed_memory
+from warpbrain.threads import beside
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 

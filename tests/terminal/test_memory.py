@@ -10,7 +10,7 @@ import pytest
 PROGRAM = """
 import resource
 import numpy as np
-from warpbrain.threads import keep_freed_memory
+from warpbrain.terminal.memory import keep_freed_memory
 
 keep_freed_memory()
 for number in range(21):
