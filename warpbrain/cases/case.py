@@ -68,12 +68,15 @@ class Case(Shown):
         The imaged anatomy, whole.
     mesh_file : str
         Relative to the folder; empty for a specimen.
+    specimen : Specimen or None
     tissues : mapping of int to Tissue
-        By their labels in the mesh.
     density, poisson : float
         [kg/m3] and without unit.
     heterogeneity : float or None
         Standard deviation of `ln mu` from place to place within a tissue; None if the case does not say.
+    boundaries : tuple of Boundary
+    mechanisms : tuple of Mechanism
+    recordings : tuple of Recording
     remarks : tuple of str
         What a user should know of how the files were read.
     """

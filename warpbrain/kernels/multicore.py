@@ -178,9 +178,9 @@ class _Team:
 
     @contextmanager
     def working(self) -> Iterator[bool]:
-        """Let the other threads look for work while the body runs, unless they do already; nobody waits for them.
+        """Context in which the other threads of the team look for work; nobody waits until they come or go.
 
-        Whether they do for the body.
+        Yields True, or False if they work in another such context already and the body has to do without them.
         """
         if not self.busy.acquire(blocking=False):
             yield False

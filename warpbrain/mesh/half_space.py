@@ -111,7 +111,10 @@ class _Cut:
         self._wedge = np.concatenate([self._around(self._half, tip, (2, 3)) for tip in (0, 1)], axis=1)
 
     def _around(self, elements: Ints, tip: int, others: tuple[int, ...]) -> Floats:
-        """The corner of a rank in height, and where the plane cuts the edges from it to others: (k, 1 + others, 4)."""
+        """Barycentric coordinates of the corner of a rank in height, and of where the plane cuts its edges to others.
+
+        (k, 1 + number of others, 4), of elements (k,).
+        """
         order = self._order[elements]
         corners, heights = np.eye(4)[order], np.take_along_axis(self._heights[elements], order, axis=1)
         points = [corners[:, tip]]

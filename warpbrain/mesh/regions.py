@@ -92,7 +92,7 @@ def read_regions(path: Path, unit: str, array: str | None = None) -> MeshWithReg
 
 
 def _of_tetrahedra(raw: Any, of_blocks: Sequence[Any]) -> NDArray[Any]:
-    """What is there for each cell of each block, of the tetrahedra alone."""
+    """Values (m, ...) of the tetrahedra alone, of those of all cells, which are given block by block."""
     pairs = zip(raw.cells, of_blocks, strict=True)
     return np.concatenate([np.asarray(values) for block, values in pairs if block.type in TETRAHEDRA])
 

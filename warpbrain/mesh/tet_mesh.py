@@ -24,7 +24,10 @@ LARGEST = 1e12
 class MeshError(InputError):
     """A mesh that cannot be computed with; the message is one line that says what is wrong and where.
 
-    `messages` are everything that is wrong, of which it is the first.
+    Attributes
+    ----------
+    messages : tuple of str
+        Everything that is wrong, of which the message is the first.
     """
 
     def __init__(self, *messages: str) -> None:
@@ -58,7 +61,10 @@ def _integers(values: ArrayLike, what: str) -> Int32s:
 
 
 def _by_name(given: Mapping[str, ArrayLike], what: str, shape: tuple[int, ...]) -> Mapping[str, Any]:
-    """Sets, which are booleans, or vectors, each of a shape."""
+    """Copies that cannot be written to, of sets (booleans) or of vectors (real numbers), by name.
+
+    `MeshError` if one has another shape, or a set is not boolean. `what`: for its message.
+    """
     checked, is_set = {}, len(shape) == 1
     for name, values in given.items():
         array = np.asarray(values, dtype=None if is_set else np.float64)
@@ -197,7 +203,10 @@ class TetMesh:
     def with_node_sets(self, sets: Mapping[str, ArrayLike]) -> TetMesh:
         """The same mesh with other sets of nodes: only these are checked, and nothing that is known is made again.
 
-        `MeshError` if a set is not a boolean array of one value a node.
+        Raises
+        ------
+        MeshError
+            If a set is not a boolean array of one value a node.
         """
         checked = _by_name(sets, "node set", (len(self.points),))
         other: TetMesh = object.__new__(TetMesh)
@@ -237,11 +246,22 @@ class TetMesh:
         return lumped.astype(np.float64)
 
     def without(self, elements: ArrayLike) -> tuple[TetMesh, Int32s, Int32s]:
-        """The mesh that is left when some tetrahedra are removed, (m,) of bool.
+        """The mesh that is left when some tetrahedra are removed.
 
-        Nodes that belonged to these only are gone; sets and vectors are restricted. The faces that it shared with what
-        was removed are its `cut`, with those of an earlier one that are left. Returns it, and the id in this mesh of
-        each of its nodes (n',) and tetrahedra (m',). `MeshError` if nothing is left, or `elements` are no such array.
+        Parameters
+        ----------
+        elements : (m,) bool array
+            True for the tetrahedra to remove.
+
+        Returns
+        -------
+        mesh : TetMesh
+            What remains; nodes that belonged to removed tetrahedra only are gone; sets and vectors are restricted. The
+            faces that it shared with what was removed are its `cut`, with those of an earlier one that are left.
+        node_ids : (n',) int32 array
+            Id in this mesh of every node of the new one.
+        element_ids : (m',) int32 array
+            Id in this mesh of every tetrahedron of the new one.
         """
         removed = np.asarray(elements)
         if removed.dtype != bool or removed.shape != (len(self.tetrahedra),):

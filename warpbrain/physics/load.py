@@ -94,8 +94,6 @@ class BodyForce(Load):
 class NodalForce(Load):
     """A force divided evenly among the nodes of a set.
 
-    `InputError` if the total is not finite or the mass negative; by `nodal_forces`, if the mesh has no such nodes.
-
     Parameters
     ----------
     nodes : str
@@ -105,6 +103,11 @@ class NodalForce(Load):
     mass : float
         Of what pulls [kg], if that moves with the nodes, in all directions: each carries ``mass / k`` along. Its weight
         is part of the total.
+
+    Raises
+    ------
+    InputError
+        If the total is not finite or the mass negative; by `nodal_forces`, if the mesh has no such set or it is empty.
     """
 
     nodes: str

@@ -296,8 +296,12 @@ class Simulator:
         return self._cg.result()
 
     def check(self) -> float:
-        """Smallest `J` of an element; `SolveError` if one is inverted, the state is not finite or the last linear solve
-        failed: when, where and why.
+        """Smallest `J` of an element.
+
+        Raises
+        ------
+        SolveError
+            If an element is inverted, the state is not finite or the last linear solve failed: when, where and why.
         """
         linear = self.last_solve()
         _, min_J = self.system.energy()

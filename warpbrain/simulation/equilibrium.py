@@ -155,6 +155,11 @@ class EquilibriumSolver:
         Adds up the wall time by phase.
     factors : KeptFactors, optional
         Kept by who solves for many states that are near to each other; they serve on the CPU alone.
+
+    Attributes
+    ----------
+    clock : PhaseClock
+        Wall time by phase.
     """
 
     def __init__(
@@ -192,12 +197,26 @@ class EquilibriumSolver:
     ) -> Equilibrium:
         """Go from a start (rest by default) to equilibrium at full load.
 
-        Nodal forces `external` (n, 3) [N] and displacements `prescribed` (n, 3) [m] of the constrained components are
-        those at full load, of the model by default. A `start` (n, 3) [m] is near to the equilibrium: where that is not
-        found at once, what the start has out of balance is taken off in the place of load steps.
+        Parameters
+        ----------
+        external : (n, 3) array, optional
+            Nodal forces at full load [N]; those of the model by default.
+        start : (n, 3) array, optional
+            Displacement to start from [m], near to the equilibrium. Where that is not found at once, what the start has
+            out of balance is taken off in the place of load steps.
+        prescribed : (n, 3) array, optional
+            Displacement of the constrained components at full load [m]; that of the model by default.
 
-        `InputError` if nothing holds the body, or a part of it; `SolveError` if no equilibrium is found: at what load
-        fraction, where and why.
+        Returns
+        -------
+        Equilibrium
+
+        Raises
+        ------
+        InputError
+            If nothing holds the body, or a part of it.
+        SolveError
+            If no equilibrium is found: at what load fraction, where and why.
         """
         model = self.system.model
         require_held(model)
@@ -212,7 +231,12 @@ class EquilibriumSolver:
     def linear_estimate(self) -> Floats:
         """Displacement (n, 3) [m] at full load if the body kept the stiffness that it has at rest.
 
-        `InputError` if nothing holds the body, or a part of it; `SolveError` if that is not positive definite.
+        Raises
+        ------
+        InputError
+            If nothing holds the body, or a part of it.
+        SolveError
+            If the stiffness at rest is not positive definite.
         """
         model, system = self.system.model, self.system
         require_held(model)
@@ -236,9 +260,22 @@ class EquilibriumSolver:
         """Go on from a state to the equilibrium a time step later, slowly: without inertia, but with memory.
 
         Terms with a memory keep it and take the step into it. To begin at rest, let them forget first (`Term.forget`).
-        From the displacement `start` (n, 3) [m], by a step [s], 0 for a change that is over at once, to a time [s], by
-        default long after every ramp, and displacements `prescribed` (n, 3) [m] of the constrained components, those of
-        the model by default. Raises as `solve`.
+
+        Parameters
+        ----------
+        start : (n, 3) array
+            Displacement [m] before the step.
+        time_step : float
+            [s]; 0 for a change that is over at once.
+        time : float
+            At the end of the step [s], for what has a ramp; by default long after every one.
+        prescribed : (n, 3) array, optional
+            Displacement of the constrained components at the end of the step [m]; that of the model by default.
+
+        Raises
+        ------
+        InputError, SolveError
+            As `solve`.
         """
         equilibrium = self.try_step(start, time_step, time, prescribed)
         self.system.u.assign(equilibrium.u)
@@ -475,12 +512,11 @@ class EquilibriumSolver:
             raise _StepFailed("Newton's direction does not descend: the tangent stiffness is not positive definite")
         alpha = 1.0
         min_J = np.nan
-        self.system.u.assign(u)
-        before = self.system.forces_without_potential()
+        before = self.system.forces_without_potential(u)
         while alpha > 1e-3:
             trial = u + alpha * d
             reached, min_J = self._potential(trial, external)
-            after = self.system.forces_without_potential()
+            after = self.system.forces_without_potential(trial)
             # of forces without a potential, the work along the step by the trapezoidal rule
             work = 0.0 if before is None or after is None else 0.5 * alpha * float(np.vdot(before + after, d))
             descends = moving or reached + work <= potential + 1e-4 * alpha * slope + noise

@@ -83,9 +83,6 @@ class Motion:
 class Model:
     """Everything that is assumed to act on a body.
 
-    `InputError` if a tissue has no material, an array has the wrong shape or holds NaN, the density is not positive, or
-    something acts that the elements cannot have; `CompositionError` if two mechanisms have no meaning together.
-
     Parameters
     ----------
     mesh : TetMesh
@@ -110,6 +107,14 @@ class Model:
         One of `ELEMENTS`: plain linear tetrahedra, linear ones that lock less (`warpbrain.simulation.averaged`),
         quadratic ones with straight sides (`warpbrain.mesh.quadratic`), or these with a pressure of their own, which
         do not lock either (`warpbrain.simulation.mixed`).
+
+    Raises
+    ------
+    InputError
+        If a tissue has no material, an array has the wrong shape or holds NaN, the density is not positive, or
+        something acts that the elements cannot have.
+    CompositionError
+        If two mechanisms have no meaning together.
     """
 
     mesh: TetMesh
@@ -256,8 +261,14 @@ class Model:
         return [load.unit_forces(self.quadratic or self.mesh) for load in self.loads]
 
     def external_forces(self, time: float = math.inf, unit_forces: Sequence[Floats] | None = None) -> Floats:
-        """Sum of the loads on the nodes [N], shape (n, 3), at a time [s], by default long after every ramp; tissue that
-        has been taken out by then weighs nothing. Others can stand for `unit_forces`, such as their derivatives.
+        """Sum of the loads on the nodes [N], shape (n, 3); tissue that has been taken out by then weighs nothing.
+
+        Parameters
+        ----------
+        time : float
+            [s]; by default long after every ramp.
+        unit_forces : sequence of arrays, optional
+            Others in the place of `unit_forces`, such as their derivatives.
         """
         total = np.zeros(self.constrained.shape)
         if unit_forces is None and not self.emptying:

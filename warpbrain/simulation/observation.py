@@ -35,12 +35,21 @@ class Observed:
 def observe(
     case: Case, result: State, time: float | None = None, others: Mapping[float, State] | None = None
 ) -> Observed:
-    """Compare states of a case's model with its recordings.
+    """Compare states with the recordings of their case.
 
     Every row is compared with the state of its time, less that of its recording's reference. A row without a time is
-    one of the end. The time of `result` is in [s]; None for a state at rest long after everything. `others` are states
-    of earlier times. Without them, rows of other times are compared with the state at rest if what acts then is the
-    same; the end of a motion with the rows of its own time alone.
+    one of the end.
+
+    Parameters
+    ----------
+    case : Case
+    result : State
+        Of the case's model.
+    time : float, optional
+        Of the state [s]; None for a state at rest long after everything.
+    others : mapping of float to State, optional
+        States of earlier times. Without them, rows of other times are compared with the state at rest if what acts then
+        is the same; the end of a motion with the rows of its own time alone.
     """
     require_kind(case, Case, "case", "a Case, as warpbrain.find_case gives")
     comparisons, skipped = [], []

@@ -79,11 +79,23 @@ def relax_to_rest(
 ) -> Relaxed:
     """Follow the damped motion from rest until nothing moves.
 
-    Prescribed displacements are reached in the first step, or in as many as the elements bear. `on_step` is called with
-    each step; the clock adds up the wall time by phase.
+    Prescribed displacements are reached in the first step, or in as many as the elements bear.
 
-    `InputError` if nothing holds the body, or a part of it; `SolveError` if the motion does not come to rest: when,
-    where and why.
+    Parameters
+    ----------
+    system : System
+    options : RelaxationOptions
+    on_step : callable, optional
+        Called with each `RelaxationStep`.
+    clock : PhaseClock, optional
+        Adds up the wall time by phase.
+
+    Raises
+    ------
+    InputError
+        If nothing holds the body, or a part of it.
+    SolveError
+        If the motion does not come to rest: when, where and why.
     """
     require_kind(system, System, "system", "a System, as warpbrain.System(model) gives")
     options = options or RelaxationOptions()

@@ -103,8 +103,13 @@ def nodal_state_of(system: System, time: float = math.inf) -> NodalState:
 
 
 def result_of(system: System, time: float = math.inf) -> Result:
-    """Strain, stress and reactions of a system at its present displacement, at a time [s]; by default long after every
-    ramp.
+    """Evaluate a system at its present displacement.
+
+    Parameters
+    ----------
+    system : System
+    time : float
+        Of the state [s], for loads with a ramp; by default long after every one.
     """
     require_kind(system, System, "system", "a System, as warpbrain.System(model) gives")
     state = nodal_state_of(system, time)

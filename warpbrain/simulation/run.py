@@ -238,6 +238,7 @@ class Run(Shown):
 
     Attributes
     ----------
+    case : Case
     model : Model
         Of the case, with the elements that were asked for or chosen.
     chosen : str or None

@@ -78,8 +78,16 @@ class System:
         1 for free components, 0 for constrained ones.
     mass : wp.array, shape (n,)
         Lumped masses [kg] of the tissue that is there.
+    mesh, node_mesh : TetMesh
+        The reference shape, and linear tetrahedra with a corner at every node: it, or its elements cut into eight.
     terms : list of Term
-        What else acts with forces that follow the deformation; for what they ask see `warpbrain.physics.term.Body`.
+        What else acts with forces that follow the deformation.
+    stiffness_factors : (m,) array
+        Factor on all moduli of each element.
+    remaining_parts : (m,) array
+        Part of each element that is left.
+    growth_stretches : (m,) array
+        Stretch of each element without stress.
     coupling_factor : float
         How many times what unknowns of a term's own do to the stiffness counts in the matrix.
     seconds : float
@@ -226,11 +234,21 @@ class System:
         those that are there; what it remembers stays. Of loads and prescribed displacements nothing is kept here: the
         model is asked for them.
 
-        The model is of the same mesh, with each tissue's law (of Ogden's, with as many terms) and formulation as it is,
-        the same mechanisms with other numbers, and any loads and prescribed displacements of the components that are
-        constrained already. Sets that a mechanism acts on are pre-processed: others need another system, and then this
-        raises `InputError` and leaves the system as it was. `made` are terms of mechanisms by the `id` of these, which
-        the caller keeps: what is not there yet is added, so that who goes to and fro between models makes each once.
+        Parameters
+        ----------
+        model : Model
+            Of the same mesh, with each tissue's law (of Ogden's, with as many terms) and formulation as it is, the
+            same mechanisms with other numbers, and any loads and prescribed displacements of the components that are
+            constrained already. Sets that a mechanism acts on are pre-processed: others need another system.
+        made : dict of int to Term, optional
+            Terms of mechanisms by the `id` of these, which the caller keeps. What is not there yet is added, so that
+            who goes to and fro between models makes each term once.
+
+        Raises
+        ------
+        InputError
+            If a tissue has another law, formulation or number of parameters, or a mechanism is another one, or
+            something that has no parameters is. The system is then as it was.
         """
         before = self.model
         self._require_alike(model)
@@ -466,10 +484,19 @@ class System:
 
         - Conjugate gradients (`warpbrain.kernels.linear.conjugate_gradient`) for one system after the other.
         - GMRES on the host (`warpbrain.simulation.coupled`) where a term has unknowns of its own: the matrix is
-          indefinite, and `factors` of states nearby precondition it.
+          indefinite.
 
-        The tolerance is relative. `watch_curvature` tells an indefinite matrix; `at_rest` one without inertia, for
-        which a coarse space is worth its making.
+        Parameters
+        ----------
+        tolerance : float
+            Relative.
+        max_iterations : int
+        watch_curvature : bool
+            Tell an indefinite matrix.
+        at_rest : bool
+            The matrix is without inertia, so that a coarse space is worth its making.
+        factors : KeptFactors, optional
+            Of states nearby, for an indefinite matrix.
         """
         kind, mesh = conjugate_gradient(self.device, only_blocks=self.assembled), self.model.node_mesh
         ordered = partial(mesh.made_once, "compact order", partial(compact_order, mesh.points))
@@ -591,11 +618,14 @@ class System:
         self.set_time_step(other._time_step)
         self.recall(other.remembered())
 
-    def forces_without_potential(self) -> Floats | None:
-        """Sum of the forces [N], shape (n, 3), at `u` of the terms that have no potential; None if all have one."""
+    def forces_without_potential(self, u: Floats) -> Floats | None:
+        """Sum of the forces (n, 3) [N] of the terms without a potential at a displacement (n, 3) [m], which the system
+        then has; None if all have a potential, and nothing is done.
+        """
         terms = [term for term in self.terms if not term.conservative]
         if not terms:
             return None
+        self.u.assign(u)
         total = np.zeros((self.size, 3))
         for term in terms:
             term.evaluate_forces(self.u)

@@ -112,7 +112,10 @@ class Law(abc.ABC):
     def volumetric_modulus(self, poisson: float, formulation: str) -> float:
         """`lam` (coupled) or `K` (uncoupled) [Pa] that gives the Poisson ratio at rest.
 
-        `InputError` if the Poisson ratio is outside (-1, 0.5) or the formulation is unknown.
+        Raises
+        ------
+        InputError
+            If the Poisson ratio is outside (-1, 0.5) or the formulation is unknown.
         """
         if not (math.isfinite(poisson) and -1.0 < poisson < 0.5):
             raise InputError(f"poisson = {poisson:g}: the Poisson ratio must lie in the open interval (-1, 0.5)")

@@ -79,12 +79,17 @@ def device_code(name: str, *, second_invariant: bool = True) -> dict[str, Invari
 
 @dataclass(frozen=True)
 class MooneyRivlin(Law):
-    """Mooney-Rivlin law; `InputError` if a coefficient is not a number or the shear modulus is not positive.
+    """Mooney-Rivlin law.
 
     Parameters
     ----------
     C1, C2 : float
         Coefficients of `I1 - 3` and `I2 - 3` [Pa], `C1 + C2 > 0`.
+
+    Raises
+    ------
+    InputError
+        If a coefficient is not a number or the shear modulus `2 (C1 + C2)` is not positive.
     """
 
     C1: float

@@ -19,12 +19,17 @@ from warpbrain.physics.laws.mooney_rivlin import device_code
 
 @dataclass(frozen=True)
 class NeoHookean(Law):
-    """Neo-Hookean law; `InputError` if `mu` is not a positive number.
+    """Neo-Hookean law.
 
     Parameters
     ----------
     mu : float
-        Shear modulus [Pa].
+        Shear modulus [Pa], positive.
+
+    Raises
+    ------
+    InputError
+        If `mu` is not a positive number.
     """
 
     mu: float

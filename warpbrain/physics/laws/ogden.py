@@ -179,14 +179,19 @@ def _uncoupled_derivatives(l: Any, parameters: wp.array2d[Any], e: int):
 
 @dataclass(frozen=True)
 class Ogden(Law):
-    """Ogden law with N terms; `InputError` if `mu` and `alpha` differ in length or are empty, or `mu0` is not positive.
+    """Ogden law with N terms.
 
     Parameters
     ----------
     mu : tuple of float
         Coefficients `mu_p` [Pa], in the convention `mu_p/alpha_p`.
     alpha : tuple of float
-        Exponents, none of them zero.
+        Exponents, none of them zero; as many as `mu`.
+
+    Raises
+    ------
+    InputError
+        If the lists differ in length or are empty, an exponent is zero, or `mu0` is not positive.
     """
 
     mu: tuple[float, ...]

@@ -115,10 +115,22 @@ class UnstableLawError(InputError):
 
 
 def require_stable(law: Law, poisson: float = 0.45, formulation: str = "coupled") -> None:
-    """Raise `UnstableLawError`, which names the law, the stretch and the condition, if the law breaks one of the
-    supplement's Table 2.
+    """Raise `UnstableLawError` if the law breaks a condition of the supplement's Table 2.
 
-    `InputError` if the Poisson ratio at rest is outside (-1, 0.5) or the formulation is unknown.
+    Parameters
+    ----------
+    law : Law
+    poisson : float
+        Poisson ratio at rest.
+    formulation : str
+        One of `FORMULATIONS`.
+
+    Raises
+    ------
+    UnstableLawError
+        Naming the law, the stretch and the condition.
+    InputError
+        If the Poisson ratio is outside (-1, 0.5) or the formulation is unknown.
 
     Examples
     --------

@@ -34,6 +34,7 @@ class Resection(Mechanism):
         raise NotTestableError("what was taken out is looked for as 'cavity', which empties the same elements")
 
     def detail(self) -> str:
+        """What the sentence leaves open, for people to read."""
         return f" It is the element set '{self.elements}'; the wall of the cavity is free."
 
     @classmethod
