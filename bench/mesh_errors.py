@@ -2,7 +2,8 @@
 
     python bench/mesh_errors.py 0529 0603 --meshes FOLDER   # writes results/mesh_errors.csv; some minutes a case
 
-Each case as declared, and under a weight that nothing carries, on its own mesh. The limit of a mesh is where one and
+Each case as declared, under a weight that nothing carries, and with what acts on the wall of the cavity alone, on its
+own mesh. The limit of a mesh is where one and
 two refinements of it lead. Of points that move by a fifth of the farthest or more: the error relative to the
 displacement of each point; by how many times the change that a refinement makes it is explained best (`amount`), with a
 field that varies linearly over the body's radius (`shape`); and what is left, root mean square of a component. Beside
@@ -26,8 +27,11 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.gravity import Gravity
+from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.mechanisms.resection import Resection
+from warpbrain.physics.mechanisms.traction import Traction
 from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.recordings.location import locate
 from warpbrain.simulation.equilibrium import EquilibriumSolver
@@ -42,6 +46,8 @@ RESULTS = Path(__file__).resolve().parent / "results"
 COLUMNS = ("case", "load", "beside", "raw", "amount", "shape_x", "shape_y", "shape_z", "left", "left_95_percent")
 #: Points that move by less than this part of the farthest are left out: of nothing there is no relative error.
 FAR = 0.2
+#: What acts on the wall of the cavity, whose node set this is: pressure and traction [Pa], and the radius of that [m].
+CAVITY, PRESSURE, PULL, RADIUS = "resection", -300.0, 1000.0, 0.02
 
 
 def displacement(case: Case) -> Floats:
@@ -76,13 +82,35 @@ def explained(mesh: TetMesh, levels: list[Floats], limit: Floats) -> tuple[float
     return root_mean_square(error.ravel()), *fitted.tolist(), root_mean_square(left.ravel()), farthest
 
 
+def on_the_wall(whole: Case, resection: tuple[Mechanism, ...]) -> dict[str, tuple[Mechanism, ...]]:
+    """A pressure of the cavity, and pulls on two patches of its wall: farthest from what is held, and nearest to it."""
+    mesh, nodes = whole.remaining
+    wall = np.flatnonzero(whole.mesh.node_sets[CAVITY][nodes])
+    held = mesh.points[whole.mesh.node_sets["fixed"][nodes]]
+    away = np.linalg.norm(mesh.points[wall][:, None] - held, axis=2).min(axis=1)
+    loads: dict[str, tuple[Mechanism, ...]] = {"a pressure": (*resection, Pressure(nodes=CAVITY, value=PRESSURE))}
+    # half a radius away or more: nearer the patch would pull at what is held
+    free = away > RADIUS / 2.0
+    ends = {
+        "a pull far from what is held": wall[np.argmax(away)],
+        "a pull near to it": wall[free][np.argmin(away[free])],
+    }
+    for load, node in ends.items():
+        inwards = mesh.points.mean(axis=0) - mesh.points[node]
+        pull = PULL * inwards / np.linalg.norm(inwards)
+        centre, value = tuple(mesh.points[node].tolist()), tuple(pull.tolist())
+        loads[load] = (*resection, Traction(centre=centre, value=value, radius=RADIUS))
+    return loads
+
+
 def measured(name: str, meshes: Path) -> list[dict[str, str]]:
     """Rows of the table by `COLUMNS`: of a case under each load, beside each limit."""
     whole = replace(find_case(name), recordings=())
     resection = tuple(mechanism for mechanism in whole.mechanisms if isinstance(mechanism, Resection))
     weight = (*resection, Gravity(direction=(0.0, -1.0, 0.0), density=300.0))
+    loads = {"as declared": whole.mechanisms, "a weight": weight, **on_the_wall(whole, resection)}
     another, amount, rows = truth_mesh(name, meshes), belief("mesh.amount"), []
-    for load, mechanisms in (("as declared", whole.mechanisms), ("a weight", weight)):
+    for load, mechanisms in loads.items():
         case = replace(whole, mechanisms=mechanisms)
         mesh, levels = refinement(case, 2)
         other, of_other = refinement(replace(case, mesh=another), 1)

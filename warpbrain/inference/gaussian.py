@@ -48,11 +48,15 @@ class _Noise:
 class _Spectrum:
     """Eigenvalues (q,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, q): the same at all scales.
 
+    Those of columns that are not zero.
+
     `factor` (n, n): `L`. `whitened` (n, q): `W`.
     """
 
     def __init__(self, factor: Floats, whitened: Floats) -> None:
         self._factor = factor
+        # columns that change nothing would only be work
+        whitened = whitened[:, whitened.any(axis=0)]
         values, vectors = np.linalg.eigh(whitened.T @ whitened)
         self.values, self.directions = np.maximum(values, 0.0), whitened @ vectors
         if np.finfo(np.float64).eps * values.max(initial=0.0) > _ROUNDED:
