@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from sinking_block import OPTIONS, write_sinking
 
-from warpbrain.inference.beliefs import belief
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.fitting import FitSearch, Fitter
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
@@ -150,12 +149,13 @@ def test_a_fit_takes_the_most_probable_size(sets):
 
     alone = {size: fit(size, (size,)) for size in effect.sizes}
     best = max(alone, key=lambda size: alone[size].log_evidence)
-    expected, unreached = alone[best].log_evidence, belief("fits.trust") * alone[best].unreached
+    expected = alone[best].log_evidence
     assert expected > alone[effect.size].log_evidence + 5.0
     for start in (effect.size, 0.4 * effect.size):
         free = fit(start, effect.sizes)
         assert free.effects[0].size == pytest.approx(best)
-        assert free.log_evidence == pytest.approx(expected, abs=0.1 + unreached)
+        # a size of the stiffness field is kept that is about as probable as others
+        assert free.log_evidence == pytest.approx(expected, abs=1.0)
 
 
 def test_a_fit_of_nothing_that_acts_may_begin_at_one_of_more(sets):
