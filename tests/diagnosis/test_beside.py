@@ -15,20 +15,17 @@ from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.mechanisms.traction import Traction
 
 
-def pressed_with(pressure: float, folder: Path) -> Case:
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory: pytest.TempPathFactory) -> Case:
     """A block that sinks and is pressed from a side, a node set that touches what is held.
 
     It is pulled at its top by a load that is declared: that tells how stiff it is, without which a smooth force of any
     size explains all that acts on softer tissue.
     """
     known = Traction(value=(400.0, 0.0, 300.0), centre=(0.03, 0.03, 0.06), radius=0.025)
-    case = write_sinking(folder / "case", (Pressure(value=pressure, nodes="side"), known))
+    pushed = Pressure(value=150.0, nodes="side")
+    case = write_sinking(Path(tmp_path_factory.mktemp("pressed")) / "case", (pushed, known))
     return replace(case, mechanisms=(known,))
-
-
-@pytest.fixture(scope="module")
-def pressed(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    return pressed_with(150.0, tmp_path_factory.mktemp("pressed"))
 
 
 def test_one_is_found_with_its_size(small_diagnosis: Diagnosis) -> None:
@@ -72,9 +69,9 @@ def test_a_pressure_on_a_set_that_touches_what_is_held_is_named_beside_it(
     assert abs(value.value - 150.0) < 4.0 * value.sd
 
 
-def test_what_no_mechanism_explains_gets_no_name_beside_one(tmp_path: Path) -> None:
+def test_what_no_mechanism_explains_gets_no_name_beside_one(pressed: Case) -> None:
     options = replace(OPTIONS, candidates=("gravity", "swelling", "falx"))
-    found = Diagnosing(pressed_with(200.0, tmp_path), options, "cpu").run()
+    found = Diagnosing(pressed, options, "cpu").run()
     assert [one.kind for one in found.named] == ["gravity"]
     assert found.verdict == NAMED_AND_REST
     assert found.unknown is not None

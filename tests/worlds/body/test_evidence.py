@@ -13,7 +13,6 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.evidence import Sizes, evidence_of, sizes_of
 from warpbrain.worlds.body.nuisances import FIELD, UNKNOWN_MESH, Nuisances
 from warpbrain.worlds.body.states import FieldSizes
-from warpbrain.worlds.body.support_rims import Rims
 
 FIELD_SIZES = np.array([0.25, 0.5, 1.0, 2.0])
 LOG_PRIOR = np.log([0.1, 0.2, 0.6, 0.1])
@@ -31,8 +30,9 @@ def base() -> Base:
         FIELD: 2.0 * random.normal(size=(120, 12)),
         UNKNOWN_MESH: 0.006 * 80.0 * relative,
     }
-    rims, field_sizes = Rims(np.zeros(0, dtype=np.int64), 0.0), FieldSizes(FIELD_SIZES, LOG_PRIOR)
-    nuisances = Nuisances(families, places[::4], 0.006, np.full(120, 80.0), relative, rims, field_sizes)
+    nuisances = Nuisances(
+        families, places[::4], 0.006, np.full(120, 80.0), relative, FieldSizes(FIELD_SIZES, LOG_PRIOR)
+    )
     model = GaussianModel(np.eye(120), nuisances.columns)
     points = tuple(np.arange(3 * k, 3 * k + 3) for k in range(40))
     sensors = SimpleNamespace(

@@ -84,8 +84,9 @@ class Base:
         at = self.at.with_sensors(sensors)
         effects = self.effects.over(at)
         theta, nuisances = self.state.hypothesis.theta, self.nuisances
-        known = nuisances.anchors, nuisances.fraction, nuisances.rims
-        return nuisances_at(at, self.states, theta, self.prior, effects, self.mesh_errors, *known), effects
+        return nuisances_at(
+            at, self.states, theta, self.prior, effects, self.mesh_errors, nuisances.anchors, nuisances.fraction
+        ), effects
 
     def at_points(self, points: Floats) -> tuple[Nuisances, Effects]:
         """The same of the displacement of other points (k, 3) [m]."""

@@ -24,7 +24,7 @@ from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses, modes_of_rows, with_courses
 from warpbrain.worlds.body.unknown import field_proposal
 
-UNKNOWN, RESISTANCE, IN_ONE_PLACE = "unknown", "resistance", "in one place"
+UNKNOWN, RESISTANCE = "unknown", "resistance"
 #: What each means, in a sentence.
 SENTENCES = {
     "registration": "Recordings and anatomy are registered wrongly.",
@@ -155,8 +155,7 @@ def unknown_effects(base: Base) -> tuple[Effect, ...]:
 
 def _unknown_cause(base: Base, effects: Sequence[Effect]) -> Cause:
     """Of `unknown_effects`."""
-    # what is in one place has an optimum of its own, to which no fit of a field leads
-    places = [Place(effect.columns, label=IN_ONE_PLACE if effect.is_placed else "") for effect in effects]
+    places = [Place(effect.columns) for effect in effects]
     # fields, and sources of each length, are as probable as others of their kind
     lengths = np.array([effect.proposed.radius if effect.is_placed else 0.0 for effect in effects])
     _, groups, counts = np.unique(lengths, return_inverse=True, return_counts=True)

@@ -44,17 +44,16 @@ class SetMarginal(Marginal):
 
 
 def evidence_of(
-    base: Base, columns: Floats, residual: Floats, sizes: Sizes, scale: float = 1.0, better: float = 0.0
+    base: Base, columns: Floats, residual: Floats, sizes: Sizes, scale: float = 1.0
 ) -> tuple[Floats, SetMarginal]:
     """Evidence of residuals, and the columns with the most probable sizes.
 
     `columns` (n, q): of nuisances and causes. `residual` (n,): less what is expected of the causes. `sizes`: near the
     most probable ones, where sums begin; the columns are of a stiffness field of the size in these. `scale`: a factor
-    on the noise near the most probable one. `better`: by how much [nats] another size must be more probable than one of
-    these to be taken for it. Returns the columns (n, q), and the marginal with these columns and the most probable
-    noise; its log evidence is the mean over all sizes.
+    on the noise near the most probable one. Returns the columns (n, q), and the marginal with these columns and the
+    most probable noise; its log evidence is the mean over all sizes.
     """
-    return _OverSizes(base, columns, residual, sizes, scale).summed(better)
+    return _OverSizes(base, columns, residual, sizes, scale).summed()
 
 
 def sizes_of(base: Base) -> Sizes:
@@ -88,16 +87,14 @@ class _OverSizes:
         self._summed: dict[Sizes, Summed] = {}
         self._with_mesh, self._with_field = cache(self._rows_with_mesh), cache(self._rows_with_field)
 
-    def summed(self, better: float) -> tuple[Floats, SetMarginal]:
+    def summed(self) -> tuple[Floats, SetMarginal]:
         """See `evidence_of`."""
         best, logs = self._first, {}
         for _ in range(_PASSES):
             before = best
             for axis in Sizes._fields:
                 logs[axis] = self._along(axis, best)
-                likely = int(np.argmax(logs[axis]))
-                if logs[axis][likely] > logs[axis][getattr(best, axis)] + better:
-                    best = best._replace(**{axis: likely})
+                best = best._replace(**{axis: int(np.argmax(logs[axis]))})
             if best == before:
                 break
         base, columns = self._base, self._columns_at(best)

@@ -28,8 +28,7 @@ from warpbrain.worlds.body.nuisances import (
 )
 from warpbrain.worlds.body.sensors import Sensors
 from warpbrain.worlds.body.shapes import columns_of_other_shapes
-from warpbrain.worlds.body.states import SolvedState
-from warpbrain.worlds.body.support_rims import rim_columns
+from warpbrain.worlds.body.states import SolvedState, States
 from warpbrain.worlds.body.weighted_set import MeshShare, Refit
 
 
@@ -130,7 +129,7 @@ def with_shapes_about(fit: Refit, nuisances: Nuisances, sensors: Sensors, base: 
         at = fit.state.linearised(sensors)
     except SolveError:
         return columns
-    columns[:, nuisances.shapes] = shape_columns_about(at, fit.effects, fit.coefficients, base)
+    columns[:, nuisances.shapes] = shape_columns_about(at, fit.effects, fit.coefficients, base.states)
     return columns
 
 
@@ -138,19 +137,16 @@ def shape_columns_about(
     at: Linearisation,
     effects: Sequence[Effect],
     coefficients: Sequence[Floats],
-    base: Base,
+    states: States,
 ) -> Floats:
     """Columns (n, k) of the shape of laws and of mechanisms about a state with effects that have these coefficients.
-
-    And of the rims of supports: see `Nuisances.shapes`.
 
     What a law's does is next to nothing where strains are small: about the base, which nothing but declared loads
     deforms. It is not where a mechanism strains tissue by half, and would be taken for a cause. The column of a
     `SharedParameter` is zero.
     """
-    relaxed, columns = relaxation_factor(effects, coefficients, at.sensors), law_columns(Effects(at), base.states)
+    relaxed, columns = relaxation_factor(effects, coefficients, at.sensors), law_columns(Effects(at), states)
     # branches are isochoric: what another bulk modulus does is the same at all times, as far as tissue hardly gives way
     columns[:, ISOCHORIC] *= relaxed
     columns[:, [each.column for each in map(shared_parameter, effects) if each is not None]] = 0.0
-    of_mechanisms = columns_of_other_shapes(at, effects, coefficients)
-    return np.hstack([columns, of_mechanisms, rim_columns(at, base.nuisances.rims)])
+    return np.hstack([columns, columns_of_other_shapes(at, effects, coefficients)])

@@ -61,8 +61,7 @@ _MATTERS = 0.3
 #: Change of the columns of laws that is none [standard deviations of the noise, all sensors together].
 _UNSEEN = 1e-3
 #: How often the sizes of effects are looked at anew, and by how much [nats] the linear model must say that others are
-#: better, of the mesh's error and of the stiffness field, too, or fits would go back and forth between sizes that are
-#: about as probable: by more than a sum over a few sizes is larger than the largest of its terms.
+#: better: by more than a sum over a few sizes is larger than the largest of its terms.
 _RESIZED, _BETTER = 4, 2.0
 #: How often at most a search goes on with laws, error of the mesh, gross errors and noise of its result.
 _ROUNDS = 8
@@ -264,8 +263,6 @@ class FitSearch:
         self._U, self.columns = scaled(self._U, factor), scaled(self.columns, factor)
         field = self._layout.field_of_nonlinear
         self._solved = [(np.where(field, at / factor, at), u) for at, u in self._solved]
-        # what shapes do from here on undoes nothing: the objective is another one
-        self._shape_change = np.zeros_like(self._shape_change)
         self._renew(self.residual)
 
     def update_mesh_share(self, known: MeshErrors, finer: FinerStates) -> None:
@@ -315,8 +312,7 @@ class FitSearch:
         """The fit at its best point."""
         q = self._U.shape[1]
         linear = self.residual + self.columns @ self.z
-        known = self._marginal
-        columns, evidence = evidence_of(self._base, self.columns, linear, known.sizes, known.scale, _BETTER)
+        columns, evidence = evidence_of(self._base, self.columns, linear, self._marginal.sizes, self._marginal.scale)
         nuisances = self._base.nuisances
         of_field = self._layout.field_size / nuisances.field_sizes.relative[evidence.sizes.field]
         part, z = nuisances.part(UNKNOWN_MESH), nuisances.with_field(self.z[None], of_field)[0]
@@ -352,7 +348,7 @@ class FitSearch:
         part, before = self._layout.shapes, self._U[:, self._layout.shapes]
         if self._about is not None:
             at, coefficients = self._about
-            self._shapes = shape_columns_about(at, self.effects, coefficients, self._base)
+            self._shapes = shape_columns_about(at, self.effects, coefficients, self._base.states)
             self._about = None
             change = self._base.model.whitened(self._shapes - before)
             # about the same point they are the same but for rounding, which undoes nothing

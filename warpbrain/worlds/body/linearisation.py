@@ -51,8 +51,6 @@ _GROWTH = 1e-4
 #: Columns that one thread computes at a time at most: of dense forces, of which products with fewer spend most of their
 #: time on copies of the compliance, and of sparse ones; few of these are in so many parts.
 _TOGETHER, _TOGETHER_SPARSE, _PARTS = 256, 128, 16
-#: Nodes that are let go at a time, each alone, three columns each.
-_TOGETHER_LOOSE = 64
 #: Part of sparse forces that is not zero above which a dense product is faster.
 _DENSE = 0.1
 
@@ -315,36 +313,6 @@ class Linearisation:
         moved = (surface if further is None else surface.with_further(further)).moved(patch, lifts)
         loose = np.flatnonzero(moved)
         return np.asarray(self._surface_responses[key][:, loose] @ moved[loose])
-
-    def own_give(self, nodes: Ints) -> Floats:
-        """Displacement (k, 3) [m] of held nodes (k,), each let go where all others are held, free ones too.
-
-        A third to three quarters of what it is where free ones are not. Zero of nodes that are free in any component.
-        """
-        parts = 3 * nodes[:, None] + np.arange(3)
-        held = ~self.free[parts].any(axis=1)
-        own = np.array([self.stiffness[part][:, part].toarray() for part in parts[held]]).reshape(-1, 3, 3)
-        give = np.zeros((len(nodes), 3))
-        give[held] = np.linalg.solve(own, -self.reactions[nodes[held], :, None])[:, :, 0]
-        return give
-
-    def released_each(self, nodes: Ints) -> Floats:
-        """Change (n, k) of what is recorded if each of some held nodes (k,) alone is let go, to first order."""
-        responses = [self._released_each(nodes[k : k + _TOGETHER_LOOSE]) for k in range(0, len(nodes), _TOGETHER_LOOSE)]
-        return np.hstack([np.zeros((len(self.sensors), 0)), *responses])
-
-    def _released_each(self, nodes: Ints) -> Floats:
-        """The same of a few nodes, all at a time."""
-        count, parts = len(nodes), (3 * nodes[:, None] + np.arange(3)).ravel()
-        by_component = np.zeros((len(self.free), len(parts)))
-        by_component[parts, np.arange(len(parts))] = 1.0
-        by_component[self.free] = -self.factors.solve(self.stiffness[self.free][:, parts])
-        forces = (self.stiffness @ by_component).reshape(-1, 3, count, 3)
-        give = np.linalg.solve(forces[nodes, :, np.arange(count)], -self.reactions[nodes, :, None])[:, :, 0]
-        du = np.einsum("nka,ka->nk", by_component.reshape(-1, count, 3), give)
-        return np.asarray(
-            self.sensors.by_displacement @ du + self.sensors.by_reactions @ self._reactions_at(du, np.zeros(du.shape))
-        )
 
     def _surface(self, key: bytes, held: Bools) -> HeldSurface:
         """A held surface with the responses of the sensors to it, made once."""

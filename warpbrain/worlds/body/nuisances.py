@@ -1,8 +1,7 @@
 """Nuisances, which may explain residuals without any missing physics: columns over the sensors, one per coordinate.
 
 Tissue (its prior), stiffness that varies within it, compressibility, the shape of its law, how large the known loads
-were, a rigid error of registration, where supports end, and the error of the mesh. A cause is credited only with what
-these cannot explain.
+were, a rigid error of registration, and the error of the mesh. A cause is credited only with what these cannot explain.
 """
 
 from __future__ import annotations
@@ -30,7 +29,6 @@ from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.states import FieldSizes, Hypothesis, States
-from warpbrain.worlds.body.support_rims import Rims, rim_columns
 
 #: The family of what is not known of the shape of tissues' laws.
 LAW = "shape of the law"
@@ -45,8 +43,6 @@ UNKNOWN_MESH, MESH_SHARE = "mesh, unknown", "mesh, of mechanisms"
 #: The family of what is not known of the shape of mechanisms in one place, which only fits have; the number of
 #: mechanisms, and of modes of each: two other radii, and a neighbouring place to both sides along each axis.
 SHAPES, SHAPED_EFFECTS, SHAPE_MODES = "shape of mechanisms", 3, 8
-#: The family of what is not known of where supports end.
-RIMS = "rims of supports"
 #: Exponent of what stiffens in both directions.
 _STIFFENS = 8.0
 #: Step of a difference in `theta`.
@@ -63,7 +59,6 @@ class Nuisances:
     fraction: float  # that part, relative to the displacement
     displacement: Floats  # (n,), of the state at each row [m]; zero of forces
     relative: Floats  # (n, k), columns of that part if it were as large as a displacement of 1 m
-    rims: Rims
     field_sizes: FieldSizes  # of which the typical one is that of the stiffness field's family
 
     @property
@@ -97,8 +92,8 @@ class Nuisances:
 
     @property
     def shapes(self) -> Ints:
-        """Where the columns of the shapes of laws and of mechanisms are, and those of the rims of supports."""
-        return np.r_[self.part(LAW), self.part(SHAPES), self.part(RIMS)]
+        """Where the columns of the shapes of laws and of mechanisms are."""
+        return np.r_[self.part(LAW), self.part(SHAPES)]
 
     def without_shapes_of(self, number: int, columns: Floats) -> Floats:
         """Columns (n, q + k), or coordinates (1, q + k), without the shape of one of some mechanisms."""
@@ -136,7 +131,6 @@ def nuisances_at(
     mesh_errors: MeshErrors | None,
     anchors: Floats | None = None,
     fraction: float | None = None,
-    rims: Rims | None = None,
 ) -> Nuisances:
     """The nuisances of a state.
 
@@ -146,7 +140,6 @@ def nuisances_at(
     `mesh_errors`: the state on a finer mesh less the state; None: the mesh is taken for exact.
     `anchors` (a, 3): those of other sensors, so that columns mean the same.
     `fraction`: unknown part of the mesh's error, relative to the displacement; the largest that is believed by default.
-    `rims`: those of other sensors; those of the state by default.
     """
     if fraction is None:
         fraction = float(beliefs("mesh.unknown").max())
@@ -154,7 +147,6 @@ def nuisances_at(
     if anchors is None:
         places = sensors.positions[sensors.is_displacement]
         anchors = places[spread_points(places, belief("mesh.alike") * sensors.radius, 60)]
-    rims = rims or Rims.of(at)
     families = {
         "tissue": tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors),
         FIELD: field_columns(at, states),
@@ -162,7 +154,6 @@ def nuisances_at(
         "known loads": load_columns(at),
         "registration": sensors.rigid * registration_of(states.case).deviations,
         SHAPES: np.zeros((len(sensors), SHAPED_EFFECTS * SHAPE_MODES)),
-        RIMS: rim_columns(at, rims),
     }
     if mesh_errors is not None:
         error = mesh_errors.error
@@ -171,7 +162,7 @@ def nuisances_at(
         families[MESH_SHARE] = np.zeros((len(sensors), 1))
     displacement, relative = _displacement(at), _alike(sensors, anchors)
     families[UNKNOWN_MESH] = fraction * displacement[:, None] * relative
-    return Nuisances(families, anchors, fraction, displacement, relative, rims, states.field_sizes)
+    return Nuisances(families, anchors, fraction, displacement, relative, states.field_sizes)
 
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:

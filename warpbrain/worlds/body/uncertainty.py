@@ -156,5 +156,5 @@ def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
         columns[:, layout.effects[number]] = effect.columns
     columns, at = columns_about(replace(state, sensors=nodes), z, columns, layout, over_nodes, base, None, None)
     coefficients = [z[part] for part in layout.effects]
-    columns[:, layout.shapes] = shape_columns_about(at, over_nodes, coefficients, base)
+    columns[:, layout.shapes] = shape_columns_about(at, over_nodes, coefficients, base.states)
     return columns
