@@ -2,11 +2,11 @@
 
     python bench/mesh_errors.py 0529 0603 --meshes FOLDER   # writes results/mesh_errors.csv; some minutes a case
 
-Each case as declared, under a weight that nothing carries, and with what acts on the wall of the cavity alone, on its
-own mesh. The limit of a mesh is where one and
-two refinements of it lead. Of points that move by a fifth of the farthest or more: the error relative to the
-displacement of each point; by how many times the change that a refinement makes it is explained best (`amount`), with a
-field that varies linearly over the body's radius (`shape`); and what is left, root mean square of a component. Beside
+Each case as declared, under a weight that nothing carries, and with a load on the wall of the cavity alone, on its own
+mesh. The limit of a mesh is where one and two refinements of it lead. Of points that move by a fifth of the farthest or
+more: the error relative to the displacement of each point; by how many times the change that a refinement makes it is
+explained best (`amount`), with a field that varies linearly over the body's radius (`shape`); and what is left, root
+mean square of a component. Beside
 it the limit of *another* mesh of the same anatomy, that of the concealed truths (15,000 nodes or more; made if FOLDER
 lacks it, which needs `pip install 'warpbrain[build]'`): its surface lies elsewhere, too.
 """
@@ -46,7 +46,7 @@ RESULTS = Path(__file__).resolve().parent / "results"
 COLUMNS = ("case", "load", "beside", "raw", "amount", "shape_x", "shape_y", "shape_z", "left", "left_95_percent")
 #: Points that move by less than this part of the farthest are left out: of nothing there is no relative error.
 FAR = 0.2
-#: What acts on the wall of the cavity, whose node set this is: pressure and traction [Pa], and the radius of that [m].
+#: Node set of the wall of the cavity; pressure and traction on it [Pa], and the radius of the traction's patch [m].
 CAVITY, PRESSURE, PULL, RADIUS = "resection", -300.0, 1000.0, 0.02
 
 
@@ -83,7 +83,10 @@ def explained(mesh: TetMesh, levels: list[Floats], limit: Floats) -> tuple[float
 
 
 def on_the_wall(whole: Case, resection: tuple[Mechanism, ...]) -> dict[str, tuple[Mechanism, ...]]:
-    """A pressure of the cavity, and pulls on two patches of its wall: farthest from what is held, and nearest to it."""
+    """Mechanisms by the name of a load: a pressure in the cavity, and tractions on two patches of its wall.
+
+    One patch is the farthest from what is held, the other the nearest to it.
+    """
     mesh, nodes = whole.remaining
     wall = np.flatnonzero(whole.mesh.node_sets[CAVITY][nodes])
     held = mesh.points[whole.mesh.node_sets["fixed"][nodes]]

@@ -53,6 +53,10 @@ class Blur:
         arm = points + displacement - middle
         return displacement + np.asarray(self.shift) + arm @ _rotation(np.asarray(self.rotation)).T - arm
 
+    def seen(self, points: Floats, displacement: Floats, middle: Floats) -> Floats:
+        """Displacement (k, 3) [m] of points (k, 3) as it is published: misaligned about the middle, with noise."""
+        return self.misaligned(points, displacement, middle) + self.noise(points)
+
     def noise(self, points: Floats) -> Floats:
         """Noise (k, 3) [m] at points (k, 3)."""
         random = np.random.default_rng(self.seed)

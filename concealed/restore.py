@@ -1,9 +1,9 @@
 """Restore stand-ins whose truths were opened: ``python -m concealed.restore FOLDER`` writes the case of each.
 
-What is kept of a stand-in is its sealed truth, with the exact motion of the observed points. Its recordings are made
-again of that without the fine mesh, whose middle the rotation of a badly registered head is about: that of the mesh
-that ships stands for it, which moves a recording as a whole by hundredths of a millimetre. Opened cases are data for
-development: nothing that is measured on them is proof.
+A sealed truth has the displacement of the observed points without noise, so its recordings can be made again without
+the fine mesh. The error of registration turns the head about the middle of that mesh; the middle of the mesh that ships
+is taken instead, which shifts a whole recording by hundredths of a millimetre. Opened cases are data for development:
+nothing that is measured on them is proof.
 """
 
 from __future__ import annotations
@@ -26,32 +26,49 @@ SHARED = ("multi.vtu", "single.vtu", "meshes.json")
 
 
 def opened() -> dict[str, Path]:
-    """Sealed truths that were opened after their diagnoses, by the name of each: its set, and its own in that."""
-    found = {}
+    """Files of sealed truths that were opened after the diagnosis, by name: number of the set, name of the truth."""
+    files = {}
     for folder in sorted((ROOT / "bench" / "results").glob("stand_ins_sealed*")):
         for file in sorted(folder.rglob("*.json.gz")):
             own = file.parent.name if file.parent != folder else file.name.removesuffix(".json.gz")
-            found[f"{folder.name.removeprefix('stand_ins_sealed').lstrip('_') or '1'}-{own}"] = file
-    return found
+            files[f"{folder.name.removeprefix('stand_ins_sealed').lstrip('_') or '1'}-{own}"] = file
+    return files
 
 
 def restore(truth: Path, folder: Path) -> Path:
-    """Write the case of a sealed truth into a folder of its name within another one, which is returned."""
+    """Write the case of a sealed truth.
+
+    Parameters
+    ----------
+    truth : Path
+        File of the sealed truth.
+    folder : Path
+        In which the folder of the case is made.
+
+    Returns
+    -------
+    Path
+        Folder of the case.
+
+    Raises
+    ------
+    ValueError
+        If the file holds no sealed truth.
+    """
     sealed = read_sealed(truth)
     data = open_sealed(sealed)
     case = folder / str(data["case"])
     case.mkdir(parents=True, exist_ok=True)
     for name in SHARED:
         shutil.copy(CASES / case.name / name, case / name)
-    box = read_mesh(case / "multi.vtu", unit="mm").points
+    nodes = read_mesh(case / "multi.vtu", unit="mm").points
     observed = [data["observed"][wall] for wall in WALLS]
     points, exact = (np.vstack([wall[key] for wall in observed]) for key in ("point_m", "displacement_m"))
-    made = read_truth(data)
-    blur, middle = made.drawn.blur, 0.5 * (box.min(axis=0) + box.max(axis=0))
-    seen = blur.misaligned(points, exact, middle) + blur.noise(points)
+    opened_truth = read_truth(data)
+    seen = opened_truth.drawn.blur.seen(points, exact, 0.5 * (nodes.min(axis=0) + nodes.max(axis=0)))
     first = len(observed[0]["point_m"])
     walls = [(points[:first], seen[:first]), (points[first:], seen[first:])]
-    publish(case, made.declared_level, walls, fingerprint(sealed))
+    publish(case, opened_truth.declared_level, walls, fingerprint(sealed))
     return case
 
 

@@ -47,8 +47,7 @@ class Trial:
         """Displacement [m] of the observed points of both walls as it is seen."""
         exact = np.concatenate(self.exact(strength, level, still))
         points = self.body.mesh.points[np.concatenate(self.nodes)]
-        blur = self.drawn.blur
-        seen = blur.misaligned(points, exact, self._middle) + blur.noise(points)
+        seen = self.drawn.blur.seen(points, exact, self._middle)
         return seen[: len(self.nodes[0])], seen[len(self.nodes[0]) :]
 
     def motion(self, strength: float, level: float) -> tuple[float, float]:

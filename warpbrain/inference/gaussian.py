@@ -46,16 +46,13 @@ class _Noise:
 
 
 class _Spectrum:
-    """Eigenvalues (q,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, q): the same at all scales.
+    """Eigenvalues (k,) of `W^T W`, `W = L^-1 U`, and `W` times its eigenvectors (n, k): the same at all scales.
 
-    Those of columns that are not zero.
-
-    `factor` (n, n): `L`. `whitened` (n, q): `W`.
+    `W` without the columns that are zero, whose eigenvalues are. `factor` (n, n): `L`. `whitened` (n, q): with them.
     """
 
     def __init__(self, factor: Floats, whitened: Floats) -> None:
         self._factor = factor
-        # columns that change nothing would only be work
         whitened = whitened[:, whitened.any(axis=0)]
         values, vectors = np.linalg.eigh(whitened.T @ whitened)
         self.values, self.directions = np.maximum(values, 0.0), whitened @ vectors
@@ -69,7 +66,7 @@ class _Spectrum:
 
     @cached_property
     def dual(self) -> Floats:
-        """`L^-T` times the directions (n, q)."""
+        """`L^-T` times the directions (n, k)."""
         from scipy.linalg import solve_triangular
 
         return np.asarray(solve_triangular(self._factor, self.directions, lower=True, trans="T", check_finite=False))
@@ -80,9 +77,9 @@ class WhiteRows:
     """Rows in coordinates in which the noise alone is `N(0, I)`, apart from its scale."""
 
     rows: Floats  # (n,), or (b, n) one after the other
-    projected: Floats  # (q,) or (b, q), `W V`: on the directions
-    values: Floats  # (q,), of the spectrum
-    directions: Floats  # (n, q)
+    projected: Floats  # (k,) or (b, k), `W V`: on the directions
+    values: Floats  # (k,), of the spectrum
+    directions: Floats  # (n, k)
 
     def __getitem__(self, numbers: Any) -> WhiteRows:
         return WhiteRows(self.rows[numbers], self.projected[numbers], self.values, self.directions)
@@ -96,7 +93,7 @@ class WhiteRows:
         return np.asarray(result)
 
     def weights(self, scale: float) -> Floats:
-        """`w` (q,), with which products at a scale are `(x . y - sum_j w_j p_j q_j) / scale^2`, `p` and `q` projected.
+        """`w` (k,), with which products at a scale are `(x . y - sum_j w_j p_j q_j) / scale^2`, `p` and `q` projected.
 
         They are those of standardised rows but for rounding, which is relative to products of white ones.
         """
@@ -165,7 +162,7 @@ class GaussianModel:
 
     @cached_property
     def low_rank(self) -> Floats:
-        """`Y` (q, n), with which `S^-1 = (L L^T)^-1 / kappa^2 - Y^T Y`."""
+        """`Y` (k, n), with which `S^-1 = (L L^T)^-1 / kappa^2 - Y^T Y`."""
         weights = 1.0 / (self.scale * np.sqrt(self.scale**2 + self._spectrum.values))
         return np.asarray(self._spectrum.dual.T * weights[:, None])
 

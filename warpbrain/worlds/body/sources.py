@@ -26,7 +26,7 @@ from warpbrain.worlds.body.unknown import (
     gaussians,
     root_mean_square,
     stress_patches,
-    unit_stresses,
+    unit_stresses_of,
 )
 
 #: Columns are components, as of `unit_stresses`, of five deviatoric stresses and of an isotropic one, all of unit
@@ -53,18 +53,12 @@ class Source(UnknownLoad):
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         assert isinstance(mesh, TetMesh), "a diagnosis has linear elements"
         if self.stress:
-            of_elements = np.tensordot(np.array(self.stress), _unit_stresses_of(mesh), axes=1)
+            of_elements = np.tensordot(np.array(self.stress), unit_stresses_of(mesh), axes=1)
             heights = _heights_at(mesh, self.centre, self.length)
             return np.asarray(-summed_at_nodes(mesh, heights[:, None, None] * of_elements))
         arms = (mesh.points - np.array(self.centre)) / self.length
         forces = np.array(self.force) + np.cross(np.array(self.turn), arms)
         return np.asarray(_shares_at(mesh, self.centre, self.length)[:, None] * forces)
-
-
-@lru_cache(maxsize=2)
-def _unit_stresses_of(mesh: TetMesh) -> Floats:
-    """`unit_stresses` of a mesh: a fit and a scan ask for them hundreds of times, of it and of a finer one."""
-    return unit_stresses(mesh.points[mesh.tetrahedra])
 
 
 @lru_cache(maxsize=_KEPT)

@@ -203,9 +203,7 @@ def eigenstresses(at: Linearisation, length: float) -> Field:
 
     def forces(mesh: TetMesh, coefficients: Floats) -> Floats:
         heights, shape = gaussians(mesh.centres, sites, length), (len(mesh.points), len(mesh.tetrahedra))
-        by_component = zip(
-            unit_stresses(mesh.points[mesh.tetrahedra]), coefficients.reshape(6, len(sites), -1), strict=True
-        )
+        by_component = zip(unit_stresses_of(mesh), coefficients.reshape(6, len(sites), -1), strict=True)
         total = np.zeros((3 * shape[0], coefficients.shape[1]))
         for of_unit, of_sites in by_component:
             total -= gathered(mesh.tetrahedra, of_unit, np.arange(shape[1]), shape) @ (heights @ of_sites)
@@ -287,6 +285,11 @@ def stress_patches(at: Linearisation, points: Floats, sites: Floats, length: flo
     weights = gaussians(at.system.model.mesh.centres, sites, length)
     forces = unit_stresses(points[at.system.tetrahedra])
     return at.answers_of_components(forces, weights).reshape(len(at.sensors), -1)
+
+
+def unit_stresses_of(mesh: TetMesh) -> Floats:
+    """`unit_stresses` [N/Pa] of the elements of a mesh at rest (6, m, 4, 3), computed once for it."""
+    return np.asarray(mesh.made_once("unit stresses", lambda: unit_stresses(mesh.points[mesh.tetrahedra])))
 
 
 def unit_stresses(corners: Floats) -> Floats:
