@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpbrain.mesh import TetMesh, boundary_faces, node_areas, split_boundary
+from warpbrain.mesh import QuadraticMesh, TetMesh, boundary_faces, node_areas, split_boundary
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -33,6 +34,11 @@ class Body:
     cavity: Ints
     ventricle: Ints
     cortex: Ints
+
+    @cached_property
+    def quadratic(self) -> QuadraticMesh:
+        """The mesh with midside nodes, on which equilibrium is found; nodes of `mesh` come first."""
+        return QuadraticMesh(self.mesh)
 
     @property
     def centroids(self) -> Floats:

@@ -32,7 +32,7 @@ class Effect:
     strength: float
 
     def forces(self, body: Body, points: Floats) -> Floats:
-        """Nodal forces [N], shape (n, 3), with the nodes at `points` (n, 3) [m]."""
+        """Nodal forces [N], shape (N, 3), with the nodes of `body.quadratic` at `points` (N, 3) [m]."""
         return np.zeros_like(points)
 
     def log_stiffness(self, body: Body) -> Floats:

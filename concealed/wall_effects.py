@@ -7,19 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from concealed.body import Body, Floats, Ints
+from concealed.body import Body, Floats
 from concealed.effect import Effect, bell
-from warpbrain.mesh import face_vectors, node_areas
-
-
-def pressure_forces(points: Floats, faces: Ints, pressure: float) -> Floats:
-    """Nodal forces [N], shape (n, 3), of a pressure [Pa] that pushes against the outward side of faces (f, 3).
-
-    Exact for linear triangles: each corner carries a third of ``-pressure * area vector``.
-    """
-    forces = np.zeros_like(points)
-    np.add.at(forces, faces.ravel(), np.repeat(-pressure / 3.0 * face_vectors(points, faces), 3, axis=0))
-    return forces
+from concealed.face_loads import pressure_forces, traction_forces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +22,7 @@ class CavityPressure(Effect):
     follows: ClassVar[bool] = True
 
     def forces(self, body: Body, points: Floats) -> Floats:
-        return pressure_forces(points, body.cavity, self.strength)
+        return pressure_forces(points, body.quadratic.six_nodes(body.cavity), self.strength)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +35,7 @@ class VentricularPressure(Effect):
     follows: ClassVar[bool] = True
 
     def forces(self, body: Body, points: Floats) -> Floats:
-        return pressure_forces(points, body.ventricle, self.strength)
+        return pressure_forces(points, body.quadratic.six_nodes(body.ventricle), self.strength)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +63,9 @@ class WallTraction(Effect):
     direction: tuple[float, float, float]
 
     def forces(self, body: Body, points: Floats) -> Floats:
-        rest = body.mesh.points
-        faces = body.cavity if self.wall == "cavity" else body.cortex
-        share = node_areas(rest, faces) * bell(rest, self.centre, self.radius)
-        return self.strength * share[:, None] * np.asarray(self.direction)
+        faces = body.quadratic.six_nodes(body.cavity if self.wall == "cavity" else body.cortex)
+
+        def traction(places: Floats) -> Floats:
+            return self.strength * bell(places, self.centre, self.radius)[:, None] * np.asarray(self.direction)
+
+        return traction_forces(body.quadratic.points, faces, traction)

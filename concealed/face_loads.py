@@ -1,0 +1,58 @@
+"""Loads on the faces of quadratic tetrahedra, six nodes each, as nodal forces.
+
+Integrals over a face with the rule of six points that is exact to degree 4 (Dunavant 1985).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from concealed.body import Floats, Ints
+
+_A, _B = 0.445948490915965, 0.091576213509771
+_WEIGHTS = 0.5 * np.repeat([0.223381589678011, 0.109951743655322], 3)
+_POINTS = np.array([[1.0 - 2.0 * each if i == j else each for j in range(3)] for each in (_A, _B) for i in range(3)])
+#: Corners at the ends of the sides that midside nodes are in the middle of.
+_SIDES = np.array([[0, 1], [0, 2], [1, 2]])
+#: Derivatives of barycentric coordinates by the two that are independent.
+_INDEPENDENT = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+
+_VALUES = np.concatenate([_POINTS * (2.0 * _POINTS - 1.0), 4.0 * _POINTS[:, _SIDES].prod(axis=2)], axis=1)
+_OF_CORNERS = (4.0 * _POINTS - 1.0)[:, :, None] * _INDEPENDENT
+_OF_MIDDLES = 4.0 * sum(_POINTS[:, _SIDES[:, i], None] * _INDEPENDENT[_SIDES[:, 1 - i]] for i in (0, 1))
+_DERIVATIVES = np.concatenate([_OF_CORNERS, _OF_MIDDLES], axis=1)
+
+
+def area_vectors(points: Floats, faces: Ints) -> Floats:
+    """Vectors of area [m2], outward, that belong to the six points of each face's rule: (f, 6, 3).
+
+    Parameters
+    ----------
+    points : (N, 3) array
+        Of all nodes [m].
+    faces : (f, 6) int array
+        Corners 0, 1, 2, then the middles of 01, 02 and 12.
+    """
+    along = np.einsum("qad,fax->dfqx", _DERIVATIVES, points[faces])
+    return _WEIGHTS[:, None] * np.cross(along[0], along[1])
+
+
+def pressure_forces(points: Floats, faces: Ints, pressure: float) -> Floats:
+    """Nodal forces [N], shape (N, 3), of a pressure [Pa] that pushes against the outward side of faces (f, 6)."""
+    return _summed(points, faces, -pressure * area_vectors(points, faces))
+
+
+def traction_forces(points: Floats, faces: Ints, traction: Callable[[Floats], Floats]) -> Floats:
+    """Nodal forces [N], shape (N, 3), of a traction [Pa] at points (k, 3) [m] of faces (f, 6)."""
+    places = np.einsum("qa,fax->fqx", _VALUES, points[faces])
+    areas = np.linalg.norm(area_vectors(points, faces), axis=2, keepdims=True)
+    return _summed(points, faces, areas * traction(places.reshape(-1, 3)).reshape(places.shape))
+
+
+def _summed(points: Floats, faces: Ints, of_points: Floats) -> Floats:
+    """Forces (f, 6, 3) at the points of the rule as forces on nodes (N, 3)."""
+    forces = np.zeros_like(points)
+    np.add.at(forces, faces, np.einsum("qa,fqx->fax", _VALUES, of_points))
+    return forces
