@@ -90,6 +90,15 @@ def test_before_something_has_no_name_the_likeliest_mechanism_is_fitted():
     assert following(nothing, unknown, fitted, less, expanded=[("viscoelasticity",)]) is None
 
 
+def test_before_a_group_with_something_without_a_name_mechanisms_that_may_be_as_probable_are_fitted():
+    nothing, unknown = weighted(0.0, fitted=True), weighted(60.0, "unknown", fitted=True)
+    known = {"expanded": [("pressure",), ("unknown",)]}
+    member = weighted(60.0, "pressure", fitted=True)
+    assert following(nothing, unknown, member, weighted(20.0, "traction"), **known) == ["traction"]
+    assert following(nothing, unknown, member, weighted(20.0, "traction", fitted=True), **known) is None
+    assert following(nothing, unknown, member, weighted(10.0, "traction"), **known) is None
+
+
 def test_a_named_mechanism_is_fitted_then_expanded_then_left():
     nothing = weighted(0.0, fitted=True)
     assert following(nothing, weighted(30.0, "pressure")) == ["pressure"]

@@ -15,7 +15,7 @@ import numpy as np
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.causes import Hypothesis
-from warpbrain.inference.decide import NAMED, NAMED_AND_REST, UNKNOWN, Decision, decide
+from warpbrain.inference.decide import GROUP, NAMED, NAMED_AND_REST, UNKNOWN, Decision, decide
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -133,20 +133,22 @@ def _unknown_not_fitted(
     a finite rigid rotation does to second order looks like an unknown force. Of any the likeliest set of mechanisms
     alone, and the likeliest single one with what may act beside it: sets with the unknown are many, and what a
     mechanism does that is far from linear, such as tissue that relaxes under another one's load, looks like one.
-    Of the unknown alone every single mechanism, too, that may be as probable once it is fitted.
+    Of the unknown alone, or of a group that it is in, every single mechanism, too, that may be as probable once it is
+    fitted.
     """
-    if decision.verdict != UNKNOWN and not (decision.verdict == NAMED_AND_REST and UNKNOWN in sets[0].names):
+    nameless = decision.verdict == UNKNOWN or (decision.verdict == GROUP and UNKNOWN in decision.causes)
+    if not nameless and not (decision.verdict == NAMED_AND_REST and UNKNOWN in sets[0].names):
         return None
     without_names = (candidate for candidate in sets if UNKNOWN in candidate.names and not candidate.mechanisms)
     likely = next((candidate.names for candidate in without_names), frozenset())
-    alone = (likely, likely - {UNKNOWN}) if decision.verdict == UNKNOWN else ()
+    alone = (likely, likely - {UNKNOWN}) if nameless else ()
     of_mechanisms = [s for s in sets if 0 < len(s.names) == len(s.mechanisms) and not s.failure]
     single = next((s for s in of_mechanisms if len(s.names) == 1), None)
     parts = (s for s in sets if s.names in alone or s is single or s in of_mechanisms[:1])
     part = next((part for part in parts if part.is_open), None)
     if part is None and single is not None and single.names not in expanded:
         part = single
-    if part is None and decision.verdict == UNKNOWN:
+    if part is None and nameless:
         singles = (s for s in sets if len(s.names) == 1 == len(s.mechanisms) and s.is_open)
         part = _first_that_may_be_best(singles, sets, belief("fits.part"))
     return part
