@@ -13,7 +13,7 @@ from concealed.body import Floats
 from concealed.draw import Drawn
 from concealed.effect import Effect, plain
 from concealed.observing import SIGMA, WALLS, Blur
-from concealed.settling import DENSITY, IMAGED_DOWN
+from concealed.settling import DENSITY, ELEMENTS, IMAGED_DOWN
 from concealed.support_effects import MisjudgedLevel, Slip, TurnedHead
 from concealed.tissue import Tissue
 from concealed.tissue_effects import Inclusion, Swelling
@@ -110,7 +110,7 @@ def write_truth(truth: Truth, trial: Trial, mesh: TetMesh) -> dict[str, Any]:
         "law": "two-term Ogden, uncoupled, mu_p/alpha_p convention",
         "blur": plain(asdict(truth.drawn.blur)),
         "declared_sigma_m": SIGMA,
-        "mesh": {**RECIPE, "made_nodes": len(mesh.points), "sha256": fingerprint(mesh)},
+        "mesh": {**RECIPE, "made_nodes": len(mesh.points), "elements": ELEMENTS, "sha256": fingerprint(mesh)},
         "observed": {
             wall: {"point_m": _rounded(points[nodes]), "displacement_m": _rounded(u)}
             for wall, nodes, u in zip(WALLS, trial.nodes, exact, strict=True)

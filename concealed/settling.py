@@ -28,7 +28,9 @@ STILL = 1e-6
 #: Enough while strengths are being looked for [m].
 NEARLY_STILL = 3e-5
 ROUNDS = 30
-OPTIONS = EquilibriumOptions(tolerance=1e-7, max_newton=20, max_total_newton=40)
+#: Elements of truths; `concealed.face_loads` is written for these.
+ELEMENTS = "tet10"
+OPTIONS = EquilibriumOptions(tolerance=1e-7, max_newton=30, max_total_newton=120)
 
 
 class Settler:
@@ -104,6 +106,6 @@ class Settler:
         if self._system is None or structure != self._structure:
             labels, materials = self._tissue.materials(body, stiffer, growth)
             mesh = TetMesh(body.mesh.points, body.mesh.tetrahedra, labels)
-            self._system = System(Model(mesh, materials, DENSITY, held, elements="tet10"))
+            self._system = System(Model(mesh, materials, DENSITY, held, elements=ELEMENTS))
             self._structure, self._last = structure, None
         return self._system
