@@ -80,7 +80,7 @@ def main(arguments: list[str] | None = None) -> int:
     for file in given.remake:
         try:
             difference = remade(file, given.meshes)
-        except ValueError as error:
+        except (OSError, ValueError) as error:
             parser.error(str(error))
         sound &= difference <= SAME
         print(f"{file}: motion found again differs by at most {1e6 * difference:.2f} micrometres", flush=True)

@@ -1,7 +1,7 @@
 """Equilibrium of the truth: gravity and every effect together, followers included.
 
-On quadratic tetrahedra. Linear ones of the same mesh lock: the wall of a cavity that is pulled at moves a quarter less
-far, and what smaller elements would change is most of what a diagnosis would see.
+On quadratic tetrahedra: linear ones lock, and smaller ones show a part of that alone (`bench/cavity_elements.py`). A
+diagnosis allows for what its own mesh loses, and what a truth has lost may seem missing.
 """
 
 from __future__ import annotations
