@@ -16,30 +16,19 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from mesh_errors import CAVITY, on_the_wall
+from mesh_errors import CAVITY, displacement, on_the_wall
 
-from warpbrain.arrays import Floats
 from warpbrain.atomic import whole_file
-from warpbrain.cases.case import Case
 from warpbrain.cases.shipped import find_case
 from warpbrain.errors import SolveError
 from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.recordings.comparison import root_mean_square
-from warpbrain.simulation.equilibrium import EquilibriumSolver
 from warpbrain.simulation.mesh_error import FinerCase
 from warpbrain.simulation.model import ELEMENTS
-from warpbrain.simulation.of_case import model_of
-from warpbrain.simulation.system import System
 
 RESULTS = Path(__file__).resolve().parent / "results"
 COLUMNS = ("case", "load", "elements", "size", "wall_mm")
 POISSON = 0.47
-
-
-def displacement(case: Case, elements: str) -> Floats:
-    """Of the nodes [m], corners first."""
-    model = replace(model_of(case), elements=elements)
-    return np.asarray(EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u)
 
 
 def measured(name: str) -> list[dict[str, str]]:
@@ -65,8 +54,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="+", metavar="NAME")
     rows = [row for name in parser.parse_args().names for row in measured(name)]
-    with whole_file(RESULTS / "cavity_elements.csv") as file, file.open("w", encoding="utf-8", newline="") as text:
-        table = csv.DictWriter(text, COLUMNS)
+    with whole_file(RESULTS / "cavity_elements.csv") as file, file.open("w", encoding="utf-8") as text:
+        table = csv.DictWriter(text, COLUMNS, lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
     return 0

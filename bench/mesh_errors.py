@@ -50,9 +50,9 @@ FAR = 0.2
 CAVITY, PRESSURE, PULL, RADIUS = "resection", -300.0, 1000.0, 0.02
 
 
-def displacement(case: Case) -> Floats:
-    """Of the nodes (n, 3) [m] that are simulated."""
-    model = model_of(case)
+def displacement(case: Case, elements: str = "tet4") -> Floats:
+    """Of the nodes (n, 3) [m] that are simulated, corners of elements first."""
+    model = replace(model_of(case), elements=elements)
     return np.asarray(EquilibriumSolver(System(model, "cpu")).solve(model.external_forces()).u)
 
 

@@ -1,7 +1,7 @@
 """Check the stand-ins: ``python -m concealed.check`` compares every sealed truth with its published hash.
 
 ``--remake FILE`` opens a truth, finds the motion of its observed points again from what acted, and compares. Truths
-that do not say on which elements they were found, up to the ninth set, are of linear ones: their motion is another.
+of the cases that ship and of the first nine sealed sets were found on linear tetrahedra: they differ by millimetres.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Loads on the faces of quadratic tetrahedra, six nodes each, as nodal forces.
-
-Integrals over a face with the rule of six points that is exact to degree 4 (Dunavant 1985).
-"""
+"""Loads on the faces of quadratic tetrahedra, six nodes each, as nodal forces: on faces that are curved, too."""
 
 from __future__ import annotations
 
@@ -10,18 +7,18 @@ from collections.abc import Callable
 import numpy as np
 
 from concealed.body import Floats, Ints
+from warpbrain.mesh.integrals import shape_values, triangle_rule
 
-_A, _B = 0.445948490915965, 0.091576213509771
-_WEIGHTS = 0.5 * np.repeat([0.223381589678011, 0.109951743655322], 3)
-_POINTS = np.array([[1.0 - 2.0 * each if i == j else each for j in range(3)] for each in (_A, _B) for i in range(3)])
-#: Corners at the ends of the sides that midside nodes are in the middle of.
+_POINTS, _WEIGHTS = triangle_rule()
+#: Shape functions at the points of the rule, (6, 6), and corners at the ends of the sides that have midside nodes.
+_VALUES = shape_values(_POINTS)
 _SIDES = np.array([[0, 1], [0, 2], [1, 2]])
 #: Derivatives of barycentric coordinates by the two that are independent.
 _INDEPENDENT = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
 
-_VALUES = np.concatenate([_POINTS * (2.0 * _POINTS - 1.0), 4.0 * _POINTS[:, _SIDES].prod(axis=2)], axis=1)
 _OF_CORNERS = (4.0 * _POINTS - 1.0)[:, :, None] * _INDEPENDENT
 _OF_MIDDLES = 4.0 * sum(_POINTS[:, _SIDES[:, i], None] * _INDEPENDENT[_SIDES[:, 1 - i]] for i in (0, 1))
+#: Derivatives of shape functions by these, (6, 6, 2).
 _DERIVATIVES = np.concatenate([_OF_CORNERS, _OF_MIDDLES], axis=1)
 
 
@@ -36,7 +33,7 @@ def area_vectors(points: Floats, faces: Ints) -> Floats:
         Corners 0, 1, 2, then the middles of 01, 02 and 12.
     """
     along = np.einsum("qad,fax->dfqx", _DERIVATIVES, points[faces])
-    return _WEIGHTS[:, None] * np.cross(along[0], along[1])
+    return 0.5 * _WEIGHTS[:, None] * np.cross(along[0], along[1])
 
 
 def pressure_forces(points: Floats, faces: Ints, pressure: float) -> Floats:
