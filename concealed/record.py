@@ -25,8 +25,8 @@ from warpbrain.mesh import TetMesh
 FORMAT = 1
 PACKAGES = ("warpbrain", "warp-lang", "numpy", "scipy", "mmgpy", "nilearn", "nibabel")
 LIMITATIONS = (
-    "Made by the authors of the tool, with the tool's own solver and linear tetrahedra on a finer mesh: not an "
-    "independent code, not another element. Quasi-static; no meninges, vessels or contact; tissue isotropic and "
+    "Made by the authors of the tool, with the tool's own solver and quadratic tetrahedra on a finer mesh: not an "
+    "independent code. Quasi-static; no meninges, vessels or contact; tissue isotropic and "
     "elastic; effects are drawn from a list that was written with the tool's mechanisms in mind; the anatomy is a "
     "deformed template. Targets are the published medians with a spread that was not published. Nothing here is a "
     "statement about a patient."

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from sinking_block import OPTIONS, write_sinking
 
+from warpbrain.errors import SolveError
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.fitting import FitSearch, Fitter
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
@@ -121,6 +122,31 @@ def test_what_a_fit_has_not_reached_is_no_evidence(sets, base, monkeypatch):
     assert not fit.converged
     assert fit.unreached > 1.0
     assert fit.log_evidence == fit.marginal.log_evidence - fit.unreached
+
+
+@pytest.mark.parametrize("part", [0.6, 0.2, 0.05])
+def test_of_what_collapses_as_large_as_it_is_seen_the_largest_that_does_not_is_fitted(sets, monkeypatch, part):
+    """The body has no equilibrium beyond a part of the weight that the linear model sees."""
+    weighed = sets.get(("gravity",))
+    [effect], [at], solve = weighed.effects, weighed.slices, FitSearch._solve
+    largest = part * np.linalg.norm(effect.offset(weighed.coordinates[at]))
+
+    def solve_unless_larger(search, hypothesis, nonlinear, *others):
+        if np.linalg.norm(effect.offset(nonlinear[-effect.columns.shape[1] :])) > largest:
+            raise SolveError("no equilibrium")
+        return solve(search, hypothesis, nonlinear, *others)
+
+    fitter, start = Fitter(sets.base), [weighed.coordinates]
+    whole = fitter.fit(weighed.effects, weighed.columns, start, weighed.marginal)
+    monkeypatch.setattr(FitSearch, "_solve", solve_unless_larger)
+    if part < 0.125:
+        with pytest.raises(SolveError):
+            fitter.fit(weighed.effects, weighed.columns, start, weighed.marginal)
+        return
+    fit = fitter.fit(weighed.effects, weighed.columns, start, weighed.marginal)
+    reached = np.linalg.norm(effect.offset(fit.coefficients[0]))
+    assert 0.8 * largest < reached <= largest
+    assert fit.log_evidence < whole.log_evidence - 1.0
 
 
 def test_a_search_that_expects_to_reach_too_little_ends(sets):

@@ -39,6 +39,8 @@ from warpbrain.worlds.body.weighted_set import MeshShare, Refit, excess_error, m
 _ITERATIONS = 20
 #: Trials along a step; along one from columns that were made elsewhere, which may point uphill.
 _TRIALS, _TRIALS_ELSEWHERE = 6, 2
+#: Parts of the way from no effect that a fit begins at if there is no equilibrium where it would begin.
+_SHARES = 0.5, 0.25, 0.125
 #: Part of a step that is tried next, at least and at most.
 _SHORTER, _SHORT = 0.1, 0.5
 #: How far [standard deviations] coordinates go until columns are made anew.
@@ -141,6 +143,31 @@ class FitSearch:
                 if number == len(starts) and not np.isfinite(self._best):
                     raise
 
+    def start_toward(self, start: Floats, nearby: SolvedState) -> None:
+        """Take the farthest point with an equilibrium on the way to coordinates that have none.
+
+        What data ask for in the linear model may collapse the body, which is no evidence against less of the same.
+        `SolveError` if there is none.
+        """
+        end = self._clipped(self._layout.without_shared(start))
+        without = self._at_base(end)
+        for effect, part in zip(self.effects, self._layout.effects, strict=True):
+            without[part] -= effect.offset(without[part])
+        for share in _SHARES:
+            try:
+                return self.start([without + share * (end - without)], nearby)
+            except SolveError:
+                if share == _SHARES[-1]:
+                    raise
+
+    def _at_base(self, z: Floats) -> Floats:
+        """Coordinates with tissue and stiffness field of the base."""
+        base = z.copy()
+        coordinates = self._base.nuisances.coordinates(self._base.prior, self._base.state.hypothesis)
+        base[self._layout.tissue] = coordinates[self._layout.tissue]
+        base[self._layout.field] = coordinates[self._layout.field] / self._layout.field_size
+        return base
+
     def begin_at(self, subset: Refit, about: Linearisation | None = None) -> Floats:
         """Take the columns for those about a fit with the first of the effects, or all; keep its share of the mesh.
 
@@ -178,10 +205,7 @@ class FitSearch:
 
     def backtrack_to_base(self) -> None:
         """Move tissue and field toward the base while that is better: far from it the linear model may fail."""
-        base = self.z.copy()
-        coordinates = self._base.nuisances.coordinates(self._base.prior, self._base.state.hypothesis)
-        base[self._layout.tissue] = coordinates[self._layout.tissue]
-        base[self._layout.field] = coordinates[self._layout.field] / self._layout.field_size
+        base = self._at_base(self.z)
         far = self.z
         for share in (0.5, 0.0):
             between = base + share * (far - base)
@@ -551,7 +575,7 @@ class Fitter:
         subset: Refit | None = None,
         wanted: float = -np.inf,
     ) -> Refit:
-        """Fit one set; `SolveError` if there is no equilibrium near the start.
+        """Fit one set; `SolveError` if there is no equilibrium near the start, nor on the way there.
 
         `columns` (n, q + e + k): of nuisances, of causes that act linearly (no physics, or what changes), and of
         effects, about the base or about `subset`. `starts`, each (q + e + k,): coordinates to begin at, of which the
@@ -566,7 +590,11 @@ class Fitter:
         if subset is not None:
             nearby = subset.state
             starts = [*starts, search.begin_at(subset)]
-        search.start(starts, nearby or self.base.state)
+        nearby = nearby or self.base.state
+        try:
+            search.start(starts, nearby)
+        except SolveError:
+            search.start_toward(starts[0], nearby)
         if subset is None:
             search.backtrack_to_base()
         best = self._converged(search, wanted)
