@@ -60,7 +60,7 @@ def test_standardised_at_several_scales_is_as_at_each() -> None:
     model = GaussianModel(factor, rng.normal(size=(9, 3)))
     rows, scales = rng.normal(size=(9, 4)), [0.5, 1.0, 3.0]
     for scale in scales:
-        found = model.standardised_at(rows)(scale)
+        found = model.white(rows).standardised(scale).T
         assert np.allclose(found, GaussianModel(factor, model.columns, scale).standardised(rows), rtol=0.0, atol=1e-12)
 
 

@@ -85,8 +85,7 @@ def decisions(truths: Sequence[Truth], probabilities: Floats) -> list[Decision]:
     verdicts += [Decision(NOT_PHYSICS, (name,)) for name in errors]
     for named in _subsets(names, range(1, 4)):
         verdicts += [Decision(NAMED, named), Decision(NAMED_AND_REST, named)]
-    groups = _subsets([*names, UNKNOWN], range(2, 5))
-    return verdicts + [Decision(GROUP, group) for group in groups if group[0] != UNKNOWN]
+    return verdicts + [Decision(GROUP, group) for group in _subsets([*names, UNKNOWN], range(2, 5))]
 
 
 def _most_probable(sets: Sequence[frozenset[str]], probabilities: Floats) -> list[str]:

@@ -148,11 +148,11 @@ class GaussianModel:
         """`kappa^2 L L^T` (n, n)."""
         return self.scale**2 * self._noise.covariance
 
-    def once(self, of: object, make: Callable[[GaussianModel], Made]) -> Made:
+    def once(self, of: object, make: Callable[[], Made]) -> Made:
         """What is made of the noise, whatever its scale, and of an object; all models of the noise keep the last."""
         known = self._noise.made
         if known is None or known[0] is not of:
-            known = self._noise.made = of, make(self)
+            known = self._noise.made = of, make()
         made: Made = known[1]
         return made
 
@@ -223,12 +223,7 @@ class GaussianModel:
 
         `(kappa^2 I + W W^T)^(-1/2) L^-1 r`, whose products are those with `S^-1`.
         """
-        return self.standardised_at(rows)(self.scale)
-
-    def standardised_at(self, rows: Floats) -> Callable[[float], Floats]:
-        """`standardised` rows as a function of the scale: what no scale changes is computed once."""
-        white = self.white(rows)
-        return lambda scale: white.standardised(scale).T
+        return self.white(rows).standardised(self.scale).T
 
     def white(self, rows: Floats) -> WhiteRows:
         """Rows (n,) or (n, b), of which products at any scale are known."""
@@ -270,7 +265,7 @@ class GaussianModel:
         return float(softmax(self._log_densities_at(rows, scales) + log_prior) @ scales)
 
     def _log_densities_at(self, rows: Floats, scales: Floats) -> Floats:
-        standardised = self.standardised_at(rows)
-        squares = np.array([np.sum(standardised(scale) ** 2) for scale in scales.tolist()])
+        white = self.white(rows)
+        squares = np.array([np.sum(white.standardised(scale) ** 2) for scale in scales.tolist()])
         determinants = np.array([self.with_scale(scale).log_determinant for scale in scales.tolist()])
         return -0.5 * (squares + determinants + len(self) * np.log(2.0 * np.pi))

@@ -46,7 +46,6 @@ class GrossErrors:
 
     #: Log density of the rows, summed over the inflation of each point with all others at their most probable ones.
     log_density: float
-    log_odds: Floats  # (g,), of each point to be a gross error, given the others
     inflation: Floats  # (g,), the most probable one of each point, 1 of a sound one
     weighted: Floats  # (n,), the inverse of the covariance with these, times the rows
 
@@ -83,7 +82,7 @@ class PointNoise:
     @classmethod
     def of(cls, model: GaussianModel, points: Sequence[Ints]) -> PointNoise:
         """The same, made once for all models with that noise."""
-        return model.once(points, lambda any_model: cls(any_model, points))
+        return model.once(points, lambda: cls(model, points))
 
 
 class PointRows:
@@ -142,18 +141,13 @@ class PointRows:
             search.change(worst, int(best[worst]))
         sums = np.logaddexp.reduce(logs, axis=1)
         log_density = search.log_density + float(log_prior[search.kinds].sum() + sums.sum())
-        odds = np.logaddexp.reduce(logs[:, 1:], axis=1) - logs[:, 0]
-        return GrossErrors(log_density, odds, prior.inflations[search.kinds], search.weighted)
+        return GrossErrors(log_density, prior.inflations[search.kinds], search.weighted)
 
 
 class FurtherColumns:
-    """Columns (n, k) beside those of a model of rows.
+    """Columns `G` (n, k) beside those of a model of rows; `weighted` (n, k): `S_0^-1 G`."""
 
-    `columns` (n, k). `weighted` (n, k): `S_0^-1 G`, if it is known.
-    """
-
-    def __init__(self, rows: PointRows, columns: Floats, weighted: Floats | None = None) -> None:
-        weighted = rows.model.precision_times(columns) if weighted is None else weighted
+    def __init__(self, rows: PointRows, columns: Floats, weighted: Floats) -> None:
         values, vectors = np.linalg.eigh(columns.T @ weighted)
         #: `l` (k,) and `D^T` (k, n).
         self.values, self.dual = np.maximum(values, 0.0), vectors.T @ weighted.T

@@ -45,10 +45,6 @@ class Prediction:
         """Of all blocks, each given the others."""
         return float(self.log_densities.sum())
 
-    def gain(self, over: Prediction) -> float:
-        """Log density [nats] of the blocks less that of another prediction."""
-        return float(np.sum(self.log_densities - over.log_densities))
-
 
 def predict(model: GaussianModel, residual: Floats, blocks: Ints) -> Prediction:
     """Predict every block of rows. `residual` (n,), `blocks` (n,)."""
