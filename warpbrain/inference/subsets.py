@@ -241,15 +241,9 @@ class Search:
 class _Sums:
     """Sums of densities by sets of causes, as logarithms, and the best configuration of each."""
 
-    def __init__(self, places: int = 0, causes: Sequence[Cause] = ()) -> None:
+    def __init__(self) -> None:
         self.logs: dict[frozenset[int], float] = {}
         self.best: dict[frozenset[int], Configuration] = {}
-        #: Of each single cause, the best configuration at each of so many places, and at one of each label.
-        self.at_places: dict[int, dict[int, Configuration]] = {}
-        #: Sums of each single cause by the numbers of its places.
-        self.by_place: dict[int, dict[int, float]] = {}
-        self._places = places
-        self._labels = [np.array([place.label for place in cause.places]) for cause in causes]
 
     def add(self, causes: frozenset[int], log: float, best: Configuration) -> None:
         self.logs[causes] = float(np.logaddexp(self.logs.get(causes, -np.inf), log))
@@ -264,61 +258,67 @@ class _Sums:
         edges = blocks.cause_edges[blocks.cause_edges >= start].tolist()
         best = []
         for low, high in itertools.pairwise(edges):
-            if blocks.cause[low] in acting:
+            cause = int(blocks.cause[low])
+            if cause in acting:
                 continue
             of_cause = logs[low - start : high - start]
-            greatest = of_cause.max(axis=1)
-            row = int(np.argmax(greatest))
-            best.append(self._configuration(blocks, low + row, of_cause[row], members, scale))
-            causes = frozenset(acting | {best[-1].members[-1].cause})
+            row = int(np.argmax(of_cause.max(axis=1)))
+            best.append(_configuration(blocks, low + row, of_cause[row], members, scale))
             of_places = np.logaddexp.reduce(of_cause, axis=1)
-            self.add(causes, float(np.logaddexp.reduce(of_places)), best[-1])
-            if not members:
-                known = self.by_place.setdefault(int(blocks.cause[low]), {})
-                for place, log in zip(blocks.place[low:high].tolist(), of_places.tolist(), strict=True):
-                    known[place] = float(np.logaddexp(known.get(place, -np.inf), log))
-            if members or not self._places:
-                continue
-            at_places, order = self.at_places.setdefault(int(blocks.cause[low]), {}), np.argsort(-greatest)
-            labels = self._labels[int(blocks.cause[low])][blocks.place[low:high]][order]
-            of_each_label = order[np.unique(labels, return_index=True)[1]]
-            for other in {*order[: self._places].tolist(), *of_each_label.tolist()}:
-                configuration = self._configuration(blocks, low + other, of_cause[other], (), scale)
-                known_there = at_places.get(configuration.members[0].place)
-                if known_there is None or configuration.log_density > known_there.log_density:
-                    at_places[configuration.members[0].place] = configuration
+            self.add(frozenset(acting | {cause}), float(np.logaddexp.reduce(of_places)), best[-1])
         return best
 
-    @staticmethod
-    def _configuration(
-        blocks: _Ordered, number: int, logs: Floats, members: tuple[Member, ...], scale: float
-    ) -> Configuration:
-        """A block with its best size, of which there are log densities (s,), after other members."""
-        size = int(np.argmax(logs))
-        last = Member(int(blocks.cause[number]), int(blocks.place[number]), size)
-        return Configuration((*members, last), scale, float(logs[size]))
 
-    def with_share(self, configuration: Configuration) -> Configuration:
-        """A configuration with the share of its place, if it is of a single cause."""
-        if len(configuration.members) != 1:
-            return configuration
-        [member] = configuration.members
-        share = self.by_place[member.cause][member.place] - self.logs[frozenset((member.cause,))]
-        return replace(configuration, log_share=min(share, 0.0))
+def _configuration(
+    blocks: _Ordered, number: int, logs: Floats, members: tuple[Member, ...], scale: float
+) -> Configuration:
+    """A block with its best size, of which there are log densities (s,), after other members."""
+    size = int(np.argmax(logs))
+    last = Member(int(blocks.cause[number]), int(blocks.place[number]), size)
+    return Configuration((*members, last), scale, float(logs[size]))
 
-    def elsewhere(self, causes: frozenset[int]) -> tuple[Configuration, ...]:
-        """Of a single cause, the best configurations at other places than the best, and the best of each label."""
-        if len(causes) != 1 or not self._places:
-            return ()
-        [cause] = causes
-        ordered = sorted(self.at_places[cause].items(), key=lambda other: -other[1].log_density)
-        at_best, chosen = self.best[causes].members[0].place, list[Configuration]()
-        labels = {self._labels[cause][at_best]}
-        for place, configuration in ordered:
-            if place != at_best and (len(chosen) < self._places - 1 or self._labels[cause][place] not in labels):
-                chosen.append(configuration)
-                labels.add(self._labels[cause][place])
-        return tuple(chosen)
+
+class _Places:
+    """Sums of densities of each single cause by the numbers of its places, as logarithms, and where it is likely.
+
+    `most`: of each cause, so many places are kept at each scale, and one of each label.
+    """
+
+    def __init__(self, causes: Sequence[Cause], most: int) -> None:
+        self._most = most
+        self._labels = [np.array([place.label for place in cause.places]) for cause in causes]
+        self._logs: list[dict[int, float]] = [{} for _ in causes]
+        self._best: list[dict[int, Configuration]] = [{} for _ in causes]
+
+    def add(self, blocks: Blocks, logs: Floats, scale: float) -> None:
+        """Add log densities (p, s) of all blocks."""
+        for low, high in itertools.pairwise(blocks.cause_edges.tolist()):
+            cause, places, of_cause = int(blocks.cause[low]), blocks.place[low:high], logs[low:high]
+            known, best = self._logs[cause], self._best[cause]
+            for place, log in zip(places.tolist(), np.logaddexp.reduce(of_cause, axis=1).tolist(), strict=True):
+                known[place] = float(np.logaddexp(known.get(place, -np.inf), log))
+            order = np.argsort(-of_cause.max(axis=1))
+            of_each_label = order[np.unique(self._labels[cause][places][order], return_index=True)[1]]
+            for number in {*order[: self._most].tolist(), *of_each_label.tolist()}:
+                found = _configuration(blocks, low + number, of_cause[number], (), scale)
+                place = found.members[0].place
+                if place not in best or found.log_density > best[place].log_density:
+                    best[place] = found
+
+    def ranked(self, best: Configuration, log_evidence: float) -> list[Configuration]:
+        """The best configuration of a single cause of such evidence, the best at other places and at one of each label.
+
+        Each with the share of its place in the evidence.
+        """
+        [member] = best.members
+        of_places, place_labels = self._logs[member.cause], self._labels[member.cause]
+        chosen, labels = [best], {place_labels[member.place]}
+        for place, other in sorted(self._best[member.cause].items(), key=lambda known: -known[1].log_density):
+            if place != member.place and (len(chosen) < self._most or place_labels[place] not in labels):
+                chosen.append(other)
+                labels.add(place_labels[place])
+        shares = [of_places[configuration.members[0].place] - log_evidence for configuration in chosen]
+        return [replace(each, log_share=min(share, 0.0)) for each, share in zip(chosen, shares, strict=True)]
 
 
 def posterior(
@@ -328,7 +328,7 @@ def posterior(
 
     `model`: of rows (n,) on which no cause acts. `residual` (n,).
     """
-    sums = _Sums(1 + search.elsewhere, causes)
+    sums, alone = _Sums(), _Places(causes, 1 + search.elsewhere)
     unscaled = Blocks(model, residual, causes) if causes else None
 
     def weighed_at(scale: float) -> tuple[float, Blocks | None, Floats]:
@@ -346,25 +346,32 @@ def posterior(
         if blocks is not None:
             logs = factors + blocks.log_weights + none
             sums.add_blocks(blocks, 0, logs, (), scale)
+            alone.add(blocks, logs, scale)
             by_scale.append((scale, none, blocks, logs))
     greatest = max((float(logs.max()) for *_, logs in by_scale), default=0.0)
+    most = min(len(causes), search.most)
     for scale, none, blocks, logs in by_scale:
-        if min(len(causes), search.most) > 1 and logs.max() >= greatest + np.log(search.negligible):
+        if most > 1 and logs.max() >= greatest + np.log(search.negligible):
             kept = blocks.subset(_best_places(blocks, logs, search.places))
             pairs = _add_pairs(sums, kept, none, scale)
-            pairs.sort(key=lambda pair: -pair.log_density)
-            _add_triples(sums, kept, none, pairs[: search.beam] if min(len(causes), search.most) > 2 else [])
-    hypotheses = [
-        Hypothesis(
-            tuple(causes[c].name for c in sorted(members)),
-            tuple(causes[c].kind for c in sorted(members)),
-            log,
-            sum(causes[c].log_prior for c in members),
-            sums.with_share(sums.best[members]),
-            tuple(sums.with_share(other) for other in sums.elsewhere(members)),
+            if most > 2:
+                pairs.sort(key=lambda pair: -pair.log_density)
+                _add_triples(sums, kept, none, pairs[: search.beam])
+    hypotheses = []
+    for members, log in sums.logs.items():
+        best, elsewhere = sums.best[members], list[Configuration]()
+        if len(members) == 1:
+            best, *elsewhere = alone.ranked(best, log)
+        hypotheses.append(
+            Hypothesis(
+                tuple(causes[c].name for c in sorted(members)),
+                tuple(causes[c].kind for c in sorted(members)),
+                log,
+                sum(causes[c].log_prior for c in members),
+                best,
+                tuple(elsewhere),
+            )
         )
-        for members, log in sums.logs.items()
-    ]
     return tuple(sorted(hypotheses, key=lambda hypothesis: -(hypothesis.log_evidence + hypothesis.log_prior)))
 
 
