@@ -118,25 +118,31 @@ def test_every_verdict_is_said(verdict, data):
         assert said[1:].rstrip(".") in text
 
 
+def judged(decision, p_value, kinds, chance):
+    """A verdict, and one set of causes of these kinds with its probability."""
+    sets = [SimpleNamespace(causes=kinds, kinds=kinds, probability=chance)]
+    return SimpleNamespace(decision=decision, p_value=p_value, alpha=0.05, smallest={}, combinations=sets, doubts=())
+
+
 @pytest.mark.parametrize(
     ("nothing", "chance"), [(0.001, f"below {1.0 - calibration().most_said:.0%}".replace("%", " %")), (0.4, "40 %")]
 )
 def test_a_p_value_that_sees_nothing_is_no_reason_for_something_missing(nothing, chance):
-    words = Words("these data", "", "", [], "", [], ["tissue drains"], nothing)
-    unseen = verdict_in_words(Decision("cannot say", ("drainage",)), 1.0, 0.05, {}, words)
+    words = Words("these data", "", "", [], "", [], ["tissue drains"])
+    unseen = verdict_in_words(judged(Decision("cannot say", ("drainage",)), 1.0, (), nothing), words)
     check(unseen)
     assert unseen.startswith("Something may be missing, but these data cannot say what.")
     # what doubts is the posterior, and the p-value is said of data, not of a cause
     assert f"The posterior probability that nothing is missing is {chance}," in unseen
     assert "yet these data do not contradict it (p = 1)." in unseen and "missing (p" not in unseen
-    seen = verdict_in_words(Decision("cannot say", ("drainage",)), 0.01, 0.05, {}, words)
+    seen = verdict_in_words(judged(Decision("cannot say", ("drainage",)), 0.01, (), nothing), words)
     assert seen.startswith(f"Something {'is' if nothing < 0.1 else 'may be'} missing (p = 0.01), but these data")
 
 
 @pytest.mark.parametrize("chance", [0.02, 0.31])
 def test_physics_beside_an_error_is_not_denied(chance):
-    words = Words("these data", "", "", [], "", [("Moduli are wrong.", 0.9)], [], 0.0, physics_acts=chance)
-    said = verdict_in_words(Decision("not physics", ("stiffness",)), 0.01, 0.05, {}, words)
+    words = Words("these data", "", "", [], "", [("Moduli are wrong.", 0.9)], [])
+    said = verdict_in_words(judged(Decision("not physics", ("stiffness",)), 0.01, (Kind.PHYSICS,), chance), words)
     check(said)
     assert said.startswith("It is not physics that is missing") and "Moduli are wrong." in said
     assert ("beside it has a probability of 31 %" in said) == ("as far as these data tell" in said) == (chance > 0.1)

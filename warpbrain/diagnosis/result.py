@@ -12,7 +12,6 @@ from warpbrain.arrays import Bools
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.locating import FittedSource, ScoreMap, Traits
 from warpbrain.diagnosis.onset import Onset
-from warpbrain.inference import Kind
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import percent
 from warpbrain.inference.decide import UNKNOWN
@@ -126,13 +125,10 @@ def sentence_of(diagnosis: Diagnosis) -> str:
         grounds=grounds([ranked.probability for ranked in named], "points", errors),
         members=[(_member(diagnosis, kind), chances.get(kind, 0.0)) for kind in diagnosis.group if kind != UNKNOWN],
         perhaps=[clause(sentence_of_kind(ranked.kind)) for ranked in likely],
-        nothing_acts=sum(each.probability for each in diagnosis.combinations if not each.causes),
-        physics_acts=sum(each.probability for each in diagnosis.combinations if set(each.kinds) - {Kind.NOT_PHYSICS}),
         only_physics=all(ranked.physics for ranked in likely),
         rest="" if diagnosis.unknown is None else traits_in_words(diagnosis.unknown, extent),
     )
-    sentence = verdict_in_words(diagnosis.decision, diagnosis.p_value, diagnosis.alpha, diagnosis.smallest, words)
-    return " ".join([sentence, *diagnosis.doubts])
+    return verdict_in_words(diagnosis, words)
 
 
 def effect_sentence(ranked: Ranked, gravity_axis: tuple[float, float, float] | None = None) -> str:

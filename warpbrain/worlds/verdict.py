@@ -115,7 +115,7 @@ class Verdict(Shown):
 
 @dataclass(frozen=True)
 class Words:
-    """What a verdict is put together from."""
+    """What the sentences of a verdict are put together from, beside its numbers."""
 
     data: str  # what was recorded: "these data"
     nothing: str  # what would have been seen, where nothing was looked for
@@ -124,19 +124,20 @@ class Words:
     grounds: str  # a sentence: why
     members: Sequence[tuple[str, float]]  # sentence and probability of each cause of the verdict that has a name
     perhaps: Sequence[str]  # clauses of what may act, where nothing can be said
-    nothing_acts: float  # posterior probability that no cause acts
     only_physics: bool = True  # whether an error of registration, mesh, loads or the like is unlikely
-    physics_acts: float = 0.0  # posterior probability that physics is missing, with a name or without
     rest: str = ""  # what is known of what has no name: a sentence after a space
 
 
-def verdict_in_words(
-    decision: Decision, p_value: float, alpha: float, smallest: Mapping[str, Smallest], words: Words
-) -> str:
-    """The verdict for people: whole sentences; a claim is significant where `p_value <= alpha`."""
-    p, verdict, data = f"p = {p_value:.2g}", decision.verdict, words.data
+def verdict_in_words(found: Verdict, words: Words) -> str:
+    """The verdict for people, with its doubts: whole sentences."""
+    return " ".join([_without_doubts(found, words), *found.doubts])
+
+
+def _without_doubts(found: Verdict, words: Words) -> str:
+    decision, p, data = found.decision, f"p = {found.p_value:.2g}", words.data
+    verdict = decision.verdict
     if verdict == NOTHING:
-        seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in smallest.items())
+        seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in found.smallest.items())
         return f"No missing physics is detected ({p}). What {data} would have shown: {seen or words.nothing}."
     if decision.named:
         first, *others = words.named
@@ -146,9 +147,10 @@ def verdict_in_words(
     if verdict == NOT_PHYSICS:
         errors = " ".join(sentence for sentence, _ in words.members)
         hedge, chance = "", ""
-        if words.physics_acts > belief("checks.perhaps"):
+        physics_acts = sum(each.probability for each in found.combinations if set(each.kinds) - {Kind.NOT_PHYSICS})
+        if physics_acts > belief("checks.perhaps"):
             hedge = f", as far as {data} tell"
-            chance = f"; that physics is missing beside it has a probability of {percent(words.physics_acts)}"
+            chance = f"; that physics is missing beside it has a probability of {percent(physics_acts)}"
         return f"It is not physics that is missing{hedge} ({p}). {errors} That explains the mismatch better{chance}."
     if verdict == UNKNOWN:
         return (
@@ -158,13 +160,14 @@ def verdict_in_words(
     if verdict == CANNOT_SAY:
         perhaps = f" Perhaps: {'; or '.join(words.perhaps)}." if words.perhaps else ""
         missing = "missing" if words.only_physics else "wrong or missing"
-        if p_value > alpha:
+        nothing_acts = sum(each.probability for each in found.combinations if not each.causes)
+        if found.p_value > found.alpha:
             # such a p-value is no reason to say that something is missing: the posterior is
             return (
                 f"Something may be {missing}, but {data} cannot say what. The posterior probability that nothing is "
-                f"{missing} is {percent(words.nothing_acts)}, yet {data} do not contradict it ({p}).{perhaps}"
+                f"{missing} is {percent(nothing_acts)}, yet {data} do not contradict it ({p}).{perhaps}"
             )
-        surely = "may be" if words.nothing_acts > belief("checks.perhaps") else "is"
+        surely = "may be" if nothing_acts > belief("checks.perhaps") else "is"
         return f"Something {surely} {missing} ({p}), but {data} cannot say what.{perhaps}"
     which = "; or ".join(f"{clause(sentence)} ({percent(probability)})" for sentence, probability in words.members)
     other = "; or something without a name" if UNKNOWN in decision.causes else ""

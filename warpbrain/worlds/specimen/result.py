@@ -12,7 +12,6 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.specimen import REST
 from warpbrain.inference.beliefs import belief
 from warpbrain.inference.calibration import percent
-from warpbrain.inference.causes import Kind
 from warpbrain.inference.decide import UNKNOWN
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.physics.sizes import size_in_words
@@ -94,11 +93,8 @@ class SpecimenDiagnosis(Verdict):
             grounds=grounds([cause.probability for cause in named], "tests", (heldout[0], heldout[-1])),
             members=[(cause.sentence, cause.probability) for cause in members],
             perhaps=[f"{clause(cause.sentence)} ({percent(cause.probability)})" for cause in members],
-            nothing_acts=sum(each.probability for each in self.combinations if not each.causes),
-            physics_acts=sum(each.probability for each in self.combinations if set(each.kinds) - {Kind.NOT_PHYSICS}),
         )
-        sentence = verdict_in_words(self.decision, self.p_value, self.alpha, self.smallest, words)
-        return " ".join([sentence, *self.doubts])
+        return verdict_in_words(self, words)
 
 
 def specimen_effect_sentence(cause: Ranked) -> str:
