@@ -75,7 +75,7 @@ class Checker:
         base = self.sets.base
         scores: dict[str, Score] = {}
         stresses: dict[str, Floats] = {}
-        for name, compared in (("refitted", base), ("explained", fit))[: 1 if fit is base else 2]:
+        for name, compared in ({"refitted": base} if fit is base else {"refitted": base, "explained": fit}).items():
             predicted = self._predicted(compared)
             stresses |= {name: predicted.stress, f"heldout {name}": predicted.held}
             scores[name] = score(self.protocol, predicted.stress, predicted.held)
@@ -93,7 +93,7 @@ class Checker:
         if fit not in self._predictions:
             # what has no name is known at thinned rows alone, and explains nothing of others
             assumed, z = fit.only(lambda effect: effect.kind is not Kind.UNKNOWN)
-            everywhere, z = fit.forward.of(protocol=self.protocol), np.concatenate([fit.z[: len(fit.forward)], z])
+            everywhere, z = replace(fit.forward, protocol=self.protocol), np.concatenate([fit.z[: len(fit.forward)], z])
             stress = everywhere.stress(assumed, z)
             predicted, log_density = held_out(fit, self.folds)
             # of thinned rows it is known by how much it differs from the fit: smoothly

@@ -90,7 +90,7 @@ class DiagnosingSpecimen:
             measurements = _next(ordered, base)
         with self.seconds.of("explained"):
             explained = _explained_case(best) if names else None
-        declared = forward.of(protocol=protocol).stress((), np.zeros(len(forward)))
+        declared = replace(forward, protocol=protocol).stress((), np.zeros(len(forward)))
         ranking = _ranking(sets, ordered, checker)
         ranked = {cause.kind: cause for cause in ranking}
         nothing = sets.nothing.hypothesis.log_evidence
@@ -159,7 +159,7 @@ def _explained_case(best: Fit) -> Case | None:
     None if a run can simulate nothing of what is assumed, or no fit stands.
     """
     assumed, z = best.only(lambda effect: effect.runs)
-    forward = best.forward.of(shape_of_law=False)
+    forward = replace(best.forward, shape_of_law=False)
     refitted = fit(forward, assumed, np.concatenate([np.zeros(len(forward)), z]), best.scale) if assumed else None
     if refitted is None:
         return None

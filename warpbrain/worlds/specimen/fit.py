@@ -15,10 +15,9 @@ noise is the most probable one.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
-from typing import Any
 
 import numpy as np
 
@@ -74,6 +73,7 @@ class Component:
         return np.where(move != 0.0, self.variant.nothing + np.sign(move) * np.abs(c - self.variant.nothing), c)
 
 
+@dataclass(eq=False)
 class Forward:
     """Stresses of causes of one case at the rows of a protocol; its length is the number of nuisances, of `names`.
 
@@ -83,46 +83,37 @@ class Forward:
     (`scaled`), or what is `added` after that [Pa].
     """
 
-    def __init__(
-        self,
-        case: Case,
-        protocol: Protocol,
-        ends: GluedEnds,
-        glued: bool,
-        law: HomogeneousMaterial | None = None,
-        shape_of_law: bool = True,
-    ) -> None:
-        self.case, self.protocol, self.glued, self._ends = case, protocol, glued, ends
-        self._declared = HomogeneousMaterial.of_case(case, ())
-        self.law = law or self._declared
-        self._arguments: dict[str, Any] = dict(  # noqa: C408
-            case=case, protocol=protocol, ends=ends, glued=glued, law=self.law, shape_of_law=shape_of_law
-        )
-        self.factor = ends.factor(self.law, protocol) if glued else np.ones(len(protocol))
+    case: Case
+    protocol: Protocol
+    ends: GluedEnds
+    glued: bool
+    law: HomogeneousMaterial | None = None
+    shape_of_law: bool = True
+
+    def __post_init__(self) -> None:
+        self._declared = HomogeneousMaterial.of_case(self.case, ())
+        law = self.law or self._declared
+        self.factor = self.ends.factor(law, self.protocol) if self.glued else np.ones(len(self.protocol))
         self._responses: dict[str, Floats] = {}
-        [tissue] = case.tissues.values()
+        [tissue] = self.case.tissues.values()
         self.mu = tissue.known_law.shear_modulus
-        self._set_nuisances(shape_of_law)
+        self._set_nuisances()
 
     def __len__(self) -> int:
         return len(self.names)
 
-    def of(self, **changed: Any) -> Forward:
-        """The same with another `protocol`, `law` or `shape_of_law`."""
-        return Forward(**self._arguments | changed)
-
     @cached_property
     def sticking(self) -> Floats:
         """Factor (n,) of ends that stick, glued or not."""
-        return self.factor if self.glued else self._ends.factor(self._declared, self.protocol)
+        return self.factor if self.glued else self.ends.factor(self._declared, self.protocol)
 
     @cached_property
     def noise(self) -> Floats:
         """Factor (n, n) of the noise."""
         return noise_factor(self.protocol)
 
-    def _set_nuisances(self, shape: bool) -> None:
-        protocol = self.protocol
+    def _set_nuisances(self) -> None:
+        protocol, shape = self.protocol, self.shape_of_law
         logs, names = [belief("specimen.modulus") * np.ones(len(protocol))], ["modulus"]
         if len(protocol.specimens) > 1:
             logs += list(belief("specimen.specimens") * specimen_rows(protocol).T)
@@ -289,7 +280,7 @@ def fit(forward: Forward, assumed: tuple[Component, ...], z: Floats, scale: floa
             law = forward.material(assumed, again.z)
         except CANNOT_BE:
             return settled
-        moved = forward.of(law=law) if forward.glued else forward
+        moved = replace(forward, law=law) if forward.glued else forward
         same_ends = float(np.abs(moved.factor - forward.factor).max()) <= _SAME
         settled = again
         if again.scale == scale and same_ends:
