@@ -13,7 +13,7 @@ from warpbrain.physics.proposal import Proposal
 def test_a_cause_that_could_not_be_simulated_says_why(small_diagnosis):
     search = small_diagnosis.search
     fitted = next(s for s in search.weighted_sets if s.mechanisms and s.refit is not None)
-    ranking = Ranking(search, Confirming(search, 100, np.random.default_rng(0), 0.05))
+    ranking = Ranking(Confirming(search, 100, np.random.default_rng(0), 0.05))
     failed = replace(fitted, refit=None, failure="no equilibrium at 3 % of the load")
     names = fitted.mechanisms[:1]
     [row] = ranking.named(fitted, names)
@@ -27,7 +27,7 @@ def test_a_cause_that_could_not_be_simulated_says_why(small_diagnosis):
 def test_a_size_that_cannot_be_is_told_of_no_linear_model(small_diagnosis):
     search = small_diagnosis.search
     linear = next(s for s in search.weighted_sets if s.acting == ("swelling",) and s.refit is None)
-    ranking = Ranking(search, Confirming(search, 100, np.random.default_rng(0), 0.05))
+    ranking = Ranking(Confirming(search, 100, np.random.default_rng(0), 0.05))
     [row] = ranking.named(linear, ("swelling",))
     assert "amount" in {value.name for value in row.values}
     # the same columns, of a body that would shrink by all of its volume and more

@@ -113,7 +113,7 @@ class Diagnosing:
         with self.seconds.of("checks"):
             for _ in range(_ROUNDS):
                 by_posterior = _decided(search)
-                checked = self._checked(search, confirming, if_significant(by_posterior, p_value, options.alpha))
+                checked = self._checked(confirming, if_significant(by_posterior, p_value, options.alpha))
                 # checks fit sets that the linear model had weighed alone: with other evidence of them the verdict of
                 # least expected loss may be another one
                 if _decided(search) == by_posterior:
@@ -124,7 +124,7 @@ class Diagnosing:
             blocks = confirming.held_out_for(source or best)
             predictions = {name: confirming.predict(candidate, blocks) for name, candidate in weighted_sets.items()}
             fit = self._fit(confirming, weighted_sets, blocks, predictions, checked.confirmations)
-            ranking = Ranking(search, confirming)
+            ranking = Ranking(confirming)
             ranked = ranking.all()
         confusing = beside(lambda: imitations(search.causes, nothing.marginal.model))
         with self.seconds.of("where"):
@@ -172,9 +172,10 @@ class Diagnosing:
             unknown=unknown,
         )
 
-    def _checked(self, search: HypothesisSearch, confirming: Confirming, claimed: Decision) -> _Checked:
+    def _checked(self, confirming: Confirming, claimed: Decision) -> _Checked:
         """A significant verdict after its other checks, and the set that it is about."""
-        nothing, alpha = search.nothing, self.options.alpha
+        search, alpha = confirming.search, self.options.alpha
+        nothing = search.nothing
         if not claimed.named:
             return _Checked(claimed, (), nothing, (), None)
         best = search.fitted_with(frozenset(claimed.causes))

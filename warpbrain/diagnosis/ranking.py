@@ -22,9 +22,9 @@ from warpbrain.worlds.verdict import Ranked
 class Ranking:
     """Ranks the causes of one search."""
 
-    def __init__(self, search: HypothesisSearch, confirming: Confirming) -> None:
-        self._search, self._confirming = search, confirming
-        self._sets = list(zip(search.weighted_sets, search.probabilities.tolist(), strict=True))
+    def __init__(self, confirming: Confirming) -> None:
+        self._search, self._confirming = confirming.search, confirming
+        self._sets = list(zip(self._search.weighted_sets, self._search.probabilities.tolist(), strict=True))
 
     def all(self) -> tuple[Ranked, ...]:
         """Every cause as it is in the most probable set that has it, the most probable first."""
