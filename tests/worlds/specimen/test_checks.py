@@ -10,7 +10,7 @@ from testing_machine import case_of
 from warpbrain.inference.decide import CANNOT_SAY, NAMED, NAMED_AND_REST, Confirmation, Decision, after_checks
 from warpbrain.physics.words import Value
 from warpbrain.worlds.options import DiagnosisOptions
-from warpbrain.worlds.specimen.checks import CheckResults, Folds, folds_of, grown_errors, held_out
+from warpbrain.worlds.specimen.checks import CheckResults, folds_of, grown_errors, held_out
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 from warpbrain.worlds.specimen.effects import effects_of, stiffening
 from warpbrain.worlds.specimen.fit import Component, Forward, fit
@@ -49,7 +49,7 @@ def test_held_out_rows_are_the_conditional_of_the_model():
     log = -0.5 * (
         e @ P[np.ix_(held, held)] @ e - np.linalg.slogdet(P[np.ix_(held, held)])[1] + held.sum() * np.log(2 * np.pi)
     )
-    stress, log_density = held_out(base, Folds((held,), True))
+    stress, log_density = held_out(base, [held])
     assert log_density == pytest.approx(log, abs=1e-6)
     np.testing.assert_allclose(
         stress[held], (again.stress - U @ again.z)[held] + mean, atol=1e-6 * np.abs(base.stress).max()
@@ -129,5 +129,5 @@ def test_a_check_that_fails_is_said():
 def test_folds_of_one_test_are_its_quarters():
     thinned = base_of(cycles(40.0))[0].thinned
     folds = folds_of(thinned)
-    assert not folds.by_test and len(folds.held) == 4
-    assert np.sum(folds.held, axis=0).tolist() == [1] * len(thinned)
+    assert len(folds) == 4
+    assert np.sum(folds, axis=0).tolist() == [1] * len(thinned)

@@ -145,20 +145,12 @@ def grown_errors(checked: CheckResults) -> tuple[list[str], list[str]]:
     return grown if second > first else [], checks
 
 
-@dataclass(frozen=True, eq=False)
-class Folds:
+def folds_of(protocol: Protocol) -> list[Bools]:
     """Rows (n,) that are held out in turn: each test that may be fitted, or each quarter of the only one."""
-
-    held: tuple[Bools, ...]
-    by_test: bool
-
-
-def folds_of(protocol: Protocol) -> Folds:
-    """Of all tests that may be fitted."""
-    if len(protocol.to_fit) > 1:
-        return Folds(tuple(protocol.mask([number]) for number in protocol.to_fit), True)
+    if protocol.by_test:
+        return [protocol.mask([number]) for number in protocol.to_fit]
     blocks = _blocks(protocol)
-    return Folds(tuple(protocol.fitted & (blocks == k) for k in np.unique(blocks[protocol.fitted])), False)
+    return [protocol.fitted & (blocks == k) for k in np.unique(blocks[protocol.fitted])]
 
 
 def _blocks(protocol: Protocol) -> Ints:
@@ -170,14 +162,16 @@ def _blocks(protocol: Protocol) -> Ints:
     return np.concatenate(each)
 
 
-def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
+def held_out(fit: Fit, folds: Sequence[Bools]) -> tuple[Floats, float]:
     """What a fit says of each fold's rows given the others: its causes fitted to these, and linear about that.
+
+    `folds` (n,): rows that are held out in turn.
 
     Returns the predicted stress (n,) [Pa], NaN where nothing was held out, and the log density of all folds.
     """
     rows = fit.rows
     predicted, total = np.full(len(rows), np.nan), 0.0
-    for held in folds.held:
+    for held in folds:
         again = fit.refitted_to(rows & ~held)
         model = GaussianModel(fit.model.noise_factor, again.columns[rows], fit.scale)
         given = predict(model, again.residual[rows], held[rows].astype(np.int64))
@@ -187,7 +181,7 @@ def held_out(fit: Fit, folds: Folds) -> tuple[Floats, float]:
     return predicted, total
 
 
-def _placebo_p(about: Linear, name: str, folds: Folds, random: np.random.Generator) -> float:
+def _placebo_p(about: Linear, name: str, folds: Sequence[Bools], random: np.random.Generator) -> float:
     """Probability that a pattern that means nothing predicts held-out rows as well as a cause does.
 
     A pattern is a random smooth function of stretch, shear, the path of a test and the logarithm of its time, the
@@ -207,7 +201,7 @@ def _placebo_p(about: Linear, name: str, folds: Folds, random: np.random.Generat
         causes.append(Cause(str(number), tuple(places), 0.0, cause.sizes))
     residual = fit.residual[fit.rows]
     total, of_all_rows = np.zeros(len(causes)), _log_densities(fit.model, residual, causes)
-    for held in folds.held:
+    for held in folds:
         observed = ~held[fit.rows]
         kept = [replace(each, places=tuple(Place(place.columns[observed]) for place in each.places)) for each in causes]
         total += of_all_rows - _log_densities(fit.model.rows(observed), residual[observed], kept)

@@ -118,13 +118,12 @@ class DiagnosingSpecimen:
             improvement=checked.improvement,
             confirmations=checked.confirmations,
             explained=explained,
-            assumptions=result.assumptions_of(best, protocol, checker.folds.by_test),
+            assumptions=result.assumptions_of(best, protocol),
             remarks=tuple(
                 f"{component.effect.name} is not simulated by a run: the explained case is fitted without it"
                 for component in best.assumed
                 if not component.effect.runs and component.effect.name != UNKNOWN
             ),
-            by_test=checker.folds.by_test,
             seconds=self.seconds,
         )
 

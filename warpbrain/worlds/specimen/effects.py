@@ -264,8 +264,8 @@ def unlike(case: Case, protocol: Protocol) -> Effect:
 
 def specimen_rows(protocol: Protocol) -> Floats:
     """Which rows (n, specimens) are of which specimen, 0 or 1."""
-    of = np.concatenate([np.full(len(test.strain), protocol.specimens.index(test.specimen)) for test in protocol.tests])
-    return (of[:, None] == np.arange(len(protocol.specimens))).astype(float)
+    of_test = np.array([protocol.specimens.index(test.specimen) for test in protocol.tests])
+    return (of_test[protocol.test_of, None] == np.arange(len(protocol.specimens))).astype(float)
 
 
 def unknown(protocol: Protocol) -> Effect:
@@ -300,13 +300,12 @@ def effects_of(
     shown, situation = _shown(protocol), _situation(case, 2 if _tells_time(protocol) else 1)
     testable: dict[str, Effect] = {}
     rejected: dict[str, str] = {}
-    registry = {name: known for name, known in mechanisms().items() if known.of_specimens}
-    for name in (*registry, *_OTHERS):
+    registry = {name: kind for name, kind in mechanisms().items() if kind.of_specimens}
+    makers = {name: partial(_registered, kind, shown, situation) for name, kind in registry.items()}
+    makers |= {name: partial(make, case, protocol) for name, make in _OTHERS.items()}
+    for name, make in makers.items():
         try:
-            if name in registry:
-                testable[name] = _registered(registry[name], shown, situation)
-            else:
-                testable[name] = _OTHERS[name](case, protocol)
+            testable[name] = make()
         except NotTestableError as error:
             rejected[name] = f"not testable with these data: {error}"
     if wanted is not None:

@@ -136,24 +136,33 @@ class Protocol:
         """Stress (n,) at all rows [Pa]."""
         return np.concatenate([test.stress for test in self.tests])
 
+    @cached_property
+    def test_of(self) -> Ints:
+        """Number (n,) of the test of each row."""
+        return np.repeat(np.arange(len(self.tests)), [len(test.strain) for test in self.tests])
+
     @property
     def peaks(self) -> Floats:
         """Largest stress of the test (n,) of each row [Pa]."""
-        return np.concatenate([np.full(len(test.strain), test.peak) for test in self.tests])
+        return np.array([test.peak for test in self.tests])[self.test_of]
 
     def mask(self, tests: Sequence[int]) -> Bools:
         """The rows (n,) of some tests."""
-        of_test = np.concatenate([np.full(len(test.strain), k) for k, test in enumerate(self.tests)])
-        return np.isin(of_test, tests)
+        return np.isin(self.test_of, tests)
 
     @property
     def to_fit(self) -> tuple[int, ...]:
         """Numbers of the tests that may be fitted."""
         return tuple(k for k, test in enumerate(self.tests) if test.fitted)
 
+    @property
+    def by_test(self) -> bool:
+        """Whether each of these is held out in turn: of an only one quarters are."""
+        return len(self.to_fit) > 1
+
     @cached_property
     def fitted(self) -> Bools:
-        """The rows (n,) of these."""
+        """The rows (n,) of the tests that may be fitted."""
         return self.mask(self.to_fit)
 
     @property

@@ -68,8 +68,6 @@ class SpecimenDiagnosis(Verdict):
         Of the same, at all rows [Pa]; and ``"heldout refitted"``, ``"heldout explained"``.
     improvement : (part, low, high) or None
         Of the refitted case's held-out error that is gone.
-    by_test : bool
-        Whether whole tests were held out.
     """
 
     protocol: Protocol
@@ -77,7 +75,11 @@ class SpecimenDiagnosis(Verdict):
     scores: Mapping[str, Score]
     stresses: Mapping[str, Floats]
     improvement: tuple[float, float, float] | None
-    by_test: bool
+
+    @property
+    def by_test(self) -> bool:
+        """Whether whole tests were held out, not quarters of the only one."""
+        return self.protocol.by_test
 
     @cached_property
     def sentence(self) -> str:
@@ -103,7 +105,7 @@ def specimen_effect_sentence(cause: Ranked) -> str:
     return f"{cause.sentence.rstrip('.')}: {size}." if size else cause.sentence
 
 
-def assumptions_of(fit: Fit, protocol: Protocol, by_test: bool) -> tuple[str, ...]:
+def assumptions_of(fit: Fit, protocol: Protocol) -> tuple[str, ...]:
     """What was taken for granted."""
     case, glued = fit.forward.case, fit.forward.factor
     remembering = any(len(chain.tests) > 1 for chain in protocol.chains)
@@ -127,7 +129,7 @@ def assumptions_of(fit: Fit, protocol: Protocol, by_test: bool) -> tuple[str, ..
         "was found.",
         ends,
         f"Allowed to explain differences first: {', '.join(fit.forward.names)}.",
-        "Held out: each test in turn." if by_test else "Held out: each quarter of the only test in turn.",
+        "Held out: each test in turn." if protocol.by_test else "Held out: each quarter of the only test in turn.",
     )
 
 

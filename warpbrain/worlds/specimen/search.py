@@ -148,9 +148,8 @@ class Sets:
         """The fit of a set, made if it was not; None if none stands."""
         if names not in self.by_names:
             # proposed about the same set with one cause less
-            fits = ((self.fitted(names - {name}), names - {name}) for name in sorted(names))
-            for fewer, kept in fits:
-                if fewer is not None:
+            for kept in (names - {name} for name in sorted(names)):
+                if (fewer := self.fitted(kept)) is not None:
                     self._propose(fewer, self.by_names[kept].spread)
                     break
         candidate = self.by_names.get(names)
