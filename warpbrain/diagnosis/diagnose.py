@@ -129,14 +129,15 @@ class Diagnosing:
         confusing = beside(lambda: imitations(search.causes, nothing.marginal.model))
         with self.seconds.of("where"):
             where = map_of_search(search, options.draws, random, options.alpha)
-            unknown, base, model = None, search.base, best.marginal.model
-            if checked.decision.verdict in (UNKNOWN, NAMED_AND_REST):
-                resists = search.likely_unknown(best) == RESISTANCE
-                noise, centre = base.typical_noise, where.centre
-                unknown = traits_of(base.at, model, best.residual, noise, search.spacing, centre, resists)
-            if unknown is not None and source is not None:
+            unknown, fitted_source = None, None
+            if source is not None:
                 error = blocks.error(confirming.predict(source, blocks))
-                unknown = replace(unknown, source=FittedSource.of(source, fit.refitted[1], error))
+                fitted_source = FittedSource.of(source, fit.refitted[1], error)
+            if checked.decision.verdict in (UNKNOWN, NAMED_AND_REST):
+                base, model = search.base, best.marginal.model
+                traits = traits_of(base.at, model, best.residual, base.typical_noise, search.spacing, where.centre)
+                resists = search.likely_unknown(best) == RESISTANCE
+                unknown = replace(traits, resistance=resists, source=fitted_source)
         with self.seconds.of("what would be seen"):
             confusion = confusing()
             seen = smallest(search.causes, nothing.marginal.model, confusion)

@@ -120,7 +120,6 @@ def score_map(
     """The map of residuals (n,).
 
     `model`: of noise and nuisances.
-    `residual` (n,).
     `draws`: of rows if no cause acts, the same in any axes and order of rows (`FieldFactors.drawn`).
     `length`, `spacing`: of patches and between them [m].
     """
@@ -205,7 +204,7 @@ class Traits:
     hidden: bool  # whether there seems to be a net force, which what holds the body may carry: it cannot be told
     surface_nats: float  # log Bayes factor of a force on the surface alone over one within the body alone
     centre: Floats  # (3,), where it is [m]
-    resistance: bool  # whether it is more like tissue whose resistance changes in time than a force or a stress
+    resistance: bool = False  # whether it is more like tissue whose resistance changes in time than a force or a stress
     source: FittedSource | None = None  # where it is all that acts, in one place
 
     @property
@@ -223,16 +222,13 @@ def traits_of(
     noise: float,
     length: float,
     centre: Floats,
-    resistance: bool = False,
 ) -> Traits:
-    """Traits of what residuals (n,) show beside noise and nuisances.
+    """Traits of a force that residuals (n,) show beside noise and nuisances.
 
     `model`: of noise and nuisances.
-    `residual` (n,).
     `noise`: typical noise of displacements [m].
     `length`: of patches [m].
     `centre` (3,): about which moments are taken [m].
-    `resistance`: see `Traits`.
     """
     sites, answers = force_patches(at, length)
     # patches on held nodes have no effect
@@ -242,8 +238,7 @@ def traits_of(
     rows = at.sensors.is_displacement
     unit = noise / np.sqrt(np.mean(np.sum(A[rows] ** 2, axis=1)))
     functionals = unit * _summed(sites, centre)
-    covariance = model.scale**2 * (model.noise_factor @ model.noise_factor.T) + model.columns @ model.columns.T
-    resultant = partial(_Resultant.of, unit * A, functionals, covariance, residual)
+    resultant = partial(_Resultant.of, unit * A, functionals, model.covariance, residual)
     plain, with_hiding = resultant(None), resultant(noise * stress_beside_held(at, length))
     force, moment = slice(0, 3), slice(3, 6)
     sd = np.sqrt(np.maximum(np.diag(with_hiding.covariance), 0.0))
@@ -258,7 +253,6 @@ def traits_of(
         plain.is_significant(force) and not outside,
         _surface_nats(at, sites, answers, model, plain.size * unit, residual, length),
         centre,
-        resistance,
     )
 
 

@@ -153,12 +153,9 @@ def _member(diagnosis: Diagnosis, kind: str) -> str:
 def confusion_sentences(confusion: Confusion) -> tuple[str, ...]:
     """Which mechanisms these recordings confuse most easily."""
     pairs = [(part, kind, other) for kind, row in confusion.rows.items() for other, part in row.items()]
-    pairs_in_words = [f"{kind} for {other} ({percent(part)})" for part, kind, other in sorted(pairs, reverse=True)[:4]]
-    sentence = (
-        f"With these recordings most easily taken for another: {', '.join(pairs_in_words)}." if pairs_in_words else ""
-    )
+    most = [f"{kind} for {other} ({percent(part)})" for part, kind, other in sorted(pairs, reverse=True)[:4]]
     return (
-        *([sentence] if sentence else []),
+        *([f"With these recordings most easily taken for another: {', '.join(most)}."] if most else []),
         "In percent of what is visible of it, at its middling place and the best place of the other.",
     )
 
