@@ -200,33 +200,29 @@ def _test(specimen: Specimen, recording: TestRecording) -> Test:
     strain = specimen.strain_of(recording.mode, recording.quantities[0], recording.imposed)
     stress, rows = unit * recording.response, np.arange(len(strain))
     reach = max(float(np.abs(strain - REST[recording.mode]).max()), 1e-12)
+    # its strain path and its noise follow from the rest
     test = Test(
         recording.name, recording.mode, recording.specimen, recording.role == "fit", rows, strain, stress,
-        recording.time, np.zeros(len(strain)), _reading(specimen, recording, strain, stress), unit,
-        float(np.abs(stress).max()), reach, recording.turn,
+        recording.time, np.zeros(len(strain)), 0.0, unit, float(np.abs(stress).max()), reach, recording.turn,
     )  # fmt: skip
     # without the jitter of a reading, which would make every path long
     kept = _kept(test)
     strain_path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(strain[kept])))]) / reach
-    return replace(test, strain_path=np.interp(rows, kept, strain_path))
+    sigma = _reading(specimen, recording, test)
+    return replace(test, strain_path=np.interp(rows, kept, strain_path), sigma=sigma)
 
 
-def _reading(specimen: Specimen, recording: TestRecording, strain: Floats, stress: Floats) -> float:
+def _reading(specimen: Specimen, recording: TestRecording, test: Test) -> float:
     """Noise of a reading [Pa]: as declared, or as rough as the record is.
 
     Where the force was imposed the strain was read, and its noise is that of a stress by the secant to the largest one:
     the stress at a strain is compared, whatever the machine imposed.
     """
     if not recording.force_controlled:
-        return (
-            _roughness(stress)
-            if recording.sigma is None
-            else specimen.stress_unit(recording.quantities[1]) * recording.sigma
-        )
-    away = float(np.abs(strain - REST[recording.mode]).max())
-    stiffness = float(np.abs(stress).max()) / max(away, 1e-12)
+        return _roughness(test.stress) if recording.sigma is None else test.unit * recording.sigma
+    stiffness = test.peak / test.reach
     if recording.sigma is None:
-        return stiffness * _roughness(strain)
+        return stiffness * _roughness(test.strain)
     # strains are linear in what was read
     zero, deviation = specimen.strain_of(recording.mode, recording.quantities[0], np.array([0.0, recording.sigma]))
     return stiffness * abs(float(deviation - zero))
