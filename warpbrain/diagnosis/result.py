@@ -36,6 +36,12 @@ class Confusion:
     #: By mechanism, the part of its detectable effect that the best place of each other cause explains.
     rows: dict[str, dict[str, float]]
 
+    @property
+    def largest(self) -> list[tuple[float, str, str]]:
+        """The four largest of these parts, each with the mechanism and what imitates it."""
+        parts = [(part, kind, other) for kind, row in self.rows.items() for other, part in row.items()]
+        return sorted(parts, reverse=True)[:4]
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -152,8 +158,7 @@ def _member(diagnosis: Diagnosis, kind: str) -> str:
 
 def confusion_sentences(confusion: Confusion) -> tuple[str, ...]:
     """Which mechanisms these recordings confuse most easily."""
-    pairs = [(part, kind, other) for kind, row in confusion.rows.items() for other, part in row.items()]
-    most = [f"{kind} for {other} ({percent(part)})" for part, kind, other in sorted(pairs, reverse=True)[:4]]
+    most = [f"{kind} for {other} ({percent(part)})" for part, kind, other in confusion.largest]
     return (
         *([f"With these recordings most easily taken for another: {', '.join(most)}."] if most else []),
         "In percent of what is visible of it, at its middling place and the best place of the other.",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from warpbrain.arrays import Floats
-from warpbrain.diagnosis.result import Diagnosis
+from warpbrain.diagnosis.result import Confusion, Diagnosis
 from warpbrain.inference.calibration import percent
 from warpbrain.physics.words import length, number, seconds
 from warpbrain.report import views
@@ -226,9 +226,8 @@ def confusion_figure(rows: dict[str, dict[str, float]]) -> dict[str, Any]:
         axes.set_ylabel("what acts", fontsize=TEXT)
         return figure
 
-    pairs = [(part, kind, imitator) for kind, row in rows.items() for imitator, part in row.items()]
-    most = sorted(pairs, reverse=True)[:4]
-    return inlined(draw, most=", ".join(f"{kind} by {imitator} {percent(part)}" for part, kind, imitator in most))
+    most = [f"{kind} by {imitator} {percent(part)}" for part, kind, imitator in Confusion(rows).largest]
+    return inlined(draw, most=", ".join(most))
 
 
 def curves_figure(diagnosis: SpecimenDiagnosis) -> dict[str, Any]:
