@@ -139,7 +139,8 @@ def window(state: SavedState, exaggeration: float | None) -> Any:
     # a graphics library is asked for here only
     from warpbrain.report.rendering.drawing import interactive
 
-    return interactive(scene_of(state.mesh, state.mesh, state.u, {}, _NO_POINTS), exaggeration)
+    nothing = np.zeros(len(state.mesh.tetrahedra), dtype=bool)
+    return interactive(scene_of(state.mesh, state.mesh, nothing, state.u, {}, _NO_POINTS), exaggeration)
 
 
 def write_view_page(path: Path, state: SavedState, exaggeration: float | None) -> None:

@@ -169,7 +169,7 @@ def _draw_open(axes: Any, scene: _Scene) -> str:
     recorded: list[PointsRecording | SurfaceRecording] = [*scene.tracked, *scene.surfaces]
     where = np.concatenate([np.zeros((0, 3)), *(recording.points for recording in recorded)])
     still = Moved(where, *np.zeros((2, *where.shape)))
-    drawn = scene_of(scene.mesh, left, np.zeros_like(left.points), scene.names, still)
+    drawn = scene_of(scene.mesh, left, scene.resected, np.zeros_like(left.points), scene.names, still)
     camera = cameras_of(drawn)[BEFORE]
     try:
         image = render(drawn, {BEFORE: camera}, _SIZE)[BEFORE]

@@ -72,7 +72,8 @@ def begin_pictures(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, st
 
     To be called where `ready_to_render` lasts: rendering ends with it.
     """
-    scene, resected = scene_of(whole, mesh, u, names, moved), taken_out(whole, mesh)
+    resected = taken_out(whole, mesh)
+    scene = scene_of(whole, mesh, resected, u, names, moved)
     cameras = cameras_of(scene)
     rendered = beside(lambda: render(scene, cameras, _SIZE))
     return Pictures(scene, cameras, whole, resected, names, rendered)
@@ -88,14 +89,15 @@ def taken_out(whole: TetMesh, mesh: TetMesh) -> Bools:
     return np.asarray(cKDTree(mesh.centres).query(whole.centres)[0] > near)
 
 
-def scene_of(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> rendering.Scene:
-    """What is drawn of a deformed body; see `begin_pictures`."""
+def scene_of(
+    whole: TetMesh, mesh: TetMesh, resected: Bools, u: Floats, names: dict[int, str], moved: Moved
+) -> rendering.Scene:
+    """What is drawn of a deformed body; see `begin_pictures`. `resected` (m,): what is not left of `whole`."""
     from matplotlib import colormaps
     from matplotlib.colors import to_rgb
 
     sizes = MILLIMETRES * np.linalg.norm(u, axis=1)
     size = MILLIMETRES * float(np.ptp(whole.points, axis=0).max())
-    resected = taken_out(whole, mesh)
     # nodes of what is left first, as in `mesh`; those that only what was removed has come after them
     more = whole.points if resected.any() else whole.points[:0]
     points, tissue = np.concatenate([mesh.points, more]), np.concatenate([mesh.tissue, whole.tissue[resected]])

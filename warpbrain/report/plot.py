@@ -151,11 +151,7 @@ def _file(what: Any) -> tuple[Any, str]:
     )
 
 
-@_file.register
-def _(what: TetMesh) -> tuple[Any, str]:
-    return body_file(what, sets_of(what.node_sets), sets_of(what.element_sets)), "tissue"
-
-
+_file.register(TetMesh, lambda what: (body_file(what, sets_of(what.node_sets), sets_of(what.element_sets)), "tissue"))
 _file.register(Case, lambda what: _file(what.mesh))
 _file.register(Result, lambda what: (file_of_result(what), "displacement"))
 _file.register(Run, lambda what: _file(what.result))

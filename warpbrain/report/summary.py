@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 #: Said wherever a stand-in is met.
 STAND_IN = "a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"
+#: What is said of the displacements of a set.
+_SIZES = ("mean", "root_mean_square", "percentile_95", "largest")
 #: How the node sets are called where users read them.
 SET_TITLES = {
     "all nodes": "all nodes",
@@ -121,15 +123,13 @@ def _ends(values: Any) -> dict[str, float]:
 
 def sizes_mm(statistics: Any) -> dict[str, float]:
     """Statistics of displacements in mm."""
-    keys = ("mean", "root_mean_square", "percentile_95", "largest")
-    return {key: MILLIMETRES * getattr(statistics, key) for key in keys}
+    return {key: MILLIMETRES * getattr(statistics, key) for key in _SIZES}
 
 
 def displacement_rows(described: Mapping[str, Any]) -> list[list[Any]]:
     """Node set, number of nodes, mean, root mean square, 95th percentile and largest displacement [mm], as text."""
-    keys = ("mean", "root_mean_square", "percentile_95", "largest")
     sets = described["displacement_mm"].items()
-    return [[SET_TITLES.get(name, name), s["nodes"], *(tabled(s[key]) for key in keys)] for name, s in sets]
+    return [[SET_TITLES.get(name, name), s["nodes"], *(tabled(s[key]) for key in _SIZES)] for name, s in sets]
 
 
 def describe_prior(prior: FromPrior) -> dict[str, Any]:

@@ -21,11 +21,9 @@ def side_by_side(
     count: int, narrow: bool, height: float, size: tuple[float, float], **options: Any
 ) -> tuple[Any, list[Any]]:
     """A figure of a size [inch] with panels side by side, or one below the other, each of that height [inch]."""
-    return (
-        views.panels(count, 1, (NARROW, height * count), **options)
-        if narrow
-        else views.panels(1, count, size, **options)
-    )
+    if narrow:
+        return views.panels(count, 1, (NARROW, height * count), **options)
+    return views.panels(1, count, size, **options)
 
 
 def panels(narrow: bool, height: float, count: int = 1, width: float = WIDTH, **options: Any) -> tuple[Any, list[Any]]:
