@@ -120,10 +120,8 @@ def next_measurements(
     ]
     places = _places(base)
     further = discrimination.rows_at(np.concatenate(list(places.values())))
-    at = 0
-    for name, points in places.items():
-        rows = further[3 * at : 3 * (at + len(points))]
-        at += len(points)
+    ends = 3 * np.cumsum([len(points) for points in places.values()])[:-1]
+    for (name, points), rows in zip(places.items(), np.split(further, ends), strict=True):
         measurements.append(Measurement(f"{len(points)} more tracked points {name}", discrimination.with_rows(rows)))
     registry = mechanisms()
     for name, effect in zip(names, effects, strict=True):
@@ -132,10 +130,7 @@ def next_measurements(
             size = abs(z[0]) * effect.proposed.sd[0] if name == names[0] else effect.proposed.sd[0]
             expected_nats = measurements[0].expected_nats + 0.5 * (float(size) / reading.error) ** 2
             measurements.append(Measurement(reading.words, expected_nats))
-    measurements += [
-        Measurement(f"the same points with the head turned {words}", expected_nats)
-        for words, expected_nats in discrimination.turned()
-    ]
+    measurements += discrimination.turned()
     return tuple(sorted(measurements, key=lambda measurement: -measurement.expected_nats))
 
 
@@ -182,7 +177,7 @@ class _Discrimination:
         noise = self._base.typical_noise * np.eye(len(further))
         return self._expected_nats(np.concatenate([self._rows, further]), self._base.model.noise_factor, noise)
 
-    def turned(self) -> list[tuple[str, float]]:
+    def turned(self) -> list[Measurement]:
         """With the same points again after the best turn of the head; empty if both effects turn with the body.
 
         Tissue is the same in both poses; each pose has its own error of registration.
@@ -202,8 +197,9 @@ class _Discrimination:
             first = np.column_stack([self._rows, np.zeros_like(registration)])
             second = np.column_stack([self._rows_of(effects[0], effects[1], common), registration])
             expected_nats = self._expected_nats(np.concatenate([first, second]), factor, factor)
-            measurements.append((f"by {_TURN:g} degrees about its {words} axis", expected_nats))
-        return [max(measurements, key=lambda measurement: measurement[1])]
+            turn = f"{_TURN:g} degrees about its {words} axis"
+            measurements.append(Measurement(f"the same points with the head turned by {turn}", expected_nats))
+        return [max(measurements, key=lambda measurement: measurement.expected_nats)]
 
     def _expected_nats(self, rows: Floats, *noise_factors: Floats) -> float:
         """Of rows whose parts, one after the other, have independent noise with these factors."""
