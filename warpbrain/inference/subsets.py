@@ -86,7 +86,21 @@ class Blocks(_Ordered):
     """
 
     def __init__(self, model: GaussianModel, residual: Floats, causes: Sequence[Cause]) -> None:
-        self._white, self._scale = model.white(self._stacked(residual, causes)), model.scale
+        widths = [np.array([place.columns.shape[1] for place in cause.places]) for cause in causes]
+        order = np.argsort([-each.max() for each in widths], kind="stable").tolist()
+        self.cause = np.concatenate([np.full(len(causes[c].places), c) for c in order]).astype(np.int64)
+        self.place = np.concatenate([np.arange(len(causes[c].places)) for c in order]).astype(np.int64)
+        self.log_weights = np.concatenate([causes[c].log_weights for c in order])
+        self._width = np.concatenate([widths[c] for c in order]).astype(np.int64)
+        self._first = np.concatenate([[0], np.cumsum(self._width)])
+        self._sizes = np.array([cause.sizes for cause in causes])[self.cause]
+        places = [place for c in order for place in causes[c].places]
+        means = [place.mean for place in places if place.mean is not None]
+        given = np.array([place.mean is not None for place in places])
+        self._mean = np.where(given, np.cumsum(given), 0)
+        # the residual, means that are given, and columns
+        self._white = model.white(np.column_stack([residual, *means, *(place.columns for place in places)]))
+        self._scale = model.scale
         self._by_width = [self._products(low, high) for low, high in self._runs(0)]
 
     def at(self, scale: float) -> Blocks:
@@ -111,22 +125,6 @@ class Blocks(_Ordered):
     def _residuals(rows: Floats, means: Ints) -> Floats:
         """The first of rows less those of means (b, ...); one for all blocks without means."""
         return rows[0] - np.where((means > 0)[:, None], rows[means], 0.0) if means.any() else rows[:1]
-
-    def _stacked(self, residual: Floats, causes: Sequence[Cause]) -> Floats:
-        """Rows (n, 1 + m + q) of the residual, means that are given and columns; sets the order of blocks."""
-        widths = [np.array([place.columns.shape[1] for place in cause.places]) for cause in causes]
-        order = np.argsort([-each.max() for each in widths], kind="stable").tolist()
-        self.cause = np.concatenate([np.full(len(causes[c].places), c) for c in order]).astype(np.int64)
-        self.place = np.concatenate([np.arange(len(causes[c].places)) for c in order]).astype(np.int64)
-        self._width = np.concatenate([widths[c] for c in order]).astype(np.int64)
-        self._first = np.concatenate([[0], np.cumsum(self._width)])
-        self._sizes = np.array([cause.sizes for cause in causes])[self.cause]
-        self.log_weights = np.concatenate([causes[c].log_weights for c in order])
-        places = [causes[c].places[p] for c, p in zip(self.cause.tolist(), self.place.tolist(), strict=True)]
-        given = np.array([place.mean is not None for place in places])
-        self._mean = np.where(given, np.cumsum(given), 0)
-        means = [place.mean for place in places if place.mean is not None]
-        return np.column_stack([residual, *means, *(place.columns for place in places)])
 
     def log_factors(self) -> Floats:
         """Log Bayes factors (p, s) of each block by itself, with every size."""
