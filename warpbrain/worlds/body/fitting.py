@@ -154,6 +154,8 @@ class FitSearch:
         for effect, part in zip(self.effects, self._layout.effects, strict=True):
             without[part] -= effect.offset(without[part])
         for share in _SHARES:
+            # from rest: what is known nearby has no equilibrium with all of these
+            self._solved = []
             try:
                 return self.start([without + share * (end - without)], nearby)
             except SolveError:
