@@ -71,6 +71,12 @@ class Sensors:
         return np.asarray(self.directions.any(axis=1))
 
     @property
+    def of_one_unit(self) -> Bools:
+        """Which rows are lengths, or all where none is: in any sum forces, which have another unit, would dominate."""
+        rows = self.is_displacement
+        return rows if rows.any() else np.ones(len(self), dtype=bool)
+
+    @property
     def of_surfaces(self) -> Bools:
         """Which rows are of points of a surface: each of these has one number, along the normal."""
         return np.asarray(self.is_displacement & (np.bincount(self.groups)[self.groups] == 1))

@@ -63,6 +63,7 @@ class Base:
     #: the first alone where all are next to nothing.
     noises: tuple[GaussianModel, ...]
     noise: Floats  # (n,), standard deviation of the independent noise of each row
+    typical_noise: float  # median of that of displacements [m]; of all rows if none was recorded
     points: tuple[Ints, ...]  # rows of each recorded point
     residual: Floats  # (n,), of the linear model with all nuisances at their prior mean
     mesh_errors: MeshErrors | None  # of the base; None: the mesh is taken for exact
@@ -72,12 +73,6 @@ class Base:
     def sources(self) -> tuple[Effect, ...]:
         """Unknown, in one place."""
         return self.begun_sources()
-
-    @property
-    def typical_noise(self) -> float:
-        """Median of the noise of displacements [m]; of all rows if none was recorded."""
-        lengths = self.at.sensors.is_displacement
-        return float(np.median(self.noise[lengths] if lengths.any() else self.noise))
 
     def for_sensors(self, sensors: Sensors) -> tuple[Nuisances, Effects]:
         """Nuisances as columns over other sensors, in the same coordinates, and what makes effects over them."""
@@ -157,28 +152,29 @@ class BaseFinder:
         # products with the compliance, which leave Python's lock alone, beside candidates that do not
         begun_sources = beside(partial(sources, linear.at, self._spacing, linear.typical_noise))
         unknown = fields(linear.at, linear.lengths, linear.body_forces)
+        smooth = next(iter(unknown.values())).columns
         nuisances, noise = linear.nuisances, linear.noise_model
         if errors is not None and not self._without_nuisances:
-            smooth = next(iter(unknown.values())).columns
             nuisances = _with_likely_fraction(nuisances, noise, linear.residual, linear.typical_noise * smooth)
         return Base(
-            self.states,
-            self.prior,
-            declared,
-            state,
-            linear.at,
-            linear.effects,
-            nuisances,
-            unknown,
-            begun_sources,
-            resistances(linear.at, self.states.times, other_volume(self.states), next(iter(unknown.values())).columns),
-            noise.of_noise(nuisances.columns),
-            _noises(linear, resolved=errors is None or self._without_nuisances),
-            linear.noise,
-            linear.points,
-            linear.residual,
-            errors,
-            tuple(self._remarks),
+            states=self.states,
+            prior=self.prior,
+            declared=declared,
+            state=state,
+            at=linear.at,
+            effects=linear.effects,
+            nuisances=nuisances,
+            unknown=unknown,
+            begun_sources=begun_sources,
+            resistance=resistances(linear.at, self.states.times, other_volume(self.states), smooth),
+            model=noise.of_noise(nuisances.columns),
+            noises=_noises(linear, resolved=errors is None or self._without_nuisances),
+            noise=linear.noise,
+            typical_noise=linear.typical_noise,
+            points=linear.at.sensors.points,
+            residual=linear.residual,
+            mesh_errors=errors,
+            remarks=tuple(self._remarks),
         )
 
     def _next_hypothesis(self, linear: _LinearModel) -> Hypothesis:
@@ -190,8 +186,9 @@ class BaseFinder:
         model = linear.noise_model.of_noise(columns)
         values, log_prior = scales()
         model = model.with_scale(model.likely_scale(linear.residual, values, log_prior))
-        inflation = with_gross_errors(model, linear.residual, linear.points, outliers()).inflation
-        model = model.with_columns(columns_of_inflation(model, linear.points, inflation))
+        points = linear.at.sensors.points
+        inflation = with_gross_errors(model, linear.residual, points, outliers()).inflation
+        model = model.with_columns(columns_of_inflation(model, points, inflation))
         xi, _ = model.coefficients(linear.residual)
         count = columns.shape[1]
         deviations = registration_of(self.states.case).deviations
@@ -242,8 +239,7 @@ class _LinearModel:
         self.smooth_force = size * smooth
         self.noise = noise_of(sensors, self.residual, self.nuisances.columns, smooth)
         self.noise_model = sensors.noise(self.noise)
-        self.typical_noise = float(np.median(self.noise[rows] if rows.any() else self.noise))
-        self.points = sensors.points
+        self.typical_noise = float(np.median(self.noise[sensors.of_one_unit]))
 
     def _residual_at_mean(self, state: SolvedState) -> Floats:
         """Residual of the linear model about a state with its tissue, field and motion at their prior mean."""

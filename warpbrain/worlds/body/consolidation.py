@@ -64,15 +64,14 @@ def bound_term(system: System, mechanism: Following) -> Term:
     return term
 
 
-def consolidation(at: Linearisation, term: Term) -> Course:
-    """What is recorded while a term's own unknowns relax to zero after all loads are applied at once.
+def consolidation(at: Linearisation, mechanism: Following) -> Course:
+    """What is recorded while the unknowns of a mechanism's term relax to zero after all loads are applied at once.
 
-    `at`: about the final state. `term`: with unknowns of its own; bound to the system of that state, but not one of its
-    terms.
+    `at`: about the final state, in which it does not act.
     """
     from scipy.linalg import eigh_tridiagonal
 
-    b, B, N, H = _matrices(at, term)
+    b, B, N, H = _matrices(at, bound_term(at.system, mechanism))
     if not b.any():
         # of a body at rest, whose fluid carries nothing
         return Course(at.sensors, np.zeros((len(at.sensors), 1)), np.ones(1), np.zeros((1, 1)))

@@ -230,7 +230,7 @@ class Effects:
                 values = of(next(effects))
                 return _expanded(values, varying, moment.times) if expanded and varying is not None else values
 
-            return self.at.summed_in_time(change)
+            return self.at.summed(change)
 
         columns_at = None
         if effect.columns_at is not None:
@@ -246,10 +246,10 @@ class Effects:
     ) -> dict[int, Effect]:
         """Effects at one state by the identity of their proposals."""
         flows = _started([proposal for proposal in proposals if proposal.pace is not None])
-        terms = {key: bound_term(self.at.system, cast(Following, flow)) for key, flow in flows.items()}
-        courses = {key: consolidation(self.at, term) for key, term in terms.items()}
+        courses = {key: consolidation(self.at, cast(Following, flow)) for key, flow in flows.items()}
         fading = _started([proposal for proposal in proposals if proposal.history is not None])
-        instant = dict(zip(fading, self._answers(list(fading.values()), present).T, strict=True))
+        each_alone = [np.eye(len(fading))]
+        instant = dict(zip(fading, self._answers(list(fading.values()), present, each_alone).T, strict=True))
         stencils = [self._stencil(proposal, columns_alone) for proposal in proposals]
         mechanisms = [mechanism for each, _ in stencils for mechanism in each]
         answers = self._answers(mechanisms, present, [weights for _, weights in stencils])
@@ -315,22 +315,16 @@ class Effects:
         offset = (proposal.mean - proposal.start) / proposal.sd
         return Effect(proposal, answers[:, 0] + columns @ offset, columns)
 
-    def _answers(
-        self, mechanisms: Sequence[Mechanism], present: Mechanism | None, weights: Sequence[Floats] | None = None
-    ) -> Floats:
-        """Effect of each mechanism (n, count), in the place of the case's own one where it has only one of the kind.
+    def _answers(self, mechanisms: Sequence[Mechanism], present: Mechanism | None, weights: Sequence[Floats]) -> Floats:
+        """Sums (n, c) of effects of mechanisms, in the place of the case's own one where it has only one of the kind.
 
-        `weights`: of each run of mechanisms (s, c), in their order: sums (n, c) of their effects instead.
+        `weights`: of each run of mechanisms (s, c), in their order.
         """
         from scipy.sparse import block_diag, identity
 
         if not mechanisms:
             return np.zeros((len(self.at.sensors), 0))
-        sums = (
-            identity(len(mechanisms), format="csr")
-            if weights is None
-            else block_diag([each for each in weights if each.size], format="csr")
-        )
+        sums = block_diag([each for each in weights if each.size], format="csr")
         total = self._added(mechanisms, present, sums)
         if present is None:
             for kind, replaced in self._exclusive.items():
@@ -431,7 +425,7 @@ def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats) -> Float
         [effect] = Effects(moment.at).of([smooth], varying.base.make(here))
         return _expanded(effect.columns, varying, moment.times)
 
-    return at.summed_in_time(about)
+    return at.summed(about)
 
 
 def _sd_of(proposal: Proposal, varying: Varying) -> Floats:

@@ -203,7 +203,16 @@ class Linearisation:
         self._equilibria = 0
         # time, linear model and share of the end of each state, where several count
         self._states: tuple[tuple[float, Linearisation, float], ...] = ()
-        self._factorise()
+        system.u.assign(u)
+        S, skew = system.stiffness().tocsr(), system.skew_stiffness()
+        free = ~system.model.constrained.ravel()
+        #: `K` [N/m] on every component, SciPy CSR (3 N, 3 N). Without its skew part the response to 1.5 kPa on the wall
+        #: of a cavity is an eighth off.
+        self.stiffness: Any = S if skew is None else (S + skew).tocsr()
+        #: Components (3 N,) that nothing holds.
+        self.free: Bools = free
+        self._held_free = self.stiffness[~free][:, free]
+        self.factors = Factors(S[free][:, free], system.device, None if skew is None else skew.tocsr()[free][:, free])
 
     def in_time(self, states: Sequence[tuple[float, Linearisation, float]]) -> Linearisation:
         """The same, where rows are of states at several times or are counted from one.
@@ -237,33 +246,16 @@ class Linearisation:
                     moments.append(Moment(number, time, model.in_time(()), rows, times, sign))
         return tuple(moments)
 
-    def summed(self, answer: Callable[[Linearisation], Floats]) -> Floats:
+    def summed(self, answer: Callable[[Moment], Floats]) -> Floats:
         """What something changes of each row (n, ...): at its time, less at that from which it is counted.
 
-        `answer`: from the linear model about one state to what it changes of the rows of that.
+        `answer`: from the state of one time to what it changes of the rows of that.
         """
-        return self.summed_in_time(lambda moment: answer(moment.at))
-
-    def summed_in_time(self, answer: Callable[[Moment], Floats]) -> Floats:
-        """The same of what depends on time."""
         changes = [(moment, answer(moment)) for moment in self.moments]
         total = np.zeros((len(self.sensors), *changes[0][1].shape[1:]))
         for moment, change in changes:
             total[moment.rows] += moment.sign * change
         return total
-
-    def _factorise(self) -> None:
-        system = self.system
-        system.u.assign(self.u)
-        S, skew = system.stiffness().tocsr(), system.skew_stiffness()
-        free = ~system.model.constrained.ravel()
-        #: `K` [N/m] on every component, SciPy CSR (3 N, 3 N). Without its skew part the response to 1.5 kPa on the wall
-        #: of a cavity is an eighth off.
-        self.stiffness: Any = S if skew is None else (S + skew).tocsr()
-        #: Components (3 N,) that nothing holds.
-        self.free: Bools = free
-        self._held_free = self.stiffness[~free][:, free]
-        self.factors = Factors(S[free][:, free], system.device, None if skew is None else skew.tocsr()[free][:, free])
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:
         """The same state with other sensors, without factorising again."""
@@ -307,21 +299,21 @@ class Linearisation:
         (N, 3): reactions [N] beside those of the state, as of `reactions_to`. `SolveError` if too little holds the body
         without the patch.
         """
-        key = held.tobytes()
         with self._surface_lock:
-            surface = self._surface(key, held)
+            surface, responses = self._surface(held)
         moved = (surface if further is None else surface.with_further(further)).moved(patch, lifts)
         loose = np.flatnonzero(moved)
-        return np.asarray(self._surface_responses[key][:, loose] @ moved[loose])
+        return np.asarray(responses[:, loose] @ moved[loose])
 
-    def _surface(self, key: bytes, held: Bools) -> HeldSurface:
-        """A held surface with the responses of the sensors to it, made once."""
+    def _surface(self, held: Bools) -> tuple[HeldSurface, Floats]:
+        """A held surface, and the responses (n, 3 m) of the sensors to it, made once."""
+        key = held.tobytes()
         if key not in self._surfaces:
             self._surfaces[key] = HeldSurface(self, held, vertex_normals(self.system.model.mesh), self.extent)
         if key not in self._surface_responses:
             # Fortran order: of each patch a few columns are used
             self._surface_responses[key] = np.asfortranarray(self._surfaces[key].answers(self))
-        return self._surfaces[key]
+        return self._surfaces[key], self._surface_responses[key]
 
     def answers(self, forces: Floats) -> Floats:
         """Response (n, ...) of the sensors to nodal forces (..., N, 3) [N]."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -25,7 +24,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.effects import Effect, Effects
-from warpbrain.worlds.body.linearisation import Linearisation
+from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.states import FieldSizes, Hypothesis, States
@@ -168,8 +167,8 @@ def nuisances_at(
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:
     """What one standard deviation of each parameter of the tissues changes of what is recorded: (n, p)."""
 
-    def about(state: Linearisation) -> Floats:
-        system = state.system
+    def about(moment: Moment) -> Floats:
+        state, system = moment.at, moment.at.system
         forces = np.zeros((len(theta), system.size, 3))
         for k in range(len(theta)):
             for sign in (-1.0, 1.0):
@@ -185,18 +184,16 @@ def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaus
 
 def field_columns(at: Linearisation, states: States) -> Floats:
     """What one standard deviation of each mode of the stiffness field changes of what is recorded: (n, k)."""
-    return at.summed(lambda state: state.answers_of_elements(state.element_forces, states.modes))
+    return at.summed(lambda moment: moment.at.answers_of_elements(moment.at.element_forces, states.modes))
 
 
 def law_columns(effects: Effects, states: States) -> Floats:
     """What another Poisson ratio, exponent, share of the second invariant and stiffening change: (n, 4)."""
-    proposals = [
-        *(_always(states, key) for key in _ALWAYS),
-        *(
-            Proposal.of_one(partial(_with_share, of=of), 0.5, belief(f"tissue.{of}"), "smooth", 0.5)
-            for of in ("second_invariant", "stiffening")
-        ),
-    ]
+
+    def shape(of: str) -> Proposal:
+        return Proposal.of_one(lambda share: _Share(share=share, of=of), 0.5, belief(f"tissue.{of}"), "smooth", 0.5)
+
+    proposals = [*(_always(states, key) for key in _ALWAYS), shape("second_invariant"), shape("stiffening")]
     return np.concatenate([effect.columns for effect in effects.of(proposals, columns_alone=True)], axis=1)
 
 
@@ -257,15 +254,11 @@ class _Share(Mechanism):
         return Ogden(moduli, exponents), poisson, formulation
 
 
-def _with_share(share: float, of: str) -> _Share:
-    return _Share(share=share, of=of)
-
-
 def load_columns(at: Linearisation) -> Floats:
     """All known loads larger or smaller by one factor, and all prescribed displacements: (n, k)."""
 
-    def about(state: Linearisation) -> Floats:
-        model = state.system.model
+    def about(moment: Moment) -> Floats:
+        state, model = moment.at, moment.at.system.model
         columns = np.zeros((len(state.sensors), 2))
         columns[:, 0] = state.answers(model.external_forces())
         if model.prescribed.any():

@@ -61,7 +61,7 @@ class PlaceCoordinates:
             [moved] = Effects(moment.at).of([moving], moving.make(none), columns_alone=True)
             return moved.columns
 
-        return at.summed_in_time(about)
+        return at.summed(about)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ def faces_for(model: Model, patch: Patch | None) -> Int32s:
     boundary = model.mesh.boundary
     if patch is not None:
         return np.asarray(boundary[patch.held[boundary].all(axis=1)])
-    held = np.asarray(model.constrained.reshape(-1, 3).all(axis=1))
+    held = np.asarray(model.constrained.all(axis=1))
     return np.asarray(boundary[~held[boundary].any(axis=1)])
 
 

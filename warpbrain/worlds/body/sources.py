@@ -19,7 +19,7 @@ from warpbrain.inference.beliefs import beliefs
 from warpbrain.mesh import QuadraticMesh, TetMesh, summed_at_nodes
 from warpbrain.physics.proposal import Place, Proposal
 from warpbrain.worlds.body.effects import Effect
-from warpbrain.worlds.body.linearisation import Linearisation, Moment
+from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import spread_points
 from warpbrain.worlds.body.unknown import (
     UnknownLoad,
@@ -100,17 +100,12 @@ def sources(at: Linearisation, spacing: float, size: float) -> tuple[Effect, ...
 
 def _sources(at: Linearisation, centres: Floats, length: float, is_force: bool, size: float) -> list[Effect]:
     """Effects of one length [m], of forces or of stresses, at each centre (s, 3) [m]; `size` as of `sources`."""
-
-    def about(moment: Moment) -> Floats:
-        return (_force_columns if is_force else _stress_columns)(moment.at, centres, length)
-
-    columns = at.summed_in_time(about)  # (n, 6, s)
-    rows = at.sensors.is_displacement
-    rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
+    columns_about = _force_columns if is_force else _stress_columns
+    columns = at.summed(lambda moment: columns_about(moment.at, centres, length))  # (n, 6, s)
     if not columns.any():
         # between two states that are the same a constant load moves nothing, whatever its size
         return []
-    sd = np.empty(len(_STRESSES))
+    rows, sd = at.sensors.of_one_unit, np.empty(len(_STRESSES))
     for part in (slice(0, 3), slice(3, 6)) if is_force else (slice(0, 5), slice(5, 6)):
         share = (part.stop - part.start) / len(sd)
         sd[part] = size * np.sqrt(share) / max(root_mean_square(columns[rows, part]), 1e-300)

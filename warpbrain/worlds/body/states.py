@@ -322,8 +322,8 @@ class States:
         counted_from_rest = all(getattr(each, "reference", None) is None for each in self.case.recordings)
         if not counted_from_rest or len(Moments.of(self.case_of(hypothesis), self.times).cases) > 1:
             return None
-        bound = ((m, bound_term(system, m)) for m in hypothesis.mechanisms if isinstance(m, Following))
-        return next((cast(Mechanism, m) for m, term in bound if term.coupling is not None), None)
+        following = (m for m in hypothesis.mechanisms if isinstance(m, Following))
+        return next((m for m in following if bound_term(system, m).coupling is not None), None)
 
     def _drained(
         self,
@@ -341,8 +341,7 @@ class States:
         """
         others = tuple(mechanism for mechanism in hypothesis.mechanisms if mechanism is not flowing)
         end = self.solve(replace(hypothesis, mechanisms=others), start, expected, (), iterations, nearby, known)
-        at = end.linearised()
-        change = consolidation(at, bound_term(end.system, cast(Following, flowing))).at(1.0)
+        change = consolidation(end.linearised(), cast(Following, flowing)).at(1.0)
         sensors = replace(end.sensors, residual=end.sensors.residual - change, computed=end.sensors.computed + change)
         return replace(end, hypothesis=hypothesis, sensors=sensors)
 

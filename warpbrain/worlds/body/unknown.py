@@ -122,8 +122,7 @@ def body_forces(at: Linearisation, lengths: Sequence[float]) -> tuple[Field, ...
         return np.asarray(mesh.node_volumes)
 
     # one after the other: the first one makes the compliance
-    mesh = at.system.model.mesh
-    return tuple(_forces_on_nodes(at, mesh.points, shares(mesh), length, shares) for length in lengths)
+    return tuple(_forces_on_nodes(at, at.system.model.mesh.points, length, shares) for length in lengths)
 
 
 def tractions(at: Linearisation, length: float) -> Field:
@@ -133,18 +132,16 @@ def tractions(at: Linearisation, length: float) -> Field:
     def shares(mesh: TetMesh) -> Floats:
         return node_areas(mesh.points, faces(mesh))
 
+    return _forces_on_nodes(at, at.system.model.mesh.points[_free_of_surface(at)], length, shares)
+
+
+def _forces_on_nodes(at: Linearisation, places: Floats, length: float, shares: Callable[[TetMesh], Floats]) -> Field:
+    """Patches of forces in every direction; `shares`: those (N,) of the nodes of a mesh, see `_weights`."""
     mesh = at.system.model.mesh
-    return _forces_on_nodes(at, mesh.points[_free_of_surface(at)], shares(mesh), length, shares)
-
-
-def _forces_on_nodes(
-    at: Linearisation, places: Floats, shares: Floats, length: float, shares_of: Callable[[TetMesh], Floats]
-) -> Field:
-    """Patches of forces in every direction; `shares` (N,): see `_weights`, and of any mesh."""
-    sites, weights, amplitudes = _weights(at.system.model.mesh.points, places, shares, length)
+    sites, weights, amplitudes = _weights(mesh.points, places, shares(mesh), length)
 
     def forces(mesh: TetMesh, coefficients: Floats) -> Floats:
-        gaussian = shares_of(mesh)[:, None] * gaussians(mesh.points, sites, length) * amplitudes
+        gaussian = shares(mesh)[:, None] * gaussians(mesh.points, sites, length) * amplitudes
         return np.asarray(gaussian @ coefficients.reshape(len(sites), -1)).reshape(len(gaussian), 3, -1)
 
     answers = at.answers_of_patches(weights)
@@ -169,12 +166,7 @@ def pressures(at: Linearisation, length: float) -> Field:
 def _free_of_surface(at: Linearisation) -> Bools:
     """Nodes (N,) on the surface that are not held."""
     mesh = at.system.model.mesh
-    return np.asarray(nodes_of(mesh.boundary, len(mesh.points)) & ~_held(at))
-
-
-def _held(at: Linearisation) -> Bools:
-    """Nodes (N,) that are held."""
-    return np.asarray(at.system.model.constrained.reshape(-1, 3).all(axis=1))
+    return np.asarray(nodes_of(mesh.boundary, len(mesh.points)) & at.system.movable)
 
 
 def _free_faces(at: Linearisation) -> Callable[[TetMesh], Int32s]:
@@ -184,7 +176,7 @@ def _free_faces(at: Linearisation) -> Callable[[TetMesh], Int32s]:
     """
     from scipy.spatial import cKDTree
 
-    mesh, held = at.system.model.mesh, _held(at)
+    mesh, held = at.system.model.mesh, ~at.system.movable
     edges = edges_of(mesh.boundary)
     halves = mesh.points[edges[held[edges].all(axis=1)]].mean(axis=1)
     known = cKDTree(np.concatenate([mesh.points[held], halves]))
@@ -248,8 +240,8 @@ def resistances(at: Linearisation, times: Sequence[float], volume: Proposal, smo
         columns = np.column_stack([state.answers_of_elements(state.element_forces, tissues), bulk.columns / volume.sd])
         return with_courses(columns, courses)
 
-    columns = at.summed_in_time(about)
-    columns = columns @ _visible_modes(columns, at.sensors.is_displacement)
+    columns = at.summed(about)
+    columns = columns @ _visible_modes(columns, at.sensors.of_one_unit)
     # nothing that is known loads the body
     if not columns.any():
         return nothing
@@ -265,7 +257,7 @@ def stress_beside_held(at: Linearisation, length: float) -> Floats:
     from scipy.spatial import cKDTree
 
     model = at.system.model
-    held = model.mesh.points[_held(at)]
+    held = model.mesh.points[~at.system.movable]
     sites = model.mesh.centres[spread_points(model.mesh.centres, length, 700)]
     if not len(held):
         return np.zeros((len(at.sensors), 0))
@@ -323,17 +315,15 @@ def fields(at: Linearisation, lengths: Sequence[float], forces: Sequence[Field])
 
 def _field(at: Linearisation, answers: Floats, forces: Callable[[TetMesh, Floats], Floats]) -> Field:
     """The field of patches to which the sensors answer (n, j); see `Field`."""
-    modes = _visible_modes(answers, at.sensors.is_displacement)
+    modes = _visible_modes(answers, at.sensors.of_one_unit)
     return Field(at.system.model.mesh, answers @ modes, modes, forces)
 
 
 def _visible_modes(columns: Floats, rows: Bools) -> Floats:
-    """Coefficients (j, k) of columns (n, j) in the modes that displacements, in some of the rows (n,), see.
+    """Coefficients (j, k) of columns (n, j) in the modes that some of the rows (n,) see.
 
     Modes are in the order of their sizes, and all together of 1 m root mean square.
     """
-    # modes of displacements alone: recorded forces have another unit, and would dominate
-    rows = rows if rows.any() else np.ones(len(rows), dtype=bool)
     squares, vectors = np.linalg.eigh(columns[rows] @ columns[rows].T)
     sizes, vectors = np.sqrt(np.maximum(squares[::-1], 0.0)), vectors[:, ::-1]
     total = np.cumsum(sizes**2) / max(float(np.sum(sizes**2)), 1e-300)
