@@ -24,7 +24,7 @@ def test_a_gpu_without_cupy_has_none(monkeypatch):
     class Device:
         is_cuda, ordinal = True, 0
 
-    monkeypatch.setattr(module, "_has_cupy", lambda device: False)
+    monkeypatch.setattr(module, "_cupy_works", lambda: False)
     assert dense_factors(_matrix()[0], Device()) is None
 
 

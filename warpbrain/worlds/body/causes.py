@@ -19,7 +19,7 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import Candidates
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.nuisances import Nuisances
+from warpbrain.worlds.body.nuisances import FIELD, Nuisances
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
 from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses, modes_of_rows, with_courses
 from warpbrain.worlds.body.unknown import field_proposal
@@ -177,19 +177,17 @@ def unknown_fields(base: Base) -> Cause:
 
 def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]:
     """Effects by name."""
-    sensors = at.sensors
-    by_name = nuisances.families
+    sensors, families, larger = at.sensors, nuisances.families, belief("tissue.larger")
+    zero = np.zeros(len(sensors))
     columns_by_name = {
         "registration": sensors.rigid
         * np.repeat([belief("registration.wrong_shift") * sensors.radius, belief("registration.wrong_turn")], 3),
-        "stiffness": belief("tissue.larger") * by_name["stiffness field"],
-        "loads": belief("tissue.larger") * by_name["known loads"],
+        "stiffness": larger * families[FIELD],
+        "loads": larger * families["known loads"],
+        "mesh": larger * families.get("mesh", zero),
+        "segmentation": _off_surfaces(sensors),
+        "forces": _wrong_forces(sensors),
     }
-    if "mesh" in by_name:
-        columns_by_name["mesh"] = belief("tissue.larger") * by_name["mesh"]
-    columns_by_name["segmentation"] = _off_surfaces(sensors)
-    columns_by_name["forces"] = _wrong_forces(sensors)
-    zero = np.zeros(len(sensors))
     return {name: Effect(None, zero, columns) for name, columns in columns_by_name.items() if columns.any()}
 
 

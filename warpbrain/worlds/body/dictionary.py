@@ -66,19 +66,19 @@ def situation_of(case: Case, instants: int = 1) -> Situation:
     # for each surface: a site on the other side of a thin mantle is near, but on another surface
     sites = [np.zeros((0, 3)), *(points[spread_points(points, between)] for points in middles)]
     return Situation(
-        mesh,
-        case.gravity_axis,
-        case.density,
-        case.poisson,
-        frozenset(mechanism.kind for mechanism in case.mechanisms),
-        frozenset(tissue.model for tissue in case.tissues.values()),
-        held,
-        free,
-        instants,
-        mesh.centres[spread_points(mesh.centres, spacing)],
-        np.concatenate(sites),
-        spacing,
-        _stiffness(case),
+        mesh=mesh,
+        gravity_axis=case.gravity_axis,
+        density=case.density,
+        poisson=case.poisson,
+        assumed=frozenset(mechanism.kind for mechanism in case.mechanisms),
+        laws=frozenset(tissue.model for tissue in case.tissues.values()),
+        held=held,
+        free=free,
+        instants=instants,
+        volume_sites=mesh.centres[spread_points(mesh.centres, spacing)],
+        surface_sites=np.concatenate(sites),
+        spacing=spacing,
+        stiffness=_stiffness(case),
         named=named_triangles(case, free),
         unused=unused_edges(case),
     )
@@ -160,7 +160,7 @@ def candidates_at(
     dictionary: Dictionary,
     effects: Effects,
     alternatives: dict[str, Effect],
-    on_kind: Callable[[str], None] | None = None,
+    on_kind: Callable[[str], None] = lambda _kind: None,
 ) -> Candidates:
     """The effects of a dictionary at one state, and of what is no physics.
 
@@ -179,8 +179,7 @@ def candidates_at(
     results = beside(switched) if effects.at.system.device.is_cpu else switched
     found: dict[str, list[Effect]] = {}
     for kind, proposals in dictionary.proposals.items():
-        if on_kind is not None:
-            on_kind(kind)
+        on_kind(kind)
         smooth = [proposal for proposal in proposals if not proposal.is_there_or_not]
         try:
             found[kind] = effects.of(smooth)

@@ -74,6 +74,7 @@ class _OverSizes:
         self._log_prior = dict(zip(Sizes._fields, (*even, nuisances.field_sizes.log_prior), strict=True))
         self._first = sizes if self._moving else sizes._replace(mesh=0)
         self._columns = columns
+        self._field = np.r_[nuisances.part(FIELD)]
         self._mesh = np.r_[nuisances.part(UNKNOWN_MESH)] if self._moving else np.zeros(0, dtype=np.int64)
         self._relative = np.zeros((len(residual), 0))
         self._inflation: Floats | None = None
@@ -85,7 +86,7 @@ class _OverSizes:
             moved = _displacement(base, residual - others @ (others.T @ as_given.weighted))
             self._relative = moved[:, None] * nuisances.relative
         self._summed: dict[Sizes, Summed] = {}
-        self._with_mesh, self._with_field = cache(self._rows_with_mesh), cache(self._rows_with_field)
+        self._rows = cache(self._rows_without)
 
     def summed(self) -> tuple[Floats, SetMarginal]:
         """See `evidence_of`."""
@@ -127,23 +128,20 @@ class _OverSizes:
             near = (self._scale, None if sizes.unresolved else self._inflation)
             near = near if known is None else (known.scale, known.inflation)
             if axis == "field":
-                rows, length = self._with_field(sizes.mesh, sizes.unresolved), self._factor(sizes)
+                rows, length = self._rows(axis, sizes._replace(field=self._first.field)), self._factor(sizes)
             else:
-                rows, length = self._with_mesh(sizes.unresolved, sizes.field), float(self._fractions[sizes.mesh])
+                rows = self._rows("mesh", sizes._replace(mesh=self._first.mesh))
+                length = float(self._fractions[sizes.mesh])
             self._summed[sizes] = rows.summed(length, *near)
         return self._summed[sizes].log_evidence
 
-    def _rows_with_mesh(self, unresolved: int, field: int) -> RowsAtScales:
-        """Rows where the size of the mesh's error varies."""
-        columns = self._columns_at(self._first._replace(field=field))
-        model = self._base.noises[unresolved].of_noise(np.delete(columns, self._mesh, axis=1))
-        return RowsAtScales(model, self._residual, self._base.points, self._relative)
-
-    def _rows_with_field(self, mesh: int, unresolved: int) -> RowsAtScales:
-        """Rows where the size of the stiffness field varies."""
-        columns, field = self._columns_at(self._first._replace(mesh=mesh)), np.r_[self._base.nuisances.part(FIELD)]
-        model = self._base.noises[unresolved].of_noise(np.delete(columns, field, axis=1))
-        return RowsAtScales(model, self._residual, self._base.points, self._columns[:, field])
+    def _rows_without(self, axis: str, sizes: Sizes) -> RowsAtScales:
+        """Rows where the size of the stiffness field, or of the mesh's error, varies; the others are as in `sizes`."""
+        part, varying = (
+            (self._field, self._columns[:, self._field]) if axis == "field" else (self._mesh, self._relative)
+        )
+        model = self._base.noises[sizes.unresolved].of_noise(np.delete(self._columns_at(sizes), part, axis=1))
+        return RowsAtScales(model, self._residual, self._base.points, varying)
 
     def _factor(self, sizes: Sizes) -> float:
         """Size of the stiffness field relative to that of the columns as given."""

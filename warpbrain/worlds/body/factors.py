@@ -52,29 +52,31 @@ class DenseFactors:
 
     def solve(self, columns: Any) -> Floats:
         """Solution (n, k) for right-hand sides (n, k), an array or SciPy sparse, in Fortran order."""
-        return self._filled(columns, len(self._L), None)
+        return self._filled(columns, None)
 
     def between(self, left: Any, columns: Any) -> Floats:
         """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k)."""
-        return self._filled(columns, left.shape[0], left)
+        return self._filled(columns, left)
 
-    def _filled(self, columns: Any, rows: int, projection: Any) -> Floats:
+    def _filled(self, columns: Any, left: Any) -> Floats:
+        """Solutions, or their product with a matrix on the left, for one block of columns after the other."""
         import cupy
         import cupyx
         from cupyx.scipy.linalg import solve_triangular
         from cupyx.scipy.sparse import csr_matrix
 
+        rows = len(self._L) if left is None else left.shape[0]
         if columns.shape[1] == 0:
             return np.empty((rows, 0))
         with self._device:
             # pinned memory is copied to several times as fast
             result = cupyx.empty_pinned((rows, columns.shape[1]), dtype=np.float64, order="F")
-            projection_on_gpu = None if projection is None else csr_matrix(projection.tocsr().astype(np.float64))
+            left_on_gpu = None if left is None else csr_matrix(left.tocsr().astype(np.float64))
             for first in range(0, columns.shape[1], _TOGETHER_ON_GPU):
                 part = slice(first, first + _TOGETHER_ON_GPU)
                 forward = solve_triangular(self._L, _on_gpu(columns[:, part]), lower=True, overwrite_b=True)
                 answers = solve_triangular(self._L, forward, lower=True, trans="T", overwrite_b=True)
-                answers = answers if projection_on_gpu is None else cupy.asfortranarray(projection_on_gpu @ answers)
+                answers = answers if left_on_gpu is None else cupy.asfortranarray(left_on_gpu @ answers)
                 answers.get(out=result[:, part])
         return np.asarray(result)
 
@@ -87,7 +89,7 @@ def dense_factors(matrix: Any, device: Any) -> DenseFactors | None:
 
     `matrix` SciPy sparse matrix (n, n): symmetric.
     """
-    if not _has_cupy(device):
+    if not (device.is_cuda and _cupy_works()):
         return None
     try:
         return DenseFactors(matrix, device)
@@ -95,13 +97,9 @@ def dense_factors(matrix: Any, device: Any) -> DenseFactors | None:
         return None
 
 
-def _has_cupy(device: Any) -> bool:
-    """Whether a Warp device is a GPU for which CuPy is installed, and finds the libraries that it calls."""
-    return bool(device.is_cuda) and _cupy_works()
-
-
 @cache
 def _cupy_works() -> bool:
+    """Whether CuPy is installed, and finds the libraries that it calls."""
     try:
         import cupy
         import cupyx.scipy.linalg  # noqa: F401
@@ -161,20 +159,20 @@ class Factors:
 
         `transposed`: with the transposed matrix.
         """
-        return self._filled(columns, columns.shape[0], None, transposed)
+        return self._filled(columns, None, transposed)
 
     def between(self, left: Any, columns: Any) -> Floats:
         """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k), dense a block at a time only."""
-        return self._filled(columns, left.shape[0], left, False)
+        return self._filled(columns, left, False)
 
-    def _filled(self, columns: Any, rows: int, left: Any, transposed: bool) -> Floats:
-        """Solutions, or their product with a matrix on the left, for one block of columns after the other."""
+    def _filled(self, columns: Any, left: Any, transposed: bool) -> Floats:
+        """As that of `DenseFactors`."""
         from scipy.sparse import issparse
 
         if isinstance(self._factors, DenseFactors) and self._skew is None:
             return self._factors.solve(columns) if left is None else self._factors.between(left, columns)
         columns = columns.tocsc() if issparse(columns) else columns
-        result = np.empty((rows, columns.shape[1]), order="F")
+        result = np.empty(((columns if left is None else left).shape[0], columns.shape[1]), order="F")
         assert self._factors is not None
         factors, skew = self._factors, self._skew
 

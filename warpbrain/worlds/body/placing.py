@@ -78,13 +78,8 @@ def _cell(base: Base, effect: Effect, spacing: float) -> list[Proposal]:
 def _around(base: Base, proposed: Proposal, step: float) -> list[Proposal]:
     """Proposals a step from another one along each principal axis of the body, corners of that cube among them."""
     assert proposed.centre is not None
-    return _with_radii(proposed, proposed.centre + _cube(base, step))
-
-
-def _cube(base: Base, step: float) -> Floats:
-    """Offsets (27, 3) [m] of none and of a step to either side along each principal axis of the body, none first."""
-    axes = principal_axes(base.at.system.model.mesh.points)
-    return np.asarray(step * np.array(list(itertools.product((0.0, -1.0, 1.0), repeat=3))) @ axes)
+    steps = step * np.array(list(itertools.product((0.0, -1.0, 1.0), repeat=3)))
+    return _with_radii(proposed, proposed.centre + steps @ principal_axes(base.at.system.model.mesh.points))
 
 
 def _with_radii(proposed: Proposal, centres: Floats) -> list[Proposal]:
@@ -197,7 +192,7 @@ def with_refined_places(
     effects = list(candidate.effects)
     placed = len(effects) if candidate.refined else placed
     for number, (effect, part) in enumerate(zip(candidate.effects, candidate.slices, strict=True)):
-        if number < placed or effect.proposal is None or effect.proposed.elsewhere is None or effect.is_solved:
+        if number < placed or effect.proposed.elsewhere is None or effect.is_solved:
             continue
         others = np.delete(candidate.columns, np.r_[part], axis=1)
         without = GaussianModel(candidate.marginal.model.noise_factor, others, candidate.marginal.scale)
