@@ -161,12 +161,8 @@ class GaussNewton:
     Converged when the next step is shorter than `tolerance` in standard deviations of the posterior.
     """
 
-    def __init__(
-        self, problem: Problem, tolerance: float = 1e-3, on_step: Callable[[GaussNewtonStep], None] | None = None
-    ) -> None:
-        self.problem = problem
-        self.tolerance = tolerance
-        self._on_step = on_step
+    def __init__(self, problem: Problem, tolerance: float, on_step: Callable[[GaussNewtonStep], None]) -> None:
+        self.problem, self.tolerance, self._on_step = problem, tolerance, on_step
         self._history: list[GaussNewtonStep] = []
 
     def solve(self, start: Estimate | None = None) -> Estimate:
@@ -214,14 +210,14 @@ class GaussNewton:
                 why = str(error)
         raise SolveError(f"in the middle of the prior, and up to {math.exp(_STIFFER):.0f} times stiffer: {why}")
 
-    def _descend(self, point: Point, linearised: Linearised, tolerance: float) -> tuple[Point, Linearised, float]:
+    def _descend(self, start: Point, linearised: Linearised, tolerance: float) -> tuple[Point, Linearised, float]:
         """Downhill with one noise to where a step is no longer worth it; and how long it is.
 
         Coordinates are steps from the start in units of the reach of a parameter, since the first step goes no farther
         than one unit.
         """
-        problem, mode, start, newton = self.problem, self.problem.mode, point, 0
-        best, trial = (point, linearised), (point, linearised)
+        problem, mode, newton = self.problem, self.problem.mode, 0
+        best = trial = start, linearised
         scale, whitening = problem.parameters.reach, np.linalg.inv(mode.gaussian.factor)
         x0 = start.state.theta
         bounds = np.minimum((mode.low - x0) / scale, 0.0), np.maximum((mode.high - x0) / scale, 0.0)
@@ -254,8 +250,7 @@ class GaussNewton:
             step = GaussNewtonStep(len(self._history) + 1, best[0].objective, decrement, share, newton)
             newton = 0
             self._history.append(step)
-            if self._on_step is not None:
-                self._on_step(step)
+            self._on_step(step)
 
         # an unstable law, no equilibrium, or one that is unstable: nearer to the last point there is none
         fails = InputError, SolveError

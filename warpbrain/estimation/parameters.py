@@ -305,7 +305,7 @@ def prior_modes(prior: Prior, parameters: Parameters) -> tuple[PriorMode, ...]:
     total = counts[kept].sum()
     # draws that all lie on one end have no spread, but a prior that excludes everything else is no prior
     ranges = parameters.high - parameters.low
-    least = np.where(np.isfinite(ranges), (_NARROWEST * np.where(np.isfinite(ranges), ranges, 0.0)) ** 2, 0.0)
+    least = (_NARROWEST * np.where(np.isfinite(ranges), ranges, 0.0)) ** 2
     modes = []
     for number in kept[np.argsort(-counts[kept])]:
         low, high = parameters.low, parameters.high
