@@ -26,7 +26,7 @@ def test_equilibria_are_the_same_in_any_number_of_threads(monkeypatch):
     np.testing.assert_array_equal(found[0], found[2])
     np.testing.assert_allclose(found[0], np.linalg.solve(dense, columns), rtol=1e-9, atol=1e-12)
     np.testing.assert_array_equal(factors.solve(csr_array(columns)), found[0])
-    between = factors.between(csr_array(columns.T), csr_array(columns))
+    between = factors.solve(csr_array(columns), left=csr_array(columns.T))
     np.testing.assert_allclose(between, columns.T @ found[0], rtol=1e-9, atol=1e-9)
     assert factors.solve(columns[:, :0]).shape == (60, 0)
 
@@ -47,5 +47,5 @@ def test_a_skew_part_of_few_rows(transposed):
     factors = Factors(csr_array(dense), skew=csr_array(skew))
     A = dense - skew if transposed else dense + skew
     np.testing.assert_allclose(A @ factors.solve(columns, transposed), columns, atol=1e-10)
-    between = factors.between(csr_array(columns.T), csr_array(columns))
+    between = factors.solve(csr_array(columns), left=csr_array(columns.T))
     np.testing.assert_allclose(between, columns.T @ np.linalg.solve(dense + skew, columns), atol=1e-8)

@@ -50,16 +50,11 @@ class DenseFactors:
         with self._device, cupyx.errstate(linalg="raise"):
             self._L = cupy.linalg.cholesky(csr_matrix(matrix.tocsr().astype(np.float64)).toarray())
 
-    def solve(self, columns: Any) -> Floats:
-        """Solution (n, k) for right-hand sides (n, k), an array or SciPy sparse, in Fortran order."""
-        return self._filled(columns, None)
+    def solve(self, columns: Any, left: Any = None) -> Floats:
+        """Solution (n, k) for right-hand sides (n, k), an array or SciPy sparse, in Fortran order.
 
-    def between(self, left: Any, columns: Any) -> Floats:
-        """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k)."""
-        return self._filled(columns, left)
-
-    def _filled(self, columns: Any, left: Any) -> Floats:
-        """Solutions, or their product with a matrix on the left, for one block of columns after the other."""
+        `left` SciPy sparse (m, n): its product (m, k) with the solution, if it is given.
+        """
         import cupy
         import cupyx
         from cupyx.scipy.linalg import solve_triangular
@@ -154,23 +149,16 @@ class Factors:
             units[rows, np.arange(len(rows))] = 1.0
             self._skew = _SkewPart(rows, skew.tocsr()[rows][:, rows].toarray(), self._factors.solve(units))
 
-    def solve(self, columns: Any, transposed: bool = False) -> Floats:
+    def solve(self, columns: Any, transposed: bool = False, left: Any = None) -> Floats:
         """Solution (n, k) for right-hand sides (n, k), an array or SciPy sparse, in Fortran order.
 
-        `transposed`: with the transposed matrix.
+        `transposed`: with the transposed matrix. `left` SciPy sparse (m, n): its product (m, k) with the solution, if
+        it is given; the solution is dense a block of columns at a time only.
         """
-        return self._filled(columns, None, transposed)
-
-    def between(self, left: Any, columns: Any) -> Floats:
-        """`left A^-1 columns` (m, k) of SciPy sparse matrices (m, n) and (n, k), dense a block at a time only."""
-        return self._filled(columns, left, False)
-
-    def _filled(self, columns: Any, left: Any, transposed: bool) -> Floats:
-        """As that of `DenseFactors`."""
         from scipy.sparse import issparse
 
         if isinstance(self._factors, DenseFactors) and self._skew is None:
-            return self._factors.solve(columns) if left is None else self._factors.between(left, columns)
+            return self._factors.solve(columns, left)
         columns = columns.tocsc() if issparse(columns) else columns
         result = np.empty(((columns if left is None else left).shape[0], columns.shape[1]), order="F")
         assert self._factors is not None

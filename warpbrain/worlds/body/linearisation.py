@@ -70,7 +70,7 @@ class HeldSurface:
         components = np.repeat(members, 3)
         coupling = stiffness[free][:, components].tocsc()
         condensed = np.asarray(stiffness[components][:, components].todense())
-        condensed -= at.factors.between(stiffness[components][:, free], coupling)
+        condensed -= at.factors.solve(coupling, left=stiffness[components][:, free])
         # beside a pressure that follows its surface it is not symmetric, and Cholesky's method reads one half of it,
         # which is another one in other axes
         condensed = 0.5 * (condensed + condensed.T)
