@@ -171,7 +171,6 @@ class GaussNewton:
         `InputError` if the laws there are not stable, `SolveError` if there is no equilibrium to start from.
         """
         problem, prior = self.problem, self.problem.nuisances.prior
-        self._history = []
         nuisances = prior.mean.copy()
         if start is None:
             state, derivatives = self._first()

@@ -214,7 +214,7 @@ class Gaussian:
 
 
 #: Draws on which the prior rests.
-DRAWS = 500
+_DRAWS = 500
 #: Part of the draws that makes a cluster of signs a mode of its own.
 _LEAST_SHARE = 0.02
 #: Smallest standard deviation of a coordinate that has two ends, relative to its range.
@@ -242,13 +242,13 @@ def declared_deviations(case: Case, parameters: Parameters) -> Floats:
 _NO_STUDIES = SimpleNamespace(name="declared", variant="about the case's own laws", studies=(), groups=())
 
 
-def _declared_prior(case: Case, parameters: Parameters, count: int, seed: int) -> Prior:
+def _declared_prior(case: Case, parameters: Parameters, seed: int) -> Prior:
     """A normal distribution about the laws that a case declares, within the ends of their parameters."""
     rng, mean = np.random.default_rng([seed, 2]), declared(case, parameters)
     deviations = declared_deviations(case, parameters)
     draws: list[Floats] = []
     attempts = 0
-    while len(draws) < count:
+    while len(draws) < _DRAWS:
         attempts += 1
         theta = mean + deviations * rng.normal(size=len(mean))
         if np.all((theta > parameters.low) & (theta < parameters.high)):
@@ -257,21 +257,21 @@ def _declared_prior(case: Case, parameters: Parameters, count: int, seed: int) -
     return Prior(cast(Process, _NO_STUDIES), *about, np.array(draws), attempts, np.zeros(len(parameters.tissues)))
 
 
-def prior_of(case: Case, model: Process | None = None, count: int = DRAWS, seed: int = 0) -> Prior:
+def prior_of(case: Case, model: Process | None = None, seed: int = 0) -> Prior:
     """What the generative model says of a case's tissues; about what the case declares where none is of a group of it.
 
-    It rests on so many draws. `InputError` if a tissue has no group, or one that the model has seen no study of;
+    `InputError` if a tissue has no group, or one that the model has seen no study of;
     `SolveError` if no stable law is found.
     """
     parameters = Parameters.of(case)
     if not any(parameters.groups) and all(case.tissues[labels[0]].law is not None for labels in parameters.labels):
-        return _declared_prior(case, parameters, count, seed)
+        return _declared_prior(case, parameters, seed)
     from warpbrain.gp.trained import trained
 
     process = trained() if model is None else model
     require_groups(case, [label for labels in parameters.labels for label in labels], process)
     tissues = parameters.groups, parameters.laws_of, parameters.poisson, parameters.formulations
-    return _prior_of_tissues(process, *tissues, count, seed)
+    return _prior_of_tissues(process, *tissues, _DRAWS, seed)
 
 
 #: A diagnosis and its estimates ask for one prior several times, and 500 draws take a second.

@@ -14,7 +14,7 @@ from warpbrain.cases.moments import Moments
 from warpbrain.estimation.finer_mesh import DiscretisationError
 from warpbrain.estimation.fit import Estimate, probabilities
 from warpbrain.estimation.likelihood import Noise
-from warpbrain.estimation.observations import Observations
+from warpbrain.estimation.observations import Observations, Sensors
 from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.registration import realigned
@@ -111,15 +111,12 @@ def predictions(
         parts = [observation for observation in observations.recordings if observation.name == name]
         rows, first = np.concatenate([observation.rows for observation in parts]), parts[0]
         shape = len(rows), first.size
-        seen_rows, noise = after.of_rows(members), point.noise
-        if role != "fit":
-            # of a recording that was not fitted, its gross errors beside what the estimate knows of it
-            undeclared = np.isnan(seen_rows.sigma)
-            sigmas = np.where(undeclared, 1.0 / np.sqrt(seen_rows.weights), seen_rows.sigma)
-            noise = Noise.of(seen_rows, sigmas, noise.unresolved, noise.outliers, noise.scale)
-            if not undeclared.any():
-                noise = noise.with_gross_errors(seen_rows.residual, columns[members] @ np.linalg.cholesky(joint))
-        noise_rows = members if role == "fit" else members - members[0]
+        seen_rows = after.of_rows(members)
+        if role == "fit":
+            noise, noise_rows = point.noise, members
+        else:
+            noise = _noise_of_unfitted(seen_rows, point.noise, columns[members] @ np.linalg.cholesky(joint))
+            noise_rows = members - members[0]
         known = role == "fit" or first.sigma is not None
         gross = noise.gross[[k for k, at in enumerate(noise.rows.points) if noise_rows[0] <= at[0] <= noise_rows[-1]]]
         gross = gross if len(gross) else np.zeros(len(rows), dtype=bool)
@@ -132,6 +129,17 @@ def predictions(
         about = name, first.kind, role, first.unit, rows, before.residual[members].reshape(shape), residual
         results.append(Prediction(*about, sigma, deviation, gross, within, run[name], fitted[name]))
     return tuple(results)
+
+
+def _noise_of_unfitted(rows: Sensors, fitted: Noise, columns: Floats) -> Noise:
+    """Noise of a recording that was not fitted, its gross errors beside what the estimate knows of it.
+
+    `columns` (n, k): of that, of one standard deviation each. Where no noise is declared nothing is a gross error.
+    """
+    undeclared = np.isnan(rows.sigma)
+    sigma = np.where(undeclared, 1.0 / np.sqrt(rows.weights), rows.sigma)
+    noise = Noise.of(rows, sigma, fitted.unresolved, fitted.outliers, fitted.scale)
+    return noise if undeclared.any() else noise.with_gross_errors(rows.residual, columns)
 
 
 def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapping[str, Comparison]:
