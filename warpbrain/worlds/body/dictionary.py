@@ -232,9 +232,9 @@ def switch_effects(effects: Effects, proposals: Sequence[Proposal]) -> list[Effe
         except (InputError, SolveError) as error:
             return error
 
-    to_first_order = [proposal.is_release and not effects.solves_releases for proposal in proposals]
-    released = [proposal for proposal, first_order in zip(proposals, to_first_order, strict=True) if first_order]
-    solved = [proposal for proposal, first_order in zip(proposals, to_first_order, strict=True) if not first_order]
+    solves = effects.solves_releases
+    released = [proposal for proposal in proposals if proposal.is_release and not solves]
+    solved = [proposal for proposal in proposals if solves or not proposal.is_release]
     # the first one condenses the surface, with threads of its own
     results = [*map(attempt, released[:1]), *in_threads(attempt, released[1:]), *map(attempt, solved)]
     by_proposal = dict(zip(map(id, (*released, *solved)), results, strict=True))

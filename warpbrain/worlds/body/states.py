@@ -141,9 +141,7 @@ class SolvedState:
         for instant in self.instants:
             if id(instant.system) not in made:
                 made[id(instant.system)] = Linearisation(instant.system, instant.u, instant.reactions, sensors)
-        shares = [_projection(instant.u, self.u) for instant in self.instants]
-        abouts = (made[id(instant.system)] for instant in self.instants)
-        return last.in_time([(i.time, about, s) for i, about, s in zip(self.instants, abouts, shares, strict=True)])
+        return last.in_time([(each.time, made[id(each.system)], _projection(each.u, self.u)) for each in self.instants])
 
 
 class States:
@@ -230,7 +228,9 @@ class States:
         system = self._system(hypothesis)
         flowing = self._flowing(hypothesis, system)
         if flowing is not None:
-            return self._drained(hypothesis, flowing, start, expected, iterations, nearby, known)
+            others = tuple(mechanism for mechanism in hypothesis.mechanisms if mechanism is not flowing)
+            end = self.solve(replace(hypothesis, mechanisms=others), start, expected, (), iterations, nearby, known)
+            return _on_the_way(end, hypothesis, flowing)
         self.solves += 1
         # relaxing stress or a fluid of the case's own: no other memory of a term changes a state in time
         in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
@@ -268,9 +268,8 @@ class States:
             if number in instants:
                 continue
             system_then = system if moments.cases[number] is case else self._system(hypothesis, moments.cases[number])
-            near = start if not instants else self._near.get(time, start)
-            external = system_then.model.external_forces()
-            first = not instants
+            external, first = system_then.model.external_forces(), not instants
+            near = start if first else self._near.get(time, start)
             if nearby is not None and near is not None and first:
                 near = nearby.toward_equilibrium(system_then, external, near, TOLERANCE)
             try:
@@ -325,26 +324,6 @@ class States:
         following = (m for m in hypothesis.mechanisms if isinstance(m, Following))
         return next((m for m in following if bound_term(system, m).coupling is not None), None)
 
-    def _drained(
-        self,
-        hypothesis: Hypothesis,
-        flowing: Mechanism,
-        start: Floats | None,
-        expected: Difference | None,
-        iterations: int,
-        nearby: Linearisation | None,
-        known: Floats | None,
-    ) -> SolvedState:
-        """The state in the end, and sensors on the way to it, linear about it.
-
-        Step by step it takes minutes, and a fit has a hundred states. What is recorded on the way is 4 to 8 % off.
-        """
-        others = tuple(mechanism for mechanism in hypothesis.mechanisms if mechanism is not flowing)
-        end = self.solve(replace(hypothesis, mechanisms=others), start, expected, (), iterations, nearby, known)
-        change = consolidation(end.linearised(), cast(Following, flowing)).at(1.0)
-        sensors = replace(end.sensors, residual=end.sensors.residual - change, computed=end.sensors.computed + change)
-        return replace(end, hypothesis=hypothesis, sensors=sensors)
-
     @staticmethod
     def _instant(time: float, system: System, state: Equilibrium, external: Floats) -> Instant:
         # tissue that is stretched without end resists no more, which balances any load that follows it
@@ -389,6 +368,16 @@ class States:
             field = StiffnessField(log_factor=self.modes @ hypothesis.field)
             model = replace(model, mechanisms=(*model.mechanisms, field))
         return System(model, self.device)
+
+
+def _on_the_way(end: SolvedState, hypothesis: Hypothesis, flowing: Mechanism) -> SolvedState:
+    """A state without the mechanism whose fluid flows, with sensors on the way to it, linear about it.
+
+    Step by step it takes minutes, and a fit has a hundred states. What is recorded on the way is 4 to 8 % off.
+    """
+    change = consolidation(end.linearised(), cast(Following, flowing)).at(1.0)
+    sensors = replace(end.sensors, residual=end.sensors.residual - change, computed=end.sensors.computed + change)
+    return replace(end, hypothesis=hypothesis, sensors=sensors)
 
 
 def _projection(field: Floats, whole: Floats) -> float:
@@ -438,8 +427,7 @@ def times_of_states(case: Case, role: str = "fit") -> tuple[float, ...]:
     was recorded at the end and at no time.
     """
     times = recorded_times(case, (role,))
-    moments = Moments.of(case, (*times, np.inf))
-    constant = len(moments.cases) == 1
+    constant = len(Moments.of(case, (*times, np.inf)).cases) == 1
     # a cause that is found may change where nothing does that is declared: what is checked keeps its time
     if not times or (constant and len(times) < 2 and role == "fit"):
         return (np.inf,)

@@ -47,7 +47,7 @@ def free_surfaces(case: Case) -> tuple[FreeSurface, ...]:
     """
     mesh, _ = case.remaining
     held = held_nodes(case)
-    parts = [(words, set_of(mesh, part), part.origin) for words, part in _named_parts(case, connected_parts(case))]
+    parts = [(words, set_of(mesh, part), part.origin) for words, part in _named_parts(case)]
     used = {boundary.nodes for boundary in case.boundaries}
     corners = rim_corners(mesh)
     known = {_triangles_key(free_faces(mesh, mesh.node_sets[name], held), corners) for name in used}
@@ -96,7 +96,7 @@ def unused_edges(case: Case) -> tuple[str, ...]:
 
 def named_triangles(case: Case, surfaces: Sequence[FreeSurface]) -> tuple[tuple[str, Int32s], ...]:
     """Triangles (k, 3) that can move with what people call them: connected parts, and free surfaces, each of them."""
-    parts = [(words, part.faces) for words, part in _named_parts(case, connected_parts(case))]
+    parts = [(words, part.faces) for words, part in _named_parts(case)]
     return (*parts, *((surface.words, surface.faces) for surface in surfaces))
 
 
@@ -143,9 +143,9 @@ def _triangles_key(faces: Int32s, corners: Int32s) -> bytes:
     return rows[np.lexsort(rows.T)].tobytes()
 
 
-def _named_parts(case: Case, parts: Sequence[FreePart]) -> Iterator[tuple[str, FreePart]]:
-    """Parts with their names: those of the same kind are told apart by where they are."""
-    inside = np.zeros(len(case.remaining[0].points), dtype=bool)
+def _named_parts(case: Case) -> Iterator[tuple[str, FreePart]]:
+    """Connected parts with their names: those of the same kind are told apart by where they are."""
+    parts, inside = connected_parts(case), np.zeros(len(case.remaining[0].points), dtype=bool)
     for part in parts:
         if part.origin == "inner":
             inside[part.faces] = True
