@@ -19,9 +19,9 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import Candidates
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.linearisation import Linearisation
-from warpbrain.worlds.body.nuisances import FIELD, Nuisances
-from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
-from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses, modes_of_rows, with_courses
+from warpbrain.worlds.body.nuisances import FIELD, LOADS, Nuisances
+from warpbrain.worlds.body.sensors import Sensors, kernel_columns, row_products, spread_points
+from warpbrain.worlds.body.time_courses import factor_of_rows, main_courses, modes_of_rows
 from warpbrain.worlds.body.unknown import field_proposal
 
 UNKNOWN, RESISTANCE = "unknown", "resistance"
@@ -149,7 +149,7 @@ def unknown_effects(base: Base) -> tuple[Effect, ...]:
         for number, course in enumerate(courses):
             if course.any():
                 proposal = field_proposal(field, noise) if number == 0 else None
-                effects.append(Effect(proposal, zero, noise * with_courses(field.columns, course)))
+                effects.append(Effect(proposal, zero, noise * row_products(field.columns, course)))
     return (*effects, *base.sources)
 
 
@@ -183,7 +183,7 @@ def not_physics_at(at: Linearisation, nuisances: Nuisances) -> dict[str, Effect]
         "registration": sensors.rigid
         * np.repeat([belief("registration.wrong_shift") * sensors.radius, belief("registration.wrong_turn")], 3),
         "stiffness": larger * families[FIELD],
-        "loads": larger * families["known loads"],
+        "loads": larger * families[LOADS],
         "mesh": larger * families.get("mesh", zero),
         "segmentation": _off_surfaces(sensors),
         "forces": _wrong_forces(sensors),
@@ -210,10 +210,5 @@ def _off_surfaces(sensors: Sensors) -> Floats:
     weights = kernel_columns(places, places[spread_points(places, reach, 60)], reach)
     coordinates = np.column_stack([sensors.directions[rows], np.ones(len(rows))])
     columns = np.zeros((len(sensors), 4 * weights.shape[1]))
-    columns[rows] = (
-        belief("mesh.surface_off")
-        * sensors.radius
-        / np.sqrt(2.0)
-        * (weights[:, :, None] * coordinates[:, None, :]).reshape(len(rows), 4 * weights.shape[1])
-    )
+    columns[rows] = belief("mesh.surface_off") * sensors.radius / np.sqrt(2.0) * row_products(weights, coordinates)
     return columns

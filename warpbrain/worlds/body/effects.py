@@ -20,7 +20,7 @@ from warpbrain.simulation.model import substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
-from warpbrain.worlds.body.sensors import Sensors
+from warpbrain.worlds.body.sensors import Sensors, row_products
 from warpbrain.worlds.body.states import SolvedState, States
 
 #: Part of a standard deviation by which a smooth or a fading proposal is differentiated.
@@ -223,23 +223,18 @@ class Effects:
         if varying is None and len(by_moment) == 1:
             return effect
 
-        def total(of: Callable[[Effect], Floats], expanded: bool = False) -> Floats:
+        def total(of: Callable[[Effect, Moment], Floats]) -> Floats:
             effects = iter(by_moment)
+            return self.at.summed(lambda moment: of(next(effects), moment))
 
-            def change(moment: Moment) -> Floats:
-                values = of(next(effects))
-                return _expanded(values, varying, moment.times) if expanded and varying is not None else values
+        def columns(e: Effect, moment: Moment) -> Floats:
+            return e.columns if varying is None else _expanded(e.columns, varying, moment.times)
 
-            return self.at.summed(change)
+        def columns_at(c: Floats) -> Floats:
+            return total(lambda e, _: e.columns if e.columns_at is None else e.columns_at(c))
 
-        columns_at = None
-        if effect.columns_at is not None:
-
-            def columns_at(c: Floats) -> Floats:
-                return total(lambda e: e.columns if e.columns_at is None else e.columns_at(c))
-
-        columns = total(lambda e: e.columns, True)
-        return Effect(proposal, total(lambda e: e.mean), columns, columns_at, effect.is_solved)
+        about = None if effect.columns_at is None else columns_at
+        return Effect(proposal, total(lambda e, _: e.mean), total(columns), about, effect.is_solved)
 
     def _at_one_time(
         self, proposals: Sequence[Proposal], present: Mechanism | None, columns_alone: bool
@@ -261,8 +256,10 @@ class Effects:
                 effects.append(_effect_of_course(proposal, courses[repr(proposal.make(proposal.start))]))
             elif proposal.history is not None:
                 effects.append(self._fading(proposal, instant[repr(proposal.make(proposal.start))]))
+            elif proposal.is_there_or_not:
+                effects.append(self._switch(proposal))
             else:
-                effects.append(self._effect(proposal, columns))
+                effects.append(_smooth(proposal, columns))
         return dict(zip(map(id, proposals), effects, strict=True))
 
     def _fading(self, proposal: Proposal, instant: Floats) -> Effect:
@@ -277,7 +274,7 @@ class Effects:
 
     @staticmethod
     def _stencil(proposal: Proposal, columns_alone: bool) -> tuple[list[Mechanism], Floats]:
-        """Mechanisms (s,), and with which weights (s, c) their effects give the answers of `_effect`.
+        """Mechanisms (s,), and with which weights (s, c) their effects give the answers of `_smooth`.
 
         Of what is smooth they are differences, taken before an equilibrium is found for any of them.
         """
@@ -293,27 +290,17 @@ class Effects:
         weights[len(at_start) :, 1:] = np.kron(np.eye(len(axes)), [[-1.0], [1.0]]) / (2.0 * _STEP)
         return [*at_start, *shifted], weights
 
-    def _effect(self, proposal: Proposal, answers: Floats) -> Effect:
-        if proposal.is_there_or_not:
-            solved = self._releases if proposal.is_release else self._switches
-            if solved is not None:
-                answer = solved.effect_of(proposal, self.at.sensors, self._instant)
-            else:
-                assert proposal.is_release, "about a fit switches keep their columns"
-                patch = proposal.released
-                lifts = proposal.make(proposal.mean).lifts
-                answer = self.at.released(patch.members, patch.held, lifts, self._further_reactions)
-            return Effect(
-                proposal,
-                proposal.mean[0] * answer,
-                proposal.sd[0] * answer[:, None],
-                is_solved=solved is not None,
-            )
-        if proposal.follows == "proportional":
-            return Effect(proposal, answers @ (proposal.mean / proposal.sd), answers)
-        columns = answers[:, 1:]
-        offset = (proposal.mean - proposal.start) / proposal.sd
-        return Effect(proposal, answers[:, 0] + columns @ offset, columns)
+    def _switch(self, proposal: Proposal) -> Effect:
+        """Of what is there or not: by an equilibrium with it, or where held nodes are released to first order."""
+        solved = self._releases if proposal.is_release else self._switches
+        if solved is not None:
+            answer = solved.effect_of(proposal, self.at.sensors, self._instant)
+        else:
+            assert proposal.is_release, "about a fit switches keep their columns"
+            patch, lifts = proposal.released, proposal.make(proposal.mean).lifts
+            answer = self.at.released(patch.members, patch.held, lifts, self._further_reactions)
+        mean, columns = proposal.mean[0] * answer, proposal.sd[0] * answer[:, None]
+        return Effect(proposal, mean, columns, is_solved=solved is not None)
 
     def _answers(self, mechanisms: Sequence[Mechanism], present: Mechanism | None, weights: Sequence[Floats]) -> Floats:
         """Sums (n, c) of effects of mechanisms, in the place of the case's own one where it has only one of the kind.
@@ -409,9 +396,8 @@ class Effects:
 
 def _expanded(columns: Floats, varying: Varying, times: Floats) -> Floats:
     """Columns (n, k) of what acts at one time as those of modes, for rows at times (n,)."""
-    modes = varying.modes_at(times)
-    each = [columns[:, k, None] * modes for k in varying.base.varying]
-    return np.column_stack([columns[:, list(varying.fixed)], *each])
+    changing = row_products(columns[:, list(varying.base.varying)], varying.modes_at(times))
+    return np.column_stack([columns[:, list(varying.fixed)], changing])
 
 
 def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats) -> Floats:
@@ -435,6 +421,15 @@ def _sd_of(proposal: Proposal, varying: Varying) -> Floats:
     sd[fixed] = proposal.sd[: len(fixed)]
     sd[list(varying.base.varying)] = proposal.sd[len(fixed) :].reshape(len(varying.base.varying), -1)[:, 0]
     return sd
+
+
+def _smooth(proposal: Proposal, answers: Floats) -> Effect:
+    """Of what is smooth, or proportional to its coefficients, from answers (n, c) to the sums of `Effects._stencil`."""
+    if proposal.follows == "proportional":
+        return Effect(proposal, answers @ (proposal.mean / proposal.sd), answers)
+    columns = answers[:, 1:]
+    offset = (proposal.mean - proposal.start) / proposal.sd
+    return Effect(proposal, answers[:, 0] + columns @ offset, columns)
 
 
 def _started(proposals: Sequence[Proposal]) -> dict[str, Mechanism]:

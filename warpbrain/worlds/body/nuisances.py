@@ -26,7 +26,7 @@ from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
-from warpbrain.worlds.body.sensors import Sensors, kernel_columns, spread_points
+from warpbrain.worlds.body.sensors import Sensors, kernel_columns, row_products, spread_points
 from warpbrain.worlds.body.states import FieldSizes, Hypothesis, States
 
 #: The family of what is not known of the shape of tissues' laws.
@@ -37,6 +37,8 @@ _ALWAYS = ("tissue.volume", "tissue.exponent")
 ISOCHORIC = slice(1, None)
 #: The family of stiffness that varies from place to place.
 FIELD = "stiffness field"
+#: The family of what is not known of the case's loads.
+LOADS = "known loads"
 #: The family of what is not known of the mesh's error, and that of mechanisms' shares of it, which only fits have.
 UNKNOWN_MESH, MESH_SHARE = "mesh, unknown", "mesh, of mechanisms"
 #: The family of what is not known of the shape of mechanisms in one place, which only fits have; the number of
@@ -150,7 +152,7 @@ def nuisances_at(
         "tissue": tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors),
         FIELD: field_columns(at, states),
         LAW: law_columns(effects, states),
-        "known loads": load_columns(at),
+        LOADS: load_columns(at),
         "registration": sensors.rigid * registration_of(states.case).deviations,
         SHAPES: np.zeros((len(sensors), SHAPED_EFFECTS * SHAPE_MODES)),
     }
@@ -293,7 +295,7 @@ def _alike(sensors: Sensors, anchors: Floats) -> Floats:
     columns = np.zeros((len(sensors), 3 * len(anchors)))
     if len(rows):
         weights = kernel_columns(sensors.positions[rows], anchors, belief("mesh.alike") * sensors.radius)
-        columns[rows] = (weights[:, :, None] * sensors.directions[rows][:, None, :]).reshape(len(rows), -1)
+        columns[rows] = row_products(weights, sensors.directions[rows])
     return columns
 
 

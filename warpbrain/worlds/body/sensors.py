@@ -24,6 +24,11 @@ def kernel_columns(places: Floats, anchors: Floats, reach: float) -> Floats:
     return np.asarray(weights / np.sqrt(np.sum(weights**2, axis=1, keepdims=True)))
 
 
+def row_products(a: Floats, b: Floats) -> Floats:
+    """Products (n, j k) of each of some columns (n, j) with each of others (n, k): Kronecker's, row by row."""
+    return np.asarray((a[:, :, None] * b[:, None]).reshape(len(a), a.shape[1] * b.shape[1]))
+
+
 def tracked_points(mesh: TetMesh, points: Floats, centre: Floats) -> Sensors:
     """Rows of the displacement of points (k, 3) [m] that were not recorded."""
     from scipy.sparse import csr_matrix, eye, kron

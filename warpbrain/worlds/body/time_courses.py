@@ -71,25 +71,18 @@ def finite_times(times: Floats) -> Floats:
 
 def factor_of_rows(course: TimeCourse, sensors: Sensors) -> Floats:
     """Part (n,) of the full size by which each row differs from the state that it is counted from."""
-    times = finite_times(np.concatenate([sensors.times, sensors.references]))
-    return _since_reference(course.factor(times)[:, None], sensors)[:, 0]
+    return _since_reference(lambda seconds: course.factor(seconds)[:, None], sensors)[:, 0]
 
 
 def modes_of_rows(times: Sequence[float], sensors: Sensors) -> Floats:
     """Modes (n, r) on rows of a cause that changes from one of several times [s] to the next."""
-    ends, modes = finite_times(np.array(times)), modes_of(len(times))
-    seconds = finite_times(np.concatenate([sensors.times, sensors.references]))
-    return _since_reference(modes_between(ends, modes, seconds), sensors)
+    ends, modes = modes_of(times)
+    return _since_reference(lambda seconds: modes_between(ends, modes, seconds), sensors)
 
 
-def with_courses(columns: Floats, courses: Floats) -> Floats:
-    """Columns (n, k r) of coefficients each of which has every course: columns (n, k) times courses (n, r)."""
-    return np.asarray((columns[:, :, None] * courses[:, None]).reshape(len(columns), -1))
-
-
-def _since_reference(factors: Floats, sensors: Sensors) -> Floats:
-    """Factors (2 n, r) at the times of rows and then at those of what they are counted from: their change (n, r)."""
-    after, before = np.split(factors, 2)
+def _since_reference(factors_at: Callable[[Floats], Floats], sensors: Sensors) -> Floats:
+    """Factors (n, r) at the times [s] of rows, less those at the times that they are counted from."""
+    after, before = np.split(factors_at(finite_times(np.concatenate([sensors.times, sensors.references]))), 2)
     return np.where(sensors.before[:, None] < 0, after, after - before)
 
 
@@ -99,9 +92,12 @@ def main_courses(times: Sequence[float]) -> list[TimeCourse]:
     return [c for c in courses if c.shape == AT_ONCE or (c.interval == 0 and c.shape == EVENLY)]
 
 
-def modes_of(count: int) -> Floats:
-    """Modes (m, r) of the process over m times, the largest first; their squares have the sum of the variances."""
-    ranks = np.linspace(0.0, 1.0, count)
+def modes_of(times: Sequence[float]) -> tuple[Floats, Floats]:
+    """Finite times (m,) [s], and modes (m, r) of the process over them.
+
+    The largest come first; their squares have the sum of the variances.
+    """
+    ranks = np.linspace(0.0, 1.0, len(times))
     covariance = np.exp(-0.5 * ((ranks[:, None] - ranks) / belief("courses.reach")) ** 2)
     variances, vectors = np.linalg.eigh(covariance)
     variances, vectors = np.maximum(variances[::-1], 0.0), vectors[:, ::-1]
@@ -109,7 +105,7 @@ def modes_of(count: int) -> Floats:
     kept = int(np.searchsorted(-left, -belief("courses.cut"))) + 1
     # the sign of an eigenvector is arbitrary
     signs = np.where(vectors[-1] < 0.0, -1.0, 1.0)
-    return np.asarray((signs * vectors * np.sqrt(variances))[:, :kept])
+    return finite_times(np.array(times)), np.asarray((signs * vectors * np.sqrt(variances))[:, :kept])
 
 
 def over_time(proposals: Sequence[Proposal], times: Sequence[float]) -> list[Proposal]:
@@ -117,5 +113,5 @@ def over_time(proposals: Sequence[Proposal], times: Sequence[float]) -> list[Pro
     constant = [proposal for proposal in proposals if not proposal.only_over_time]
     if len(times) < 2:
         return constant
-    ends, modes = finite_times(np.array(times)), modes_of(len(times))
+    ends, modes = modes_of(times)
     return constant + [Varying(proposal, ends, modes).proposal() for proposal in proposals if proposal.varying]

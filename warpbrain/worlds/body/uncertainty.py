@@ -27,12 +27,9 @@ from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.effects import Effect, width_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about, shape_columns_about
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.nuisances import load_columns
+from warpbrain.worlds.body.nuisances import LOADS, load_columns
 from warpbrain.worlds.body.sensors import tracked_points
 from warpbrain.worlds.body.weighted_set import WeightedSet
-
-#: The family of what is not known of the case's loads.
-_LOADS = "known loads"
 
 
 @dataclass(frozen=True)
@@ -144,7 +141,7 @@ def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
     nodes = tracked_points(mesh, mesh.points, base.states.centre)
     over = base.at.with_sensors(nodes)
     columns, made = np.zeros((len(nodes), len(z))), base.effects.over(over)
-    part, loads = base.nuisances.part(_LOADS), load_columns(over)
+    part, loads = base.nuisances.part(LOADS), load_columns(over)
     # those that no recording sees have no coordinate
     if part.stop - part.start == loads.shape[1]:
         columns[:, part] = loads

@@ -29,8 +29,8 @@ from warpbrain.physics.words import number
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.effects import Effects
 from warpbrain.worlds.body.linearisation import Linearisation, Moment, gathered
-from warpbrain.worlds.body.sensors import spread_points
-from warpbrain.worlds.body.time_courses import finite_times, modes_of, modes_of_rows, with_courses
+from warpbrain.worlds.body.sensors import row_products, spread_points
+from warpbrain.worlds.body.time_courses import finite_times, modes_of, modes_of_rows
 
 #: Components of a symmetric tensor.
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
@@ -231,21 +231,22 @@ def resistances(at: Linearisation, times: Sequence[float], volume: Proposal, smo
         return nothing
     mesh = at.system.model.mesh
     tissues = (mesh.tissue[:, None] == np.array(mesh.labels)).astype(np.float64)
-    ends, modes = finite_times(np.array(times)), modes_of(len(times))
+    ends, modes = modes_of(times)
 
     def about(moment: Moment) -> Floats:
         state = moment.at
         courses = modes_between(ends, modes, finite_times(np.concatenate([times, moment.times]))[len(times) :])
         [bulk] = Effects(state).of([volume])
         columns = np.column_stack([state.answers_of_elements(state.element_forces, tissues), bulk.columns / volume.sd])
-        return with_courses(columns, courses)
+        # each with every course
+        return row_products(columns, courses)
 
     columns = at.summed(about)
     columns = columns @ _visible_modes(columns, at.sensors.of_one_unit)
     # nothing that is known loads the body
     if not columns.any():
         return nothing
-    not_linear = with_courses(smooth, modes_of_rows(times, at.sensors))
+    not_linear = row_products(smooth, modes_of_rows(times, at.sensors))
     return np.column_stack([columns, belief("unknown.not_linear") * not_linear])
 
 
