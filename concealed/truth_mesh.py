@@ -55,8 +55,12 @@ def make_truth_mesh(name: str) -> TetMesh:
 
 
 def fingerprint(mesh: TetMesh) -> str:
-    """SHA-256 of a mesh: its points to a nanometre, tetrahedra and labels."""
+    """SHA-256 of a mesh, however it is numbered: its points to a nanometre, tetrahedra and labels."""
+    points = np.round(mesh.points * 1e9).astype("<i8")
+    order = np.lexsort(points.T)
+    tetrahedra = np.sort(np.argsort(order)[mesh.tetrahedra], axis=1)
+    elements = np.lexsort(tetrahedra.T)
     digest = hashlib.sha256()
-    for array in (np.round(mesh.points * 1e9).astype("<i8"), mesh.tetrahedra.astype("<i4"), mesh.tissue.astype("<i4")):
+    for array in (points[order], tetrahedra[elements].astype("<i4"), mesh.tissue[elements].astype("<i4")):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
