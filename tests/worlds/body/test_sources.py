@@ -164,7 +164,8 @@ def test_a_force_throughout_the_body_is_not_called_by_a_name(density):
     assert cosine > 0.95
 
 
-@pytest.mark.parametrize("size", [12e3, pytest.param(40e3, marks=pytest.mark.slow(10))])
+@pytest.mark.slow(10)
+@pytest.mark.parametrize("size", one_for_this_commit([12e3, 40e3]))
 def test_a_whirl_that_turns_tissue_far_is_not_called_by_a_name(size):
     """Linear about rest it is lost to a traction that a fit follows; a larger one looks like a field there."""
     side, noise = 0.1, 3e-4
