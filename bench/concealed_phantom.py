@@ -115,7 +115,7 @@ def again(first: Posterior, case: Case) -> Estimate:
     """Another estimate with the error of the mesh of the first, from its state."""
     problem = first.best.problem
     other = Problem(problem.forward, Observations.to_fit(case), problem.mode, problem.likelihood, problem.nuisances)
-    return GaussNewton(other, 3e-3).solve(first.best)
+    return GaussNewton(other, 3e-3, lambda _step: None).solve(first.best)
 
 
 def described(
