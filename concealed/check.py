@@ -25,8 +25,8 @@ from warpbrain.cases.building.pipeline import RECIPES
 
 #: Motion that is found again differs by no more than this [m].
 SAME = 5e-6
-#: Points in a truth are nodes of its mesh to this [m]: a nanometre, rounded.
-PUBLISHED = 2e-9
+#: Distance of an observed point of a truth from its node at most [m]: coordinates are rounded to nanometres.
+ROUNDING = 2e-9
 
 
 def intact(name: str) -> bool:
@@ -58,7 +58,7 @@ def remade(file: Path, meshes: Path) -> float:
     # the observed points are nodes of the fine mesh
     recorded = [data["observed"][wall] for wall in WALLS]
     distances, nodes = zip(*(cKDTree(body.mesh.points).query(wall["point_m"]) for wall in recorded), strict=True)
-    if len(mesh.points) != data["mesh"]["made_nodes"] or max(map(np.max, distances)) > PUBLISHED:
+    if len(mesh.points) != data["mesh"]["made_nodes"] or max(map(np.max, distances)) > ROUNDING:
         raise ValueError(f"{file}: the fine mesh made here is another; the truth was made with {data['versions']}")
     motion = Trial(truth.drawn, body, nodes).exact(truth.strength, truth.level)
     differences = (u - np.array(wall["displacement_m"]) for u, wall in zip(motion, recorded, strict=True))

@@ -195,7 +195,7 @@ class Confirming:
         return Confirmation(
             name,
             weighted_set.hypothesis.log_evidence - others.hypothesis.log_evidence,
-            float(np.sum(full.log_densities - reduced.log_densities)),
+            full.log_density - reduced.log_density,
             full.improvement(reduced, held_out.sensors.is_displacement, self._random),
             p_value(full.log_density, [pattern.log_density for pattern in patterns]),
         )

@@ -298,10 +298,10 @@ class _Places:
             order = np.argsort(-of_cause.max(axis=1))
             of_each_label = order[np.unique(self._labels[cause][places][order], return_index=True)[1]]
             for number in {*order[: self._most].tolist(), *of_each_label.tolist()}:
-                found = _configuration(blocks, low + number, of_cause[number], (), scale)
-                place = found.members[0].place
-                if place not in best or found.log_density > best[place].log_density:
-                    best[place] = found
+                configuration = _configuration(blocks, low + number, of_cause[number], (), scale)
+                place = configuration.members[0].place
+                if place not in best or configuration.log_density > best[place].log_density:
+                    best[place] = configuration
 
     def ranked(self, best: Configuration, log_evidence: float) -> list[Configuration]:
         """The best configuration of a single cause of such evidence, the best at other places and at one of each label.

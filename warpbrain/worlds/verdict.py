@@ -128,16 +128,16 @@ class Words:
     rest: str = ""  # what is known of what has no name: a sentence after a space
 
 
-def verdict_in_words(found: Verdict, words: Words) -> str:
+def verdict_in_words(diagnosis: Verdict, words: Words) -> str:
     """The verdict for people, with its doubts: whole sentences."""
-    return " ".join([_without_doubts(found, words), *found.doubts])
+    return " ".join([_without_doubts(diagnosis, words), *diagnosis.doubts])
 
 
-def _without_doubts(found: Verdict, words: Words) -> str:
-    decision, p, data = found.decision, f"p = {found.p_value:.2g}", words.data
+def _without_doubts(diagnosis: Verdict, words: Words) -> str:
+    decision, p, data = diagnosis.decision, f"p = {diagnosis.p_value:.2g}", words.data
     verdict = decision.verdict
     if verdict == NOTHING:
-        seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in found.smallest.items())
+        seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in diagnosis.smallest.items())
         return f"No missing physics is detected ({p}). What {data} would have shown: {seen or words.nothing}."
     if decision.named:
         first, *others = words.named
@@ -147,7 +147,7 @@ def _without_doubts(found: Verdict, words: Words) -> str:
     if verdict == NOT_PHYSICS:
         errors = " ".join(sentence for sentence, _ in words.members)
         hedge, chance = "", ""
-        physics_acts = sum(each.probability for each in found.combinations if set(each.kinds) - {Kind.NOT_PHYSICS})
+        physics_acts = sum(each.probability for each in diagnosis.combinations if set(each.kinds) - {Kind.NOT_PHYSICS})
         if physics_acts > belief("checks.perhaps"):
             hedge = f", as far as {data} tell"
             chance = f"; that physics is missing beside it has a probability of {percent(physics_acts)}"
@@ -160,8 +160,8 @@ def _without_doubts(found: Verdict, words: Words) -> str:
     if verdict == CANNOT_SAY:
         perhaps = f" Perhaps: {'; or '.join(words.perhaps)}." if words.perhaps else ""
         missing = "missing" if words.only_physics else "wrong or missing"
-        nothing_acts = sum(each.probability for each in found.combinations if not each.causes)
-        if found.p_value > found.alpha:
+        nothing_acts = sum(each.probability for each in diagnosis.combinations if not each.causes)
+        if diagnosis.p_value > diagnosis.alpha:
             # such a p-value is no reason to say that something is missing: the posterior is
             return (
                 f"Something may be {missing}, but {data} cannot say what. The posterior probability that nothing is "

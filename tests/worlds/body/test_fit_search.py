@@ -125,8 +125,8 @@ def test_what_a_fit_has_not_reached_is_no_evidence(sets, base, monkeypatch):
 
 
 @pytest.mark.parametrize("part", [0.6, 0.2, 0.05])
-def test_of_what_collapses_as_large_as_it_is_seen_the_largest_that_does_not_is_fitted(sets, monkeypatch, part):
-    """The body has no equilibrium beyond a part of the weight that the linear model sees."""
+def test_without_an_equilibrium_at_its_start_a_fit_begins_at_smaller_sizes(sets, monkeypatch, part):
+    """The body is made to have no equilibrium beyond a part of the most probable weight of the linear model."""
     weighed = sets.get(("gravity",))
     [effect], [at], solve = weighed.effects, weighed.slices, FitSearch._solve
     largest = part * np.linalg.norm(effect.offset(weighed.coordinates[at]))

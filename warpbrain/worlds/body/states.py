@@ -371,9 +371,9 @@ class States:
 
 
 def _on_the_way(end: SolvedState, hypothesis: Hypothesis, flowing: Mechanism) -> SolvedState:
-    """A state without the mechanism whose fluid flows, with sensors on the way to it, linear about it.
+    """The state of a hypothesis whose fluid flows, from its drained end state: sensors are linear about that.
 
-    Step by step it takes minutes, and a fit has a hundred states. What is recorded on the way is 4 to 8 % off.
+    Step by step it takes minutes, and a fit has a hundred states. What is recorded before the end is 4 to 8 % off.
     """
     change = consolidation(end.linearised(), cast(Following, flowing)).at(1.0)
     sensors = replace(end.sensors, residual=end.sensors.residual - change, computed=end.sensors.computed + change)
