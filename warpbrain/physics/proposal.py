@@ -219,6 +219,9 @@ class Proposal:
     centre: Floats | None = None  # (3,), where it acts, if somewhere [m]
     radius: float | None = None  # [m]
     region: str = ""  # where it acts in words
+    #: Numbers of the coefficients that say how it acts, such as how fast, not how much: their standard deviations stay
+    #: where those of the others are scaled
+    traits: tuple[int, ...] = ()
     odds: str = "causes.mechanism"  # key of the belief of the odds that its kind acts
     declared: bool = False  # whether it acts on a node set of `Situation.unused`
     #: Numbers of the coefficients that may be functions of time: all of them where it is in proportion to them
@@ -251,6 +254,12 @@ class Proposal:
     def switch(cls, mechanism: Mechanism, sd: float, follows: Follows = "switch", **where: Any) -> Proposal:
         """What is there or not; its one coefficient, the share, says how exactly that is simulated."""
         return cls.of_one(lambda _share: mechanism, 1.0, sd, follows, **where)
+
+    def scales(self, factor: float) -> Floats:
+        """Factors (k,) on the standard deviations of all coefficients where that of how much acts is another one."""
+        scales = np.full(len(self), factor)
+        scales[list(self.traits)] = 1.0
+        return scales
 
     @property
     def without(self) -> Floats:

@@ -1,11 +1,14 @@
 """Viscoelasticity against the hereditary integral, by quadrature."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from bodies import energy_at, forces_at, model_of
 from scipy.integrate import quad
+from scipy.stats import norm
 from shapes import cube
 
 from warpbrain.errors import InputError
@@ -176,3 +179,15 @@ def test_slow_change_relaxes_as_motion_does():
     slow.evaluate_forces()
     slow.gather_forces()
     assert slow.internal.numpy()[top, 0].sum() == pytest.approx(expected[-1], rel=1e-9)
+
+
+def test_no_relaxation_time_is_more_probable_than_another_within_those_that_are_looked_for():
+    """Of one branch: the density of `ln tau` under all proposals together."""
+    situation = SimpleNamespace(require_new=lambda _kind: None, instants=3)
+    alone = [proposal for proposal in Viscoelasticity.proposals(situation) if len(proposal) == 2]
+    log_times = np.linspace(math.log(1.0), math.log(300.0), 200)
+    density = sum(norm.pdf(log_times, proposal.mean[1], proposal.sd[1]) for proposal in alone) / len(alone)
+    assert density[10:-10].max() < 1.5 * density[10:-10].min()
+    # a size says how much relaxes, not how fast
+    [scaled] = {tuple(proposal.scales(0.1)) for proposal in alone}
+    assert scaled == (0.1, 1.0)

@@ -56,7 +56,7 @@ def test_a_body_that_moves_less_while_stress_relaxes_has_less_of_the_error(tmp_p
         return solved(of_finer, *acting).sensors.computed - solved(of_mesh, *acting).sensors.computed
 
     any_case = SimpleNamespace(require_new=lambda _kind: None, instants=3)
-    proposal = next(p for p in Viscoelasticity.proposals(any_case) if p.sd[0] > 1.0 and np.exp(p.mean[1]) > 99.0)
+    proposal = next(p for p in Viscoelasticity.proposals(any_case) if np.exp(p.mean[1]) > 99.0)
     z = (np.array([1.0, np.log(100.0)]) - proposal.mean) / proposal.sd
     state, finer = solved(of_mesh, proposal.make(proposal.mean + proposal.sd * z)), FinerStates(of_mesh)
     error = finer.error(state.hypothesis, solved(of_mesh))

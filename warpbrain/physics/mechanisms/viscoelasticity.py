@@ -36,12 +36,9 @@ from warpbrain.physics.words import HARDLY, Smallest, Value, Values, measured, n
 
 #: Relaxation times [s] that are looked for, alone and in pairs.
 _LOOKED_FOR = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-#: Scales of what all branches have together: within the minutes that are recorded anything from a few hundredths of
-#: the modulus relaxes to several times as much.
-_SCALES = (0.2, 2.0)
-#: Standard deviations of `ln tau`, from one time that is looked for to the next, and of the log odds of the first of
-#: two branches.
-_STEP, _ODDS = 0.5 * math.log(10.0), 1.0
+#: Standard deviations of `ln tau`, half of the way from one time that is looked for to the next, so that all of them
+#: together are even, and of the log odds of the first of two branches.
+_STEP, _ODDS = 0.25 * math.log(10.0), 1.0
 #: The least modulus of all branches together.
 _LEAST = 1e-6
 
@@ -110,15 +107,16 @@ class Viscoelasticity(Mechanism):
             Proposal(
                 cls._of_coefficients,
                 middle := np.array([0.0, *np.log(times), *np.zeros(len(times) - 1)]),
-                np.array([scale, *np.full(len(times), _STEP), *np.full(len(times) - 1, _ODDS)]),
+                # within the minutes that are recorded about as much relaxes as is left
+                np.array([1.0, *np.full(len(times), _STEP), *np.full(len(times) - 1, _ODDS)]),
                 "fading",
                 # all of the case's own modulus, whatever the times
                 np.eye(1, len(middle))[0],
                 nothing=middle,
                 history=_left,
                 region="all tissue",
+                traits=tuple(range(1, len(middle))),
             )
-            for scale in _SCALES
             for times in (*alone, *combinations(_LOOKED_FOR, 2))
         ]
 

@@ -701,8 +701,9 @@ def _better_sizes(fit: Refit) -> list[tuple[int, float, float]]:
         factors = np.asarray(effect.sizes) / effect.size
         if len(factors) < 2:
             continue
-        others = fit.marginal.noise.of_noise(np.delete(fit.columns, np.r_[part], axis=1))
-        cause = Cause("", (Place(fit.columns[:, part]),), 0.0, factors)
+        sized = np.delete(np.r_[part], list(effect.proposed.traits))
+        others = fit.marginal.noise.of_noise(np.delete(fit.columns, sized, axis=1))
+        cause = Cause("", (Place(fit.columns[:, sized]),), 0.0, factors)
         [logs] = Blocks(others, fit.linear, [cause]).log_factors()
         gains = logs - logs[np.argmin(np.abs(factors - 1.0))]
         better += [(number, *each) for each in zip(factors.tolist(), gains.tolist(), strict=True) if each[1] > _BETTER]

@@ -44,7 +44,7 @@ class PlaceCoordinates:
     def effect_at(self, p: Floats, effect: Effect) -> Effect:
         """An effect of this proposal, whose standard deviations may be others, at coordinates (4,), in its columns."""
         there = self.at(p)
-        return replace(effect, proposal=replace(there, sd=effect.size * there.sd))
+        return replace(effect, proposal=replace(there, sd=there.scales(effect.size) * there.sd))
 
     def columns(self, at: Linearisation, effect: Effect, z: Floats) -> Floats:
         """Derivatives (n, 4) of what is recorded, about a state where the effect acts with coefficients z (k,)."""

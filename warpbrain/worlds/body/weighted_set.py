@@ -47,10 +47,10 @@ class MeshShare:
         """The same where further mechanisms have coefficients after these, `count` in all."""
         return replace(self, gradient=np.append(self.gradient, np.zeros(count - len(self.gradient))))
 
-    def with_scaled(self, part: slice, factor: float) -> MeshShare:
-        """The same, of coefficients of which those of a part were divided by a factor."""
+    def with_scaled(self, part: slice, scales: Floats) -> MeshShare:
+        """The same, of coefficients of which those of a part were divided by some scales (j,)."""
         gradient = self.gradient.copy()
-        gradient[part] *= factor
+        gradient[part] *= scales
         return replace(self, gradient=gradient)
 
     def with_fixed(self, part: slice, z: Floats) -> MeshShare:
@@ -146,10 +146,11 @@ class Refit:
         return self.marginal.log_evidence - self.unreached + self.within_expected
 
     def scaled(self, number: int, factor: float) -> Refit:
-        """The same point, the prior standard deviations of the coefficients of an effect times a factor."""
+        """The same point, the prior standard deviations of how much of an effect acts times a factor."""
         part, share = column_slices(self.effects, 0)[number], self.mesh_share
+        scales = self.effects[number].proposed.scales(factor)
         columns, first = self.columns.copy(), len(self.nuisances)
-        columns[:, first + part.start : first + part.stop] *= factor
+        columns[:, first + part.start : first + part.stop] *= scales
 
         def changed(values: tuple[Any, ...], change: Callable[[Any], Any]) -> tuple[Any, ...]:
             return (*values[:number], change(values[number]), *values[number + 1 :])
@@ -158,9 +159,9 @@ class Refit:
             self,
             effects=changed(self.effects, lambda effect: effect.scaled(factor)),
             columns=columns,
-            coefficients=changed(self.coefficients, lambda z: z / factor),
-            covariances=changed(self.covariances, lambda covariance: covariance / factor**2),
-            mesh_share=None if share is None else share.with_scaled(part, factor),
+            coefficients=changed(self.coefficients, lambda z: z / scales),
+            covariances=changed(self.covariances, lambda covariance: covariance / np.outer(scales, scales)),
+            mesh_share=None if share is None else share.with_scaled(part, scales),
         )
 
     def without(self, number: int, base: Base) -> Refit:
