@@ -222,6 +222,7 @@ class Proposal:
     #: Numbers of the coefficients that say how it acts, such as how fast, not how much: their standard deviations stay
     #: where those of the others are scaled
     traits: tuple[int, ...] = ()
+    positive: tuple[int, ...] = ()  # numbers of the coefficients that are normal beforehand, but never negative
     odds: str = "causes.mechanism"  # key of the belief of the odds that its kind acts
     declared: bool = False  # whether it acts on a node set of `Situation.unused`
     #: Numbers of the coefficients that may be functions of time: all of them where it is in proportion to them

@@ -1,9 +1,15 @@
 """Numbers of mechanisms that are not expected at all are no explanation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
 
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
+from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.effects import Effect
 from warpbrain.worlds.body.parameters import log_within_expected, numbers_of
 
@@ -35,3 +41,21 @@ def test_what_has_no_range_is_as_probable_as_it_was(small_diagnosis):
     [weight, *_] = small_diagnosis.search.candidates.effects["gravity"]
     k = len(weight.proposed.mean)
     assert log_within_expected(weight, np.full(k, 5.0), np.eye(k)) == 0.0
+
+
+@pytest.mark.parametrize(("seen", "noise"), [(1.5, 0.5), (0.2, 0.5), (-0.4, 0.5)])
+def test_of_what_is_never_negative_half_of_a_normal_prior_cannot_be(seen, noise):
+    """The evidence of a half-normal prior over that of a normal one, by quadrature, of one number that was seen."""
+
+    def density(c: float) -> float:
+        return float(norm.pdf(seen, c, noise) * norm.pdf(c))
+
+    precision = 1.0 + noise**-2
+    relaxing = Viscoelasticity(moduli=(1.0,), times=(1.0,))
+    proposal = Proposal.of_one(lambda c: replace(relaxing, moduli=(max(c, 1e-6),)), 0.0, 1.0, positive=(0,))
+    effect = Effect(proposal, np.zeros(3), np.ones((3, 1)))
+    half, whole = 2.0 * quad(density, 0.0, 9.0)[0], quad(density, -9.0, 9.0)[0]
+    z = np.array([seen / noise**2 / precision])
+    assert log_within_expected(effect, z, np.array([[1.0 / precision]])) == pytest.approx(
+        np.log(half / whole), abs=1e-3
+    )

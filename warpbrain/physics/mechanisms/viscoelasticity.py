@@ -116,6 +116,7 @@ class Viscoelasticity(Mechanism):
                 history=_left,
                 region="all tissue",
                 traits=tuple(range(1, len(middle))),
+                positive=(0,),
             )
             for times in (*alone, *combinations(_LOOKED_FOR, 2))
         ]

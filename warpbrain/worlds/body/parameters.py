@@ -61,7 +61,8 @@ def log_within_expected(effect: Effect, z: Floats, covariance: Floats) -> float:
     """Log probability that numbers of a mechanism are in the ranges outside of which they are not expected at all.
 
     The evidence of a prior that ends there is so many times that of one that does not (Gelfand, Smith and Lee 1992):
-    a fit must not explain recordings by a Poisson ratio of 0.1.
+    a fit must not explain recordings by a Poisson ratio of 0.1. Of a coefficient that is never negative that ratio is
+    over the probability beforehand (Klugkist and Hoijtink 2007): half of its normal prior was of what cannot be.
 
     `z` (k,), `covariance` (k, k): of the coefficients, a posteriori.
     """
@@ -74,6 +75,11 @@ def log_within_expected(effect: Effect, z: Floats, covariance: Floats) -> float:
             continue
         low, high = ((end - value.value) / value.sd for end in spec.expectation.ends)
         total += math.log(max(float(ndtr(high) - ndtr(low)), _LEAST))
+    proposed, c = effect.proposed, effect.coefficients(z)
+    for number in proposed.positive:
+        sd = proposed.sd[number]
+        after, before = c[number] / (sd * math.sqrt(covariance[number, number])), proposed.mean[number] / sd
+        total += math.log(max(float(ndtr(after)), _LEAST) / float(ndtr(before)))
     return total
 
 
