@@ -43,6 +43,7 @@ from warpbrain.worlds.body.evidence import SetMarginal, evidence_of, sizes_of
 from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.moving import moved_about_fit
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
+from warpbrain.worlds.body.parameters import log_overlap
 from warpbrain.worlds.body.placing import Weighing, with_refined_places
 from warpbrain.worlds.body.states import SolvedState, States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
@@ -284,8 +285,19 @@ class HypothesisSearch:
             # that ended too early must not make everything else look better
             gain = max(gain, 0.0)
         inherited, known = candidate.inherited_gain or 0.0, candidate.hypothesis.log_evidence
-        fitted = candidate.fitted(refit).with_gain(gain - inherited)
+        overlap = self._overlap(candidate, refit, 0 if subset is None else len(subset.effects))
+        fitted = candidate.fitted(refit).with_gain(gain - inherited).with_overlap(overlap)
         return fitted, inherited + fitted.hypothesis.log_evidence - known
+
+    def _overlap(self, candidate: WeightedSet, refit: Refit, placed: int) -> float:
+        """Sum of `log_overlap` of the effects of a fit but the first ones, which were `placed` with a fitted subset."""
+        total, each = 0.0, zip(refit.effects, refit.coefficients, refit.covariances, candidate.acting, strict=True)
+        for effect, z, covariance, name in itertools.islice(each, placed, None):
+            others = [other.proposal for other in self.candidates.effects[name] if other.proposal is not None]
+            alike = [p for p in others if p.make == effect.proposed.make and len(p) == len(effect.proposed)]
+            if len(alike) > 1:
+                total += log_overlap(effect, z, covariance, alike)
+        return total
 
     def _move(self, fitted: WeightedSet) -> None:
         """Fit a fitted set and its alternatives where their mechanisms are better placed; the best of these is kept."""

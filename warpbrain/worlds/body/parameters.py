@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.inference.beliefs import belief
 from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.proposal import Proposal
 from warpbrain.physics.words import Smallest, Value
 from warpbrain.worlds.body.effects import Effect
 
@@ -81,6 +83,37 @@ def log_within_expected(effect: Effect, z: Floats, covariance: Floats) -> float:
         after, before = c[number] / (sd * math.sqrt(covariance[number, number])), proposed.mean[number] / sd
         total += math.log(max(float(ndtr(after)), _LEAST) / float(ndtr(before)))
     return total
+
+
+def log_overlap(effect: Effect, z: Floats, covariance: Floats, alike: Sequence[Proposal]) -> float:
+    """Log evidence of a fit under the priors of all proposals that are alike, over that under its own alone.
+
+    Those that make the same of the same coefficients differ by their priors alone, such as about one relaxation time
+    and about the next, which overlap. The linear model about the base sees but the middle of each. About a fit the
+    likelihood is a Gaussian, the posterior over the prior, whose integral with each prior is known. All proposals are
+    equally probable, and so are all sizes.
+
+    `z` (k,), `covariance` (k, k): of the coefficients, a posteriori. `alike`: that of the effect among them, all of the
+    usual size.
+    """
+    proposed, size = effect.proposed, effect.size
+    posterior = covariance * np.outer(proposed.sd, proposed.sd)
+    prior = np.diag(proposed.sd**-2.0)
+    precision = np.linalg.inv(posterior) - prior
+    information = np.linalg.solve(posterior, effect.coefficients(z)) - prior @ proposed.mean
+
+    def log_evidence(other: Proposal) -> float:
+        """But for a constant, the sum over sizes."""
+        logs = []
+        for of_size in effect.sizes:
+            sd = other.scales(of_size) * other.sd
+            joint, shifted = precision + np.diag(sd**-2.0), information + other.mean / sd**2
+            explained = shifted @ np.linalg.solve(joint, shifted) - np.sum((other.mean / sd) ** 2)
+            logs.append(0.5 * (explained - np.linalg.slogdet(joint)[1]) - np.log(sd).sum())
+        return float(np.logaddexp.reduce(logs))
+
+    own = log_evidence(replace(proposed, sd=proposed.sd / proposed.scales(size)))
+    return float(np.logaddexp.reduce([log_evidence(other) for other in alike])) - own
 
 
 def numbers_of(effect: Effect, z: Floats) -> dict[str, tuple[float, str]]:

@@ -341,6 +341,15 @@ class WeightedSet:
         """
         return self.with_gain_of_cell(gain) if gain > 0.0 else self.with_evidence(self.hypothesis.log_evidence + gain)
 
+    def with_overlap(self, gain: float) -> WeightedSet:
+        """The set whose fit gains so much [nats] by the priors of other places, see `log_overlap`.
+
+        What the linear model had of these is in its evidence already: only what is beyond that counts.
+        """
+        in_cell = self.log_share + gain
+        beyond = max(in_cell, 0.0)
+        return replace(self.with_evidence(self.hypothesis.log_evidence + beyond), log_share=min(in_cell, 0.0))
+
     def with_gain_of_cell(self, gain: float) -> WeightedSet:
         """The set whose log evidence in the cells of its places alone is larger by a gain, or less by a loss [nats]."""
         log_share, of_all = self.log_share, gain
