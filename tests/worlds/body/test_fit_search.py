@@ -9,7 +9,8 @@ from sinking_block import OPTIONS, write_sinking
 
 from warpbrain.errors import SolveError
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.fitting import FitSearch, Fitter
+from warpbrain.worlds.body.fit_search import FitSearch
+from warpbrain.worlds.body.fitting import Fitter
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 from warpbrain.worlds.body.nuisances import FIELD, UNKNOWN_MESH
 from warpbrain.worlds.body.weighted_set import Refit
@@ -102,7 +103,7 @@ def test_a_renewal_of_shapes_that_undoes_the_one_before_is_taken_by_half(base, s
     first = base.noise[:, None] * np.random.default_rng(4).normal(size=search._U[:, shapes].shape)
     search._U[:, shapes] = first
     others = [2.0 * first, first, 2.0 * first]
-    monkeypatch.setattr("warpbrain.worlds.body.fitting.shape_columns_about", lambda *_: others.pop(0))
+    monkeypatch.setattr("warpbrain.worlds.body.fit_search.shape_columns_about", lambda *_: others.pop(0))
     for taken, expected in ((1.0, 2.0 * first), (0.5, 1.5 * first), (0.25, 1.625 * first)):
         search._about = search._nearby, ()
         search.update_shapes()

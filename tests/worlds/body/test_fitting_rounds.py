@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpbrain.worlds.body import fitting
-from warpbrain.worlds.body.fitting import FitSearch, Fitter
+from warpbrain.worlds.body import fit_search
+from warpbrain.worlds.body.fit_search import FitSearch
+from warpbrain.worlds.body.fitting import Fitter
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,10 @@ def test_laws_that_stay_the_same_are_not_taken_in_part(monkeypatch: pytest.Monke
     )  # fmt: skip
     for made in (laws, laws * (1.0 + rounding), laws):
         search._about = (None, ())
-        monkeypatch.setattr(fitting, "shape_columns_about", lambda *_, made=made: made)
+        monkeypatch.setattr(fit_search, "shape_columns_about", lambda *_, made=made: made)
         FitSearch.update_shapes(search)
         assert search.taken == 1.0
     search._about = (None, ())
-    monkeypatch.setattr(fitting, "shape_columns_about", lambda *_: 0.5 * laws)
+    monkeypatch.setattr(fit_search, "shape_columns_about", lambda *_: 0.5 * laws)
     FitSearch.update_shapes(search)
     assert search.taken == 0.5
