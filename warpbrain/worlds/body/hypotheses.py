@@ -8,7 +8,7 @@ weighed in the linear model about its fit, where what acts already is as large a
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import partial
@@ -23,14 +23,12 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import Listener
 from warpbrain.estimation.parameters import Gaussian
-from warpbrain.inference import GaussianModel, Search, posterior
+from warpbrain.inference import GaussianModel, posterior
 from warpbrain.inference.calibration import calibration
-from warpbrain.inference.causes import Cause, Hypothesis
-from warpbrain.inference.noise import scales
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads, one_thread_of_blas
 from warpbrain.worlds.body.base import Base, BaseFinder
-from warpbrain.worlds.body.causes import UNKNOWN, BodyCauses, causes_of, not_physics_at, unknown_effects, visible
+from warpbrain.worlds.body.causes import UNKNOWN, causes_of, not_physics_at, unknown_effects, visible
 from warpbrain.worlds.body.dictionary import (
     Candidates,
     candidates_about_fit,
@@ -44,15 +42,12 @@ from warpbrain.worlds.body.fitting import CANNOT_BE_FITTED, Fitter
 from warpbrain.worlds.body.moving import moved_about_fit
 from warpbrain.worlds.body.nuisances import UNKNOWN_MESH
 from warpbrain.worlds.body.parameters import log_overlap
-from warpbrain.worlds.body.placing import Weighing, with_refined_places
+from warpbrain.worlds.body.placing import with_refined_places
 from warpbrain.worlds.body.states import SolvedState, States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
+from warpbrain.worlds.body.weighing import Weighing, keep_better, search_of, supersets, weighed
 from warpbrain.worlds.body.weighted_set import Refit, WeightedSet
 
-#: Places of each cause of which pairs are made, and sets that are weighed with gross errors of their own.
-_PLACES, _SETS = 20, 12
-#: Other places at which a single cause is weighed with gross errors of its own.
-_ELSEWHERE = 2
 #: Places of each cause whose columns are made anew about a fit, and of releases for which states are solved.
 _PLACES_ABOUT_FIT = _SOLVED = 8
 #: How often at most a set is fitted, or its supersets are weighed, as long as any set may be chosen; and as often again
@@ -128,8 +123,8 @@ class HypothesisSearch:
         self.causes = causes_of(base, self.candidates)
         self._visible = visible(self.causes, base.model)
         weighing = Weighing(base, self._visible, nothing.sizes)
-        for _, candidate in _weighed(weighing, models, base.residual, self._visible.causes, most=2):
-            _keep_better(self._sets, candidate)
+        for _, candidate in weighed(weighing, models, base.residual, self._visible.causes, most=2):
+            keep_better(self._sets, candidate)
         # a local cause that has been missed by half a cell seems to do nothing
         singles = [candidate for candidate in self._sets.values() if len(candidate.acting) == len(candidate.names) == 1]
         refine = partial(with_refined_places, base, spacing=self.spacing, source=base.effects)
@@ -137,7 +132,7 @@ class HypothesisSearch:
             self._sets[candidate.names] = candidate
         refined = [self._sets[single.names] for single in singles]
         for candidate in itertools.chain.from_iterable(in_threads(self._with_releases, refined)):
-            _keep_better(self._sets, candidate)
+            keep_better(self._sets, candidate)
 
     def _with_solved_releases(
         self, candidates: Candidates, state: SolvedState, model: GaussianModel, residual: Floats
@@ -177,8 +172,7 @@ class HypothesisSearch:
         causes = visible(causes_of(self.base, replace(self.candidates, effects=effects)), marginal.model)
         weighing = Weighing(self.base, causes, marginal.sizes, single)
         unscaled = GaussianModel(marginal.noise.noise_factor / marginal.scale, single.columns)
-        supersets = self._supersets(single, causes, weighing, [unscaled])
-        return [replace(superset, inherited_gain=0.0) for superset in supersets]
+        return [replace(superset, inherited_gain=0.0) for superset in supersets(single, causes, weighing, [unscaled])]
 
     def fit(self, alone: bool = False) -> None:
         """Fit sets, and weigh supersets of those that are fitted, until no fit can be expected to change the verdict.
@@ -233,7 +227,7 @@ class HypothesisSearch:
     def likely_unknown(self, weighted: WeightedSet) -> str:
         """Label of the most probable place of the unknown in the residuals of a weighted set; see `Place.label`."""
         cause = self.causes.named(UNKNOWN)
-        screened = posterior(weighted.marginal.model, weighted.residual, (cause,), _search(most=1))
+        screened = posterior(weighted.marginal.model, weighted.residual, (cause,), search_of(most=1))
         [member] = next(hypothesis.best.members for hypothesis in screened if hypothesis.causes)
         return cause.places[member.place].label
 
@@ -434,84 +428,17 @@ class HypothesisSearch:
         best: dict[frozenset[str], WeightedSet] = {}
         weighing = Weighing(self.base, causes, marginal.sizes, fitted)
         unscaled = [GaussianModel(factor, fitted.columns) for factor in noise_factors]
-        for superset in self._supersets(fitted, causes, weighing, unscaled):
-            _keep_better(best, superset)
+        for superset in supersets(fitted, causes, weighing, unscaled):
+            keep_better(best, superset)
         fits = {names for names, known in self._sets.items() if known.refit is not None}
         placed = len(fitted.effects)
         refine = partial(with_refined_places, self.base, spacing=self.spacing, source=candidates.source, placed=placed)
         for superset in in_threads(refine, [superset for names, superset in best.items() if names not in fits]):
             self._sets[superset.names] = superset
 
-    def _supersets(
-        self, fitted: WeightedSet, causes: BodyCauses, weighing: Weighing, unscaled: Sequence[GaussianModel]
-    ) -> Iterator[WeightedSet]:
-        """The most probable sets of one cause more than a fitted one, with that at the best place of a scan.
-
-        `unscaled`: models of the rows with the fitted causes, at a scale of one.
-        """
-        for hypothesis, candidate in _weighed(weighing, unscaled, fitted.residual, causes.causes, most=1):
-            # both with gross errors of their own
-            gain = candidate.hypothesis.log_evidence - fitted.marginal.log_evidence
-            # causes in the order of their effects
-            joint = replace(
-                hypothesis,
-                causes=(*fitted.hypothesis.causes, *hypothesis.causes),
-                kinds=(*fitted.hypothesis.kinds, *hypothesis.kinds),
-                log_prior=hypothesis.log_prior + fitted.hypothesis.log_prior,
-                log_evidence=fitted.hypothesis.log_evidence + gain,
-            )
-            log_share = fitted.log_share + candidate.log_share
-            yield replace(candidate, hypothesis=joint, inherited_gain=None, alternatives=(), log_share=log_share)
-
-
-def _weighed(
-    weighing: Weighing, models: Sequence[GaussianModel], residual: Floats, causes: Sequence[Cause], most: int
-) -> Iterator[tuple[Hypothesis, WeightedSet]]:
-    """The most probable sets of so many causes at most, under each of several models of the rows (n,).
-
-    Of pairs at most also that without any cause, and every single one; else neither.
-    """
-    pairs, search = most > 1, _search(most)
-    screened = in_threads(lambda model: posterior(model, residual, causes, search), models)
-    tasks = [
-        (hypothesis, model)
-        for model, of_model in zip(models, screened, strict=True)
-        for hypothesis in _most_probable(of_model, pairs)
-        if pairs or hypothesis.causes
-    ]
-    weighed = in_threads(lambda task: weighing.weigh(*task), tasks)
-    return zip((hypothesis for hypothesis, _ in tasks), weighed, strict=True)
-
-
-def _keep_better(sets: dict[frozenset[str], WeightedSet], candidate: WeightedSet) -> None:
-    """Put a set among others by its names, unless the same is there with as much evidence.
-
-    That of less evidence is an alternative of the other where a single cause has another placement.
-    """
-    known = sets.get(candidate.names)
-    if known is None:
-        sets[candidate.names] = candidate
-        return
-    is_better = candidate.hypothesis.log_evidence > known.hypothesis.log_evidence
-    better, other = (candidate, known) if is_better else (known, candidate)
-    alternatives = (*better.alternatives, other, *other.alternatives) if len(better.names) == 1 else ()
-    sets[better.names] = better.with_alternatives(alternatives)
-
 
 def _probabilities(sets: Iterable[WeightedSet]) -> Floats:
     return calibration().probabilities([candidate.hypothesis for candidate in sets])
-
-
-def _search(most: int) -> Search:
-    values, log_prior = scales()
-    return Search(values, log_prior, places=_PLACES, beam=0, most=most, elsewhere=_ELSEWHERE)
-
-
-def _most_probable(screened: Sequence[Hypothesis], singles: bool = True) -> list[Hypothesis]:
-    """The most probable sets, that without any cause, and every single cause if `singles`."""
-    others = screened[_SETS:]
-    kept = [other for other in others if not other.causes or (singles and len(other.causes) == 1)]
-    return [*screened[:_SETS], *kept]
 
 
 def require_observable(case: Case) -> None:

@@ -9,23 +9,19 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
-from warpbrain.arrays import Floats, Ints
+from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
-from warpbrain.inference.causes import Hypothesis, Member
 from warpbrain.inference.gross_errors import log_densities_of
-from warpbrain.inference.noise import scales
 from warpbrain.mesh.quality import principal_axes
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Patch, Proposal
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.causes import BodyCauses
 from warpbrain.worlds.body.dictionary import BETWEEN, switch_effects
-from warpbrain.worlds.body.effects import Effect, Effects, width_of
-from warpbrain.worlds.body.evidence import SetMarginal, Sizes, evidence_of
+from warpbrain.worlds.body.effects import Effect, Effects
+from warpbrain.worlds.body.evidence import evidence_of
 from warpbrain.worlds.body.places import RADII, middles_of_faces
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -106,78 +102,6 @@ def _on_surface(base: Base, centre: Floats, reach: float, patch: Patch | None) -
         if min(np.linalg.norm(np.array(chosen) - middles[number], axis=1)) >= 0.25 * reach:
             chosen.append(middles[number])
     return np.array(chosen)
-
-
-class Weighing:
-    """Hypotheses of screening in the linear model about the base, or about a fit, with gross errors of their own.
-
-    `causes`: those that are screened. `sizes`: see `evidence_of`. `about`: a fitted set, whose causes act beside those
-    of each hypothesis; the base, where no cause acts, unless given.
-    """
-
-    def __init__(self, base: Base, causes: BodyCauses, sizes: Sizes, about: WeightedSet | None = None) -> None:
-        self._base, self._causes, self._sizes = base, causes, sizes
-        self._names: tuple[str, ...] = () if about is None else about.acting
-        self._acting: tuple[Effect, ...] = () if about is None else about.effects
-        self._residual = base.residual if about is None else about.residual
-        self._columns = base.nuisances.columns_with_field(sizes.field) if about is None else about.columns
-        # the same ones are often found with several noises
-        self._at = cache(self._acting_with)
-
-    def weigh(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
-        """A hypothesis with gross errors of its own.
-
-        Screening gives all hypotheses the gross errors of one model. What this one gains by having its own is added to
-        its log evidence: the mean over its likeliest places, since points that a local cause moves far are gross errors
-        where it is thought to be elsewhere.
-
-        `screened`: of the rows without its causes.
-        """
-        configurations = (hypothesis.best, *hypothesis.elsewhere)
-        weighed = [self._weigh_at(replace(hypothesis, best=best), screened) for best in configurations]
-        shares = np.array([configuration.log_density for configuration in configurations])
-        logs = np.array([candidate.hypothesis.log_evidence for candidate in weighed]) + shares
-        log_evidence = float(np.logaddexp.reduce(logs) - np.logaddexp.reduce(shares))
-        best = int(np.argmax(logs))
-        of_places = float(np.logaddexp.reduce([configuration.log_share for configuration in configurations]))
-        log_shares = np.minimum(logs - np.logaddexp.reduce(logs) + of_places, 0.0)
-        weighed = [
-            replace(each.with_evidence(log_evidence), log_share=share)
-            for each, share in zip(weighed, log_shares.tolist(), strict=True)
-        ]
-        return weighed[best].with_alternatives(weighed[k] for k in np.argsort(-logs).tolist())
-
-    def _weigh_at(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
-        """The same as if its best configuration stood for all places."""
-        acting, effects, residual, columns, further, result = self._at(hypothesis.best.members, hypothesis.best.scale)
-        values, log_prior = scales()
-        log_screened = screened.with_columns(columns[:, further]).log_marginal(residual, values, log_prior)
-        log_evidence = hypothesis.log_evidence + result.log_evidence - log_screened
-        hypothesis = replace(hypothesis, log_evidence=log_evidence)
-        return WeightedSet(hypothesis, acting, effects, residual, columns, result, further=further)
-
-    def _acting_with(
-        self, members: tuple[Member, ...], scale: float
-    ) -> tuple[tuple[str, ...], tuple[Effect, ...], Floats, Floats, Ints, SetMarginal]:
-        """Names of what acts, effects, residual (n,) and columns (n, q + k) with members of a hypothesis.
-
-        And numbers (k,) of the columns of these, and the evidence, whose sum begins at a scale of the noise.
-        """
-        causes, effects = self._causes, [self._causes.effect(member) for member in members]
-        linear = [causes.columns(member) for member, effect in zip(members, effects, strict=True) if effect is None]
-        added = [effect for effect in effects if effect is not None]
-        names = [causes.causes[m.cause].name for m, effect in zip(members, effects, strict=True) if effect is not None]
-        residual = self._residual - sum(
-            (causes.mean(member) for member in members), start=np.zeros(len(self._residual))
-        )
-        # nuisances, linear causes, effects: those that act already come first
-        split = self._columns.shape[1] - width_of(self._acting)
-        before, after = np.hsplit(self._columns, [split])
-        columns = np.column_stack([before, *linear, after, *(effect.columns for effect in added)])
-        columns, result = evidence_of(self._base, columns, residual, self._sizes, scale)
-        count, linear_count = columns.shape[1], sum(of_cause.shape[1] for of_cause in linear)
-        further = np.r_[split : split + linear_count, count - width_of(added) : count].astype(np.int64)
-        return (*self._names, *names), (*self._acting, *added), residual, columns, further, result
 
 
 def with_refined_places(
