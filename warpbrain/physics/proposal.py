@@ -221,7 +221,7 @@ class Proposal:
     region: str = ""  # where it acts in words
     #: Numbers of the coefficients that say how it acts, such as how fast, not how much: their standard deviations stay
     #: where those of the others are scaled
-    traits: tuple[int, ...] = ()
+    unscaled: tuple[int, ...] = ()
     positive: tuple[int, ...] = ()  # numbers of the coefficients that are normal beforehand, but never negative
     odds: str = "causes.mechanism"  # key of the belief of the odds that its kind acts
     declared: bool = False  # whether it acts on a node set of `Situation.unused`
@@ -259,7 +259,7 @@ class Proposal:
     def scales(self, factor: float) -> Floats:
         """Factors (k,) on the standard deviations of all coefficients where that of how much acts is another one."""
         scales = np.full(len(self), factor)
-        scales[list(self.traits)] = 1.0
+        scales[list(self.unscaled)] = 1.0
         return scales
 
     @property

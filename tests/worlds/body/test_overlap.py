@@ -14,9 +14,9 @@ from warpbrain.worlds.body.parameters import log_overlap
 SIZES = (0.3, 1.0, 2.5)
 
 
-def _about(trait: float) -> Proposal:
+def _about(how: float) -> Proposal:
     """How much and, about some value, how."""
-    return Proposal(_swelling, np.array([0.0, trait]), np.array([0.5, 0.6]), "smooth", traits=(1,))
+    return Proposal(_swelling, np.array([0.0, how]), np.array([0.5, 0.6]), "smooth", unscaled=(1,))
 
 
 def _swelling(c: np.ndarray) -> Swelling:
@@ -26,7 +26,7 @@ def _swelling(c: np.ndarray) -> Swelling:
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("noise", [0.05, 0.7])
 def test_it_is_the_sum_over_all_places_and_sizes(size: float, noise: float) -> None:
-    places = [_about(trait) for trait in (-1.0, 0.0, 1.0)]
+    places = [_about(how) for how in (-1.0, 0.0, 1.0)]
     seen, of_seen = np.array([0.4, 0.3]), noise**2 * np.array([[1.0, 0.4], [0.4, 2.0]])
     effect = replace(Effect(places[1], np.zeros(3), np.ones((3, 2))).scaled(size), sizes=SIZES)
     prior = np.diag(effect.proposed.sd**2)

@@ -115,7 +115,7 @@ class Viscoelasticity(Mechanism):
                 nothing=middle,
                 history=_left,
                 region="all tissue",
-                traits=tuple(range(1, len(middle))),
+                unscaled=tuple(range(1, len(middle))),
                 positive=(0,),
             )
             for times in (*alone, *combinations(_LOOKED_FOR, 2))

@@ -184,7 +184,7 @@ def _better_sizes(fit: Refit) -> list[tuple[int, float, float]]:
         factors = np.asarray(effect.sizes) / effect.size
         if len(factors) < 2:
             continue
-        sized = np.delete(np.r_[part], list(effect.proposed.traits))
+        sized = np.delete(np.r_[part], list(effect.proposed.unscaled))
         others = fit.marginal.noise.of_noise(np.delete(fit.columns, sized, axis=1))
         cause = Cause("", (Place(fit.columns[:, sized]),), 0.0, factors)
         [logs] = Blocks(others, fit.linear, [cause]).log_factors()
