@@ -36,9 +36,9 @@ from warpbrain.physics.words import HARDLY, Smallest, Value, Values, measured, n
 
 #: Relaxation times [s] that are looked for, alone and in pairs.
 _LOOKED_FOR = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-#: Standard deviations of `ln tau`, half of the way from one time that is looked for to the next, so that all of them
-#: together are even, and of the log odds of the first of two branches.
-_STEP, _ODDS = 0.25 * math.log(10.0), 1.0
+#: Standard deviations of `ln tau`, from one time that is looked for to the next, so that all of them together are even
+#: and none pulls a fit, and of the log odds of the first of two branches.
+_STEP, _ODDS = 0.5 * math.log(10.0), 1.0
 #: The least modulus of all branches together.
 _LEAST = 1e-6
 
