@@ -34,8 +34,6 @@ Shipped = tuple[Body, Body]
 ATTEMPTS = 60
 #: Relative miss of the wanted motion that is let pass: on the coarse mesh to go on, on the fine mesh to end.
 COARSE_MISS, FINE_MISS = 0.04, 0.03
-#: Parts of a sealed strength at which it is looked for again: where elements do not lock it may leave no equilibrium.
-AGAIN_FROM = 1.0, 0.6, 0.35
 
 
 def fitted(trial: Trial, coarse: CoarseTrial, wanted: tuple[float, float]) -> Tuned:
@@ -100,14 +98,7 @@ def find_truth_again(name: str, body: Body, shipped: Shipped) -> tuple[Truth, Tr
     nodes = observed_nodes(name, body, shipped)
     limit = truth.drawn.main.limit
     trial = Trial(truth.drawn, body, nodes)
-    for share in AGAIN_FROM:
-        try:
-            found = tune(trial.motion, limit, truth.wanted, share * truth.strength, truth.level, close=0.01)
-        except Unreachable:
-            if share == AGAIN_FROM[-1]:
-                raise
-        else:
-            break
+    found = tune(trial.motion, limit, truth.wanted, truth.strength, truth.level, close=0.01)
     if found.miss > FINE_MISS:
         raise Unreachable
     # from rest, as it is made again when it is checked
