@@ -45,7 +45,7 @@ from warpbrain.worlds.body.parameters import log_overlap
 from warpbrain.worlds.body.placing import with_refined_places
 from warpbrain.worlds.body.states import SolvedState, States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
-from warpbrain.worlds.body.weighing import Weighing, keep_better, search_of, supersets, weighed
+from warpbrain.worlds.body.weighing import Weighing, keep_better, search_of
 from warpbrain.worlds.body.weighted_set import Refit, WeightedSet
 
 #: Places of each cause whose columns are made anew about a fit, and of releases for which states are solved.
@@ -123,7 +123,7 @@ class HypothesisSearch:
         self.causes = causes_of(base, self.candidates)
         self._visible = visible(self.causes, base.model)
         weighing = Weighing(base, self._visible, nothing.sizes)
-        for _, candidate in weighed(weighing, models, base.residual, self._visible.causes, most=2):
+        for _, candidate in weighing.most_probable(models, most=2):
             keep_better(self._sets, candidate)
         # a local cause that has been missed by half a cell seems to do nothing
         singles = [candidate for candidate in self._sets.values() if len(candidate.acting) == len(candidate.names) == 1]
@@ -172,7 +172,7 @@ class HypothesisSearch:
         causes = visible(causes_of(self.base, replace(self.candidates, effects=effects)), marginal.model)
         weighing = Weighing(self.base, causes, marginal.sizes, single)
         unscaled = GaussianModel(marginal.noise.noise_factor / marginal.scale, single.columns)
-        return [replace(superset, inherited_gain=0.0) for superset in supersets(single, causes, weighing, [unscaled])]
+        return [replace(superset, inherited_gain=0.0) for superset in weighing.supersets([unscaled])]
 
     def fit(self, alone: bool = False) -> None:
         """Fit sets, and weigh supersets of those that are fitted, until no fit can be expected to change the verdict.
@@ -428,7 +428,7 @@ class HypothesisSearch:
         best: dict[frozenset[str], WeightedSet] = {}
         weighing = Weighing(self.base, causes, marginal.sizes, fitted)
         unscaled = [GaussianModel(factor, fitted.columns) for factor in noise_factors]
-        for superset in supersets(fitted, causes, weighing, unscaled):
+        for superset in weighing.supersets(unscaled):
             keep_better(best, superset)
         fits = {names for names, known in self._sets.items() if known.refit is not None}
         placed = len(fitted.effects)

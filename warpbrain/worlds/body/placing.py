@@ -1,4 +1,4 @@
-"""Sets of causes in the linear model, with gross errors of their own and places finer than a scan's.
+"""Places of causes in the linear model, finer than those of a scan.
 
 Each place of a scan stands for a cell about it. So the evidence of the best one becomes the mean over finer places in
 its cell, and the best of these is where a fit begins.

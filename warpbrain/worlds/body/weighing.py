@@ -14,7 +14,7 @@ import numpy as np
 
 from warpbrain.arrays import Floats, Ints
 from warpbrain.inference import GaussianModel, Search, posterior
-from warpbrain.inference.causes import Cause, Hypothesis, Member
+from warpbrain.inference.causes import Hypothesis, Member
 from warpbrain.inference.noise import scales
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
@@ -37,13 +37,50 @@ class Weighing:
     """
 
     def __init__(self, base: Base, causes: BodyCauses, sizes: Sizes, about: WeightedSet | None = None) -> None:
-        self._base, self._causes, self._sizes = base, causes, sizes
+        self._base, self._causes, self._sizes, self._about = base, causes, sizes, about
         self._names: tuple[str, ...] = () if about is None else about.acting
         self._acting: tuple[Effect, ...] = () if about is None else about.effects
         self._residual = base.residual if about is None else about.residual
         self._columns = base.nuisances.columns_with_field(sizes.field) if about is None else about.columns
         # the same ones are often found with several noises
         self._at = cache(self._acting_with)
+
+    def most_probable(self, models: Sequence[GaussianModel], most: int) -> Iterator[tuple[Hypothesis, WeightedSet]]:
+        """The most probable sets of so many causes at most, under each of several models of the rows (n,).
+
+        Of pairs at most also that without any cause, and every single one; else neither.
+        """
+        pairs, search = most > 1, search_of(most)
+        screened = in_threads(lambda model: posterior(model, self._residual, self._causes.causes, search), models)
+        tasks = [
+            (hypothesis, model)
+            for model, of_model in zip(models, screened, strict=True)
+            for hypothesis in _most_probable(of_model, pairs)
+            if pairs or hypothesis.causes
+        ]
+        weighed = in_threads(lambda task: self.weigh(*task), tasks)
+        return zip((hypothesis for hypothesis, _ in tasks), weighed, strict=True)
+
+    def supersets(self, unscaled: Sequence[GaussianModel]) -> Iterator[WeightedSet]:
+        """The most probable sets of one cause more than the fitted one, with that at the best place of a scan.
+
+        `unscaled`: models of the rows with the fitted causes, at a scale of one.
+        """
+        fitted = self._about
+        assert fitted is not None
+        for hypothesis, candidate in self.most_probable(unscaled, most=1):
+            # both with gross errors of their own
+            gain = candidate.hypothesis.log_evidence - fitted.marginal.log_evidence
+            # causes in the order of their effects
+            joint = replace(
+                hypothesis,
+                causes=(*fitted.hypothesis.causes, *hypothesis.causes),
+                kinds=(*fitted.hypothesis.kinds, *hypothesis.kinds),
+                log_prior=hypothesis.log_prior + fitted.hypothesis.log_prior,
+                log_evidence=fitted.hypothesis.log_evidence + gain,
+            )
+            log_share = fitted.log_share + candidate.log_share
+            yield replace(candidate, hypothesis=joint, inherited_gain=None, alternatives=(), log_share=log_share)
 
     def weigh(self, hypothesis: Hypothesis, screened: GaussianModel) -> WeightedSet:
         """A hypothesis with gross errors of its own.
@@ -99,47 +136,6 @@ class Weighing:
         count, linear_count = columns.shape[1], sum(of_cause.shape[1] for of_cause in linear)
         further = np.r_[split : split + linear_count, count - width_of(added) : count].astype(np.int64)
         return (*self._names, *names), (*self._acting, *added), residual, columns, further, result
-
-
-def weighed(
-    weighing: Weighing, models: Sequence[GaussianModel], residual: Floats, causes: Sequence[Cause], most: int
-) -> Iterator[tuple[Hypothesis, WeightedSet]]:
-    """The most probable sets of so many causes at most, under each of several models of the rows (n,).
-
-    Of pairs at most also that without any cause, and every single one; else neither.
-    """
-    pairs, search = most > 1, search_of(most)
-    screened = in_threads(lambda model: posterior(model, residual, causes, search), models)
-    tasks = [
-        (hypothesis, model)
-        for model, of_model in zip(models, screened, strict=True)
-        for hypothesis in _most_probable(of_model, pairs)
-        if pairs or hypothesis.causes
-    ]
-    weighed = in_threads(lambda task: weighing.weigh(*task), tasks)
-    return zip((hypothesis for hypothesis, _ in tasks), weighed, strict=True)
-
-
-def supersets(
-    fitted: WeightedSet, causes: BodyCauses, weighing: Weighing, unscaled: Sequence[GaussianModel]
-) -> Iterator[WeightedSet]:
-    """The most probable sets of one cause more than a fitted one, with that at the best place of a scan.
-
-    `unscaled`: models of the rows with the fitted causes, at a scale of one.
-    """
-    for hypothesis, candidate in weighed(weighing, unscaled, fitted.residual, causes.causes, most=1):
-        # both with gross errors of their own
-        gain = candidate.hypothesis.log_evidence - fitted.marginal.log_evidence
-        # causes in the order of their effects
-        joint = replace(
-            hypothesis,
-            causes=(*fitted.hypothesis.causes, *hypothesis.causes),
-            kinds=(*fitted.hypothesis.kinds, *hypothesis.kinds),
-            log_prior=hypothesis.log_prior + fitted.hypothesis.log_prior,
-            log_evidence=fitted.hypothesis.log_evidence + gain,
-        )
-        log_share = fitted.log_share + candidate.log_share
-        yield replace(candidate, hypothesis=joint, inherited_gain=None, alternatives=(), log_share=log_share)
 
 
 def keep_better(sets: dict[frozenset[str], WeightedSet], candidate: WeightedSet) -> None:
