@@ -222,7 +222,7 @@ class Proposal:
     #: Numbers of the coefficients that say how it acts, such as how fast, not how much: their standard deviations stay
     #: where those of the others are scaled
     unscaled: tuple[int, ...] = ()
-    positive: tuple[int, ...] = ()  # numbers of the coefficients that are normal beforehand, but never negative
+    positive: tuple[int, ...] = ()  # numbers of the coefficients with a half-normal prior, never negative
     odds: str = "causes.mechanism"  # key of the belief of the odds that its kind acts
     declared: bool = False  # whether it acts on a node set of `Situation.unused`
     #: Numbers of the coefficients that may be functions of time: all of them where it is in proportion to them
@@ -257,7 +257,7 @@ class Proposal:
         return cls.of_one(lambda _share: mechanism, 1.0, sd, follows, **where)
 
     def scales(self, factor: float) -> Floats:
-        """Factors (k,) on the standard deviations of all coefficients where that of how much acts is another one."""
+        """Factors (k,) on prior standard deviations that scale those of amounts by a factor; 1 of the others."""
         scales = np.full(len(self), factor)
         scales[list(self.unscaled)] = 1.0
         return scales

@@ -83,7 +83,7 @@ class Effect:
     #: Of a course in time: from its coefficients (k,) to the columns (n, k) about them.
     columns_at: Callable[[Floats], Floats] | None = None
     is_solved: bool = False  # of what is there or not: by a state with it, not to first order
-    #: Standard deviation of how much of it acts over the usual one, and the values that this may have.
+    #: Prior standard deviation of its amounts over the usual one, and the values that this may have.
     size: float = 1.0
     sizes: tuple[float, ...] = (1.0,)
 
@@ -119,7 +119,7 @@ class Effect:
         return list(self.proposal.acting(self.coefficients(z)))
 
     def scaled(self, factor: float) -> Effect:
-        """The same with the standard deviations of how much of it acts times a factor; of what is physics."""
+        """The same with the prior standard deviations of its amounts times a factor; of what is physics."""
         scales = self.proposed.scales(factor)
         proposal = replace(self.proposed, sd=scales * self.proposed.sd)
         return replace(self, proposal=proposal, columns=scales * self.columns, size=factor * self.size)

@@ -63,8 +63,8 @@ def log_within_expected(effect: Effect, z: Floats, covariance: Floats) -> float:
     """Log probability that numbers of a mechanism are in the ranges outside of which they are not expected at all.
 
     The evidence of a prior that ends there is so many times that of one that does not (Gelfand, Smith and Lee 1992):
-    a fit must not explain recordings by a Poisson ratio of 0.1. Of a coefficient that is never negative that ratio is
-    over the probability beforehand (Klugkist and Hoijtink 2007): half of its normal prior was of what cannot be.
+    a fit must not explain recordings by a Poisson ratio of 0.1. Of a half-normal prior that ratio is the probability
+    of a positive coefficient a posteriori over that a priori (Klugkist and Hoijtink 2007).
 
     `z` (k,), `covariance` (k, k): of the coefficients, a posteriori.
     """
@@ -103,7 +103,7 @@ def log_overlap(effect: Effect, z: Floats, covariance: Floats, alike: Sequence[P
     information = np.linalg.solve(posterior, effect.coefficients(z)) - prior @ proposed.mean
 
     def log_evidence(other: Proposal) -> float:
-        """But for a constant, the sum over sizes."""
+        """Of the fit under the prior of another proposal, summed over sizes, but for a constant."""
         logs = []
         for of_size in effect.sizes:
             sd = other.scales(of_size) * other.sd

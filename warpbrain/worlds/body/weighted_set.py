@@ -146,7 +146,7 @@ class Refit:
         return self.marginal.log_evidence - self.unreached + self.within_expected
 
     def scaled(self, number: int, factor: float) -> Refit:
-        """The same point, the prior standard deviations of how much of an effect acts times a factor."""
+        """The same point, the prior standard deviations of the amounts of an effect times a factor."""
         part, share = column_slices(self.effects, 0)[number], self.mesh_share
         scales = self.effects[number].proposed.scales(factor)
         columns, first = self.columns.copy(), len(self.nuisances)
