@@ -4,7 +4,7 @@ Linear tetrahedra are too stiff, near nu = 1/2 by several percent of the displac
 Recordings know nothing of elements: fitted as it is, such a mesh finds tissue that is too soft by as much, and says so
 with a standard deviation that is far smaller than that. So what is recorded is taken to be
 
-    H(u_h + (a I + B(x)) d(theta)) + noise,    d = u_(h/2) - u_h
+    H(u_h + (a I + B(x)) d(theta)) + H' s(theta) + noise,    d = u_(h/2) - u_h
 
 What falls with a power p of the size is the error of the stiffness, since a mesh that is far too stiff shows little of
 its error when halved: `1/u_h = (1 + e)/u` and `1/u_(h/2) = (1 + e/2^p)/u` give, with `k` the part of `u_(h/2)` that is
@@ -16,7 +16,8 @@ and Richardson's extrapolation, `a = b`, where `k` is small. `b` is 4/3 for p = 
 p = 1, as at the edges of what is held and where elements lock: `b ~ N(5/3, 0.4^2)` holds both. What is missing is not
 quite of the shape of d, nor of one amount everywhere: `B` is a matrix field, affine in the position, whose coefficients
 (of the unit matrices, and of positions in units of the body's root mean square radius) are independent, `N(0, 0.2^2)`.
-All are estimated along with the tissue and integrated out.
+All are estimated along with the tissue and integrated out. `s` is what displacement within elements is beyond what
+they say (`warpbrain.estimation.surplus`).
 
 `d` depends on the tissue as the displacement itself does. It is taken to first order in the tissue about the estimate:
 held fixed, it would make the displacement change too little with a modulus, by the share that d is of it.
@@ -28,7 +29,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
@@ -38,6 +39,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import Forward, State
+from warpbrain.estimation.surplus import Surplus, surplus_of
 from warpbrain.inference.beliefs import belief
 from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
@@ -93,6 +95,7 @@ class Difference:
 
     u: Floats  # (n, 3), at the nodes of the mesh [m]
     reactions: Floats  # (n, 3) [N]
+    surplus: Surplus  # within the elements of the mesh, which has none
     theta: Floats  # (p,), where it was computed
 
     @property
@@ -101,13 +104,18 @@ class Difference:
         return root_mean_square(self.u)
 
     def less(self, other: Difference) -> Difference:
-        return Difference(self.u - other.u, self.reactions - other.reactions, self.theta)
+        return self.plus(other.times(-1.0))
 
     def plus(self, other: Difference) -> Difference:
-        return Difference(self.u + other.u, self.reactions + other.reactions, self.theta)
+        surplus = self.surplus.plus(other.surplus)
+        return Difference(self.u + other.u, self.reactions + other.reactions, surplus, self.theta)
 
     def times(self, factor: float) -> Difference:
-        return Difference(factor * self.u, factor * self.reactions, self.theta)
+        return Difference(factor * self.u, factor * self.reactions, self.surplus.times(factor), self.theta)
+
+    def extrapolated(self, amount: float) -> Difference:
+        """The whole error, of which this is a part, `amount` times as large; the surplus is nearly all there is."""
+        return replace(self.times(amount), surplus=self.surplus)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +125,7 @@ class DiscretisationError:
     change: Difference  # `d`: what elements of half the size change
     du: Floats  # (p, s n, 3), its derivatives by `theta`
     dR: Floats
+    dsurplus: Floats  # (p, s, E, 3), of its surplus (s, E, 3)
     positions: Floats  # (s n, 3), of nodes, from the mean of all in units of their root mean square radius
     part: float  # `k`: the part of the displacement on elements of half the size that is `d`, its projection
 
@@ -137,6 +146,11 @@ class DiscretisationError:
         """Derivatives (p, s n, 3) of that."""
         M = self._matrices(values)
         return np.einsum("nij,pnj->pni", M, self.du), np.einsum("nij,pnj->pni", M, self.dR)
+
+    def surplus_at(self, theta: Floats) -> Floats:
+        """Surplus (s, E, 3) with other parameters (p,)."""
+        step = theta - self.change.theta
+        return self.change.surplus.values + np.tensordot(step, self.dsurplus, axes=1)
 
     def by_values(self, theta: Floats, values: Floats) -> tuple[Floats, Floats]:
         """Derivatives (37, s n, 3) of that by `values`."""
@@ -174,8 +188,8 @@ class FinerMesh:
         # of earlier states: kinds of mechanisms, coarse displacements, flat, and the finer ones less those
         self._earlier: list[tuple[frozenset[str], Floats, Floats]] = []
         self._system: System | None = None
-        # to its mesh, its model and its displacement
-        self._last: tuple[Any, Model, Floats] | None = None
+        # its mesh, its model and its displacement
+        self._last: tuple[FinerCase, Model, Floats] | None = None
 
     def difference(
         self, case: Case, theta: Floats, system: System, u: Floats, reactions: Floats, tolerance: float = ROUGH
@@ -205,26 +219,27 @@ class FinerMesh:
                 raise
             solution = solver.solve(external, flat)
         self._earlier = [*self._earlier[-_KEPT:], (acting, u.ravel(), solution.u - flat)]
-        self._last = finer.prolongation, model, solution.u
+        self._last = finer, model, solution.u
         finer_u, finer_reactions = restricted(
             finer.prolongation, solution.u, model.reactions(solution.internal, external)
         )
-        return Difference(finer_u - u, finer_reactions - reactions, theta)
+        return Difference(finer_u - u, finer_reactions - reactions, Surplus.of(finer.edges, solution.u), theta)
 
     def derivatives(
         self, theta: Floats, materials: Callable[[Floats], Mapping[int, Material]]
-    ) -> tuple[Floats, Floats]:
-        """Derivatives (p, n, 3) of the last state there, its displacement and its reactions at the nodes of the mesh.
+    ) -> tuple[Floats, Floats, Floats]:
+        """Derivatives of the last state there: displacement and reactions (p, n, 3) at the nodes of the mesh, surplus.
 
-        `materials` are those of parameters (p,) by label; `SolveError` if the state is unstable.
+        `materials` are those of parameters (p,) by label. The surplus is (p, E, 3). `SolveError` if the state is
+        unstable.
         """
         assert self._system is not None and self._last is not None
-        prolongation, model, u = self._last
+        finer, model, u = self._last
         solver = SensitivitySolver(self._system, _DERIVATIVES)
         sensitivities = solver.solve(u, lambda at: model.with_materials(materials(at)), theta)
-        each = (restricted(prolongation, *one) for one in zip(sensitivities.u, sensitivities.reactions, strict=True))
-        du, dR = map(np.array, zip(*each, strict=True))
-        return du, dR
+        each = zip(sensitivities.u, sensitivities.reactions, strict=True)
+        du, dR = map(np.array, zip(*(restricted(finer.prolongation, *one) for one in each), strict=True))
+        return du, dR, surplus_of(finer.edges, np.asarray(sensitivities.u))
 
     def _system_of(self, model: Model) -> System:
         """The system of the last state with other parameters, or a new one if more than parameters changed."""
@@ -259,11 +274,13 @@ def discretisation_error(
             "then the estimate holds for this mesh only"
         ) from None
     u, reactions = (np.concatenate([getattr(error, name) for error in errors]) for name in ("u", "reactions"))
-    du, dR = (np.concatenate(parts, axis=1) for parts in zip(*by_theta, strict=True))
+    du, dR = (np.concatenate([each[k] for each in by_theta], axis=1) for k in (0, 1))
+    dsurplus = np.stack([each[2] for each in by_theta], axis=1)
+    surplus = replace(errors[0].surplus, values=np.stack([error.surplus.values for error in errors]))
     there = state.u + u
     part = float(np.vdot(u, there)) / max(float(np.vdot(there, there)), 1e-300)
     points = forward.case.remaining[0].points
     away = points - points.mean(axis=0)
     positions = np.tile(away / root_mean_square(away), (count, 1))
-    change = Difference(u, reactions, theta)
-    return DiscretisationError(change, du - derivatives[0], dR - derivatives[1], positions, part)
+    change = Difference(u, reactions, surplus, theta)
+    return DiscretisationError(change, du - derivatives[0], dR - derivatives[1], dsurplus, positions, part)

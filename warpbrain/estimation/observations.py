@@ -16,13 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.cases.boundary import Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.checking import too_few_for_noise
 from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
+from warpbrain.estimation.surplus import RowsOnEdges, Surplus
 from warpbrain.estimation.within_element import change_over_element, turn_over_element
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.noise import noise_covariance, noise_factor
@@ -113,6 +114,26 @@ class Sensors:
     def answer(self, du: Floats, dR: Floats) -> Floats:
         """Change (n,) of what is computed by changes of displacement and reactions (N, 3) at its time alone."""
         return np.asarray(self.by_displacement @ du.ravel() + self.by_reactions @ dR.ravel())
+
+    def answer_within(self, surplus: Surplus) -> Floats:
+        """Change (n,) of what is computed by displacement within elements at its time alone."""
+        return self._on_edges(surplus.edges).answers(surplus.values[None])[:, 0]
+
+    def answers_within_in_time(self, edges: Int32s, surplus: Floats) -> Floats:
+        """The same (n, p) of the surplus (p, s, E, 3) of s states, one after the other, from which rows are counted."""
+        on_edges, total = self._on_edges(edges), np.zeros((len(self), len(surplus)))
+        for number in range(surplus.shape[1]):
+            share = (self.after == number) * 1.0 - (self.before == number)
+            if share.any():
+                total += share[:, None] * on_edges.answers(surplus[:, number])
+        return total
+
+    def moved(self, change: Floats) -> Sensors:
+        """The same rows where the state is others by a change (n,) of what is computed."""
+        return replace(self, residual=self.residual - change, computed=self.computed + change)
+
+    def _on_edges(self, edges: Int32s) -> RowsOnEdges:
+        return RowsOnEdges.of(self.by_displacement, edges)
 
     def answers_in_time(self, du: Floats, dR: Floats) -> Floats:
         """The same (n, p) of changes (p, s N, 3) of s states, one after the other, from which rows are counted, too."""

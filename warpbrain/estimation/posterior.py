@@ -99,7 +99,8 @@ def predictions(
     centre, motion = problem.observations.centre, problem.nuisances.motion(point.nuisances)
     rest = np.zeros_like(point.state.u)
     seen = problem.nuisances.observed(point.state, point.nuisances)
-    before, after = observations.at(rest, rest, centre), observations.at(*seen, centre, motion)
+    before = observations.at(rest, rest, centre)
+    after = problem.nuisances.within_elements(observations.at(*seen, centre, motion), estimate.theta)
     moments = problem.forward.moments
     run = compared(case, point.state.u, point.state.reactions, moments)
     fitted = compared(realigned(case, motion, centre), *seen, moments)

@@ -69,6 +69,13 @@ class Nuisances:
         u, reactions = self.error.at(state.theta, values[: len(DISCRETISATION_NAMES)])
         return state.u + u, state.reactions + reactions
 
+    def within_elements(self, rows: Sensors, theta: Floats) -> Sensors:
+        """Rows beside the displacement within elements, where it is known."""
+        if self.error is None:
+            return rows
+        surplus = self.error.surplus_at(theta)[None]
+        return rows.moved(rows.answers_within_in_time(self.error.change.surplus.edges, surplus)[:, 0])
+
     def motion(self, values: Floats) -> Floats:
         """Rigid motion (6,) of what was recorded."""
         return np.zeros(6) if self.registration is None else values[-6:]
@@ -84,10 +91,11 @@ class Nuisances:
 
     def tissue_columns(self, rows: Sensors, values: Floats, du: Floats, dR: Floats) -> Floats:
         """What parameters change of what is recorded (n, p), by the derivatives (p, n, 3) of the state."""
-        if self.error is not None:
-            more_du, more_dR = self.error.by_theta(values[: len(DISCRETISATION_NAMES)])
-            du, dR = du + more_du, dR + more_dR
-        return rows.answers_in_time(du, dR)
+        if self.error is None:
+            return rows.answers_in_time(du, dR)
+        more_du, more_dR = self.error.by_theta(values[: len(DISCRETISATION_NAMES)])
+        within = rows.answers_within_in_time(self.error.change.surplus.edges, self.error.dsurplus)
+        return rows.answers_in_time(du + more_du, dR + more_dR) + within
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +141,8 @@ class Problem:
 
     def seen(self, state: State, nuisances: Floats) -> Sensors:
         """What was recorded beside a state, values of nuisances (q,) taken off."""
-        return self.observations.at(*self.nuisances.observed(state, nuisances), motion=self.nuisances.motion(nuisances))
+        observed, motion = self.nuisances.observed(state, nuisances), self.nuisances.motion(nuisances)
+        return self.nuisances.within_elements(self.observations.at(*observed, motion=motion), state.theta)
 
     def at(self, state: State, nuisances: Floats, noise: Noise, model: GaussianModel | None = None) -> Point:
         """The objective at a state, nuisances linear about some values (q,) of them; or with the columns of a model."""

@@ -61,6 +61,8 @@ class FinerCase:
         self._coarse, _ = case.remaining
         mesh, ends = finer_mesh(self._coarse)
         self.prolongation = prolongation(ends, len(self._coarse.points))
+        #: (E, 2), ends of the edges in the middle of which the further nodes are.
+        self.edges = ends[len(self._coarse.points) :]
         mechanisms = tuple(m for m in case.mechanisms if not isinstance(m, Removing))
         boundaries = tuple(b for b in case.boundaries if not isinstance(b, Forced))
         self.case = replace(case, mesh=mesh, mechanisms=mechanisms, boundaries=boundaries)

@@ -65,13 +65,13 @@ class MeshErrors:
 
 def expected(known: Difference) -> Difference:
     """The whole error of a mesh, of which elements of half the size show a part."""
-    return known.times(Discretisation().mean)
+    return known.extrapolated(Discretisation().mean)
 
 
 def expected_answer(sensors: Sensors, known: Difference) -> Floats:
     """Response (n,) of the sensors to the whole error."""
     change = expected(known)
-    return sensors.share * sensors.answer(change.u, change.reactions)
+    return sensors.share * (sensors.answer(change.u, change.reactions) + sensors.answer_within(change.surplus))
 
 
 class FinerStates:

@@ -345,9 +345,10 @@ class States:
             pairs = zip(reactions, of_reactions, strict=True)
             reactions = [each + share * expected.reactions for each, share in pairs]
         sensors = self.observations.at(np.concatenate(u), np.concatenate(reactions), self.centre)
-        if len({id(instant.system) for instant in instants}) == 1 and sensors.is_counted_from_rest:
-            return sensors
-        return replace(sensors, share=shares[sensors.after] - np.where(sensors.before < 0, 0.0, shares[sensors.before]))
+        share = shares[sensors.after] - np.where(sensors.before < 0, 0.0, shares[sensors.before])
+        if len({id(instant.system) for instant in instants}) > 1 or not sensors.is_counted_from_rest:
+            sensors = replace(sensors, share=share)
+        return sensors if expected is None else sensors.moved(share * sensors.answer_within(expected.surplus))
 
     def _factors_of(self, system: System) -> KeptFactors:
         """Kept while the same mechanisms act: a fit has many states of those, one after the other."""
