@@ -37,6 +37,7 @@ def test_a_field_of_second_order_is_whole_within_elements() -> None:
     expected = quadratic(places).ravel()
     assert np.abs(linear - expected).max() > 0.01
     np.testing.assert_allclose(linear + sensors.answer_within(surplus), expected, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(surplus.with_middles(at_nodes[:count]), at_nodes, rtol=0.0, atol=1e-14)
     halved = surplus.plus(surplus.times(-0.5))
     np.testing.assert_allclose(2.0 * sensors.answer_within(halved), sensors.answer_within(surplus), atol=1e-14)
 

@@ -147,10 +147,10 @@ class DiscretisationError:
         M = self._matrices(values)
         return np.einsum("nij,pnj->pni", M, self.du), np.einsum("nij,pnj->pni", M, self.dR)
 
-    def surplus_at(self, theta: Floats) -> Floats:
-        """Surplus (s, E, 3) with other parameters (p,)."""
-        step = theta - self.change.theta
-        return self.change.surplus.values + np.tensordot(step, self.dsurplus, axes=1)
+    def surplus_at(self, theta: Floats) -> Surplus:
+        """Surplus, of values (s, E, 3), with other parameters (p,)."""
+        at, change = self.change.surplus, np.tensordot(theta - self.change.theta, self.dsurplus, axes=1)
+        return replace(at, values=at.values + change)
 
     def by_values(self, theta: Floats, values: Floats) -> tuple[Floats, Floats]:
         """Derivatives (37, s n, 3) of that by `values`."""

@@ -19,7 +19,9 @@ from warpbrain.estimation.options import EstimationOptions
 from warpbrain.estimation.parameters import Parameter, Parameters
 from warpbrain.estimation.registration import realigned
 from warpbrain.estimation.sampling import Chain, Importance
+from warpbrain.estimation.surplus import Surplus
 from warpbrain.gp.prior import Prior
+from warpbrain.mesh.refinement import finer_mesh
 from warpbrain.physics.words import enumerated
 from warpbrain.recordings.comparison import Comparison, by_unit
 from warpbrain.shown import Shown
@@ -103,7 +105,8 @@ def predictions(
     after = problem.nuisances.within_elements(observations.at(*seen, centre, motion), estimate.theta)
     moments = problem.forward.moments
     run = compared(case, point.state.u, point.state.reactions, moments)
-    fitted = compared(realigned(case, motion, centre), *seen, moments)
+    surplus = problem.nuisances.surplus_at(estimate.theta)
+    fitted = compared(realigned(case, motion, centre), *seen, moments, surplus)
     columns = problem.columns(after, estimate.theta, point.nuisances, derivatives)
     deviations = np.sqrt(np.einsum("np,pq,nq->n", columns, joint, columns))
     results = []
@@ -143,11 +146,19 @@ def _noise_of_unfitted(rows: Sensors, fitted: Noise, columns: Floats) -> Noise:
     return noise if undeclared.any() else noise.with_gross_errors(rows.residual, columns)
 
 
-def compared(case: Case, u: Floats, reactions: Floats, moments: Moments) -> Mapping[str, Comparison]:
-    """Recordings by name beside displacement and reactions (s N, 3) at moments, as `warpbrain run` compares them."""
-    count = len(moments.cases)
-    pairs = zip(np.split(u, count), np.split(reactions, count), strict=True)
-    states = [NodalState(case.remaining[0], *state) for state in pairs]
+def compared(
+    case: Case, u: Floats, reactions: Floats, moments: Moments, within: Surplus | None = None
+) -> Mapping[str, Comparison]:
+    """Recordings by name beside displacement and reactions (s N, 3) at moments, as `warpbrain run` compares them.
+
+    `within`: displacement within elements, of values (s, E, 3), where it is known.
+    """
+    count, mesh = len(moments.cases), case.remaining[0]
+    fields = np.stack(np.split(u, count)), np.stack(np.split(reactions, count))
+    if within is not None:
+        mesh, nothing = finer_mesh(mesh)[0], np.zeros_like(within.values)
+        fields = within.with_middles(fields[0]), np.concatenate([fields[1], nothing], axis=1)
+    states = [NodalState(mesh, *state) for state in zip(*fields, strict=True)]
     others = {time: states[number] for time, number in zip(moments.times, moments.numbers, strict=True)}
     return {comparison.name: comparison for comparison in observe(case, states[-1], others=others).comparisons}
 

@@ -24,6 +24,7 @@ from warpbrain.estimation.likelihood import Likelihood, Noise
 from warpbrain.estimation.observations import Observations, Sensors
 from warpbrain.estimation.parameters import Gaussian, Parameters, PriorMode
 from warpbrain.estimation.registration import NAMES as REGISTRATION_NAMES
+from warpbrain.estimation.surplus import Surplus
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.recordings.base import Registration
 
@@ -71,10 +72,14 @@ class Nuisances:
 
     def within_elements(self, rows: Sensors, theta: Floats) -> Sensors:
         """Rows beside the displacement within elements, where it is known."""
-        if self.error is None:
+        surplus = self.surplus_at(theta)
+        if surplus is None:
             return rows
-        surplus = self.error.surplus_at(theta)[None]
-        return rows.moved(rows.answers_within_in_time(self.error.change.surplus.edges, surplus)[:, 0])
+        return rows.moved(rows.answers_within_in_time(surplus.edges, surplus.values[None])[:, 0])
+
+    def surplus_at(self, theta: Floats) -> Surplus | None:
+        """Displacement within elements at parameters (p,), of values (s, E, 3); None where it is not known."""
+        return None if self.error is None else self.error.surplus_at(theta)
 
     def motion(self, values: Floats) -> Floats:
         """Rigid motion (6,) of what was recorded."""

@@ -29,12 +29,17 @@ class Surplus:
     """The surplus of a state."""
 
     edges: Int32s  # (E, 2), nodes at the ends of each edge of the mesh, ascending; edges in lexicographic order
-    values: Floats  # (E, 3), displacement of its middle less the mean of that of its ends [m]
+    values: Floats  # (..., E, 3), displacement of its middle less the mean of that of its ends [m]
 
     @classmethod
     def of(cls, edges: Int32s, u: Floats) -> Surplus:
         """That of a displacement [m] of the nodes and then of the middles of edges: (N + E, 3)."""
         return cls(edges, surplus_of(edges, u))
+
+    def with_middles(self, u: Floats) -> Floats:
+        """Displacement (..., N + E, 3) of nodes and of middles of edges, by that of nodes (..., N, 3) [m]."""
+        middles = 0.5 * (u[..., self.edges[:, 0], :] + u[..., self.edges[:, 1], :]) + self.values
+        return np.concatenate([u, middles], axis=-2)
 
     def plus(self, other: Surplus) -> Surplus:
         return replace(self, values=self.values + other.values)
