@@ -12,6 +12,7 @@ from synthetic import GREY, WHITE, beads, block, truth
 
 from warpbrain.cases.writing import write_case
 from warpbrain.estimation.options import EstimationOptions
+from warpbrain.mesh.refinement import refined
 from warpbrain.report.files import SEEN, UNSEEN, read_state
 
 QUICK = ("--samples", "25", "--no-causes")
@@ -19,9 +20,9 @@ QUICK = ("--samples", "25", "--no-causes")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A pushed block of two tissues with points to fit and points to check."""
+    """A pushed block of two tissues with points to fit and points to check, of smaller elements than the case has."""
     case = block({"grey": GREY, "white": WHITE}, "pushed")
-    result = truth(case)
+    result = truth(replace(case, mesh=refined(case.mesh)[0]))
     fit = replace(beads(result, count=60, noise=1e-4), file="recordings/beads.csv")
     check = replace(beads(result, seed=1, noise=1e-4), name="check", role="check", file="recordings/check.csv")
     path = tmp_path_factory.mktemp("cases") / "block"

@@ -29,7 +29,9 @@ def quadratic(x: np.ndarray) -> np.ndarray:
 
 def test_a_field_of_second_order_is_whole_within_elements() -> None:
     finer, ends = finer_mesh(MESH)
-    count, places = len(MESH.points), RANDOM.uniform(0.02, 0.98, size=(60, 3))
+    count, random = len(MESH.points), np.random.default_rng(0)
+    corners = MESH.points[random.choice(MESH.tetrahedra, 60)]
+    places = np.einsum("nc,nci->ni", random.dirichlet(np.ones(4), 60), corners)
     at_nodes, edges = quadratic(finer.points), ends[len(MESH.points) :]
     sensors = tracked_points(MESH, places, np.zeros(3))
     surplus = Surplus.of(edges, at_nodes)
