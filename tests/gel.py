@@ -35,8 +35,14 @@ def block_of_gel(cells: tuple[int, int, int], sides: tuple[float, float, float],
     )
 
 
-def with_beads(case: Case, u: np.ndarray, at: np.ndarray, noise: float, rng: np.random.Generator) -> Case:
-    """A case that records a displacement of its nodes (N, 3) [m] at points (n, 3) [m], with noise [m] of each axis."""
-    moved = locate(case.mesh.points, case.mesh.tetrahedra, at).interpolate(u) + noise * rng.normal(size=at.shape)
+def with_beads(
+    case: Case, u: np.ndarray, at: np.ndarray, noise: float, rng: np.random.Generator, mesh: TetMesh | None = None
+) -> Case:
+    """A case that records a displacement of nodes (N, 3) [m] at points (n, 3) [m], with noise [m] of each axis.
+
+    `mesh`: of these nodes; the case's own unless given.
+    """
+    mesh = case.mesh if mesh is None else mesh
+    moved = locate(mesh.points, mesh.tetrahedra, at).interpolate(u) + noise * rng.normal(size=at.shape)
     beads = PointsRecording(name="beads", file="beads.csv", role="fit", points=at, displacement=moved, sigma=noise)
     return replace(case, recordings=(beads,))
