@@ -1,6 +1,7 @@
 """Meshes that tests make: a tetrahedron, cubes, bodies swept from a triangulation, and closed surfaces."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -116,6 +117,17 @@ def swept(
     n = len(xy)
     prism = np.concatenate([np.stack(t, 1) for t in ((a, b, c, c + n), (a, b, b + n, c + n), (a, a + n, b + n, c + n))])
     return oriented(points, np.concatenate([prism + n * k for k in range(layers)]), tissue)
+
+
+def octant(n: int, layers: int, radius: Callable[[Floats], Floats]) -> TetMesh:
+    """An octant of a thick sphere; `radius` (k,) of layers at s (k,) in [0, 1]. Planes of symmetry are at exactly 0."""
+
+    def place(xy: Floats, s: Floats) -> Floats:
+        direction = np.stack([xy[:, 0], xy[:, 1], 1.0 - xy.sum(axis=1)], axis=1)
+        return radius(s)[:, None] * direction / np.linalg.norm(direction, axis=1)[:, None]
+
+    mesh = swept(triangle(n), layers, place)
+    return replace(mesh, points=np.where(np.abs(mesh.points) < 1e-12, 0.0, mesh.points))
 
 
 def room(size: float) -> ClosedSurface:

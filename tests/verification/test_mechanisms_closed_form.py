@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from bodies import model_of
 from scipy.integrate import quad
-from shapes import cube, quarter, swept, triangle
+from shapes import cube, octant, quarter, swept
 from verification_rows import Row
 
 from warpbrain.errors import SolveError
@@ -47,15 +47,11 @@ def incompressible(value: Callable[[float], float]) -> float:
 def wall(shape: str, n: int) -> TetMesh:
     """An octant of a sphere, a quarter of a slice of a cylinder; radii 1 and 2."""
 
-    def on_sphere(xy: np.ndarray, s: np.ndarray) -> np.ndarray:
-        direction = np.stack([xy[:, 0], xy[:, 1], 1.0 - xy.sum(axis=1)], axis=1)
-        return 2.0 ** s[:, None] * direction / np.linalg.norm(direction, axis=1)[:, None]
-
     def on_cylinder(xy: np.ndarray, s: np.ndarray) -> np.ndarray:
         radius, angle = 2.0 ** xy[:, 1], 0.5 * np.pi * xy[:, 0]
         return np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.1 * s], axis=1)
 
-    mesh = swept(triangle(n), n, on_sphere) if shape == "sphere" else swept(quarter(n), 1, on_cylinder)
+    mesh = octant(n, n, lambda s: 2.0**s) if shape == "sphere" else swept(quarter(n), 1, on_cylinder)
     points = np.where(np.abs(mesh.points) < 1e-12, 0.0, mesh.points)
     radius = np.linalg.norm(points[:, : 3 if shape == "sphere" else 2], axis=1)
     sets = {"inner": radius < 1.0 + 1e-9, "outer": radius > 2.0 - 1e-9}

@@ -11,7 +11,7 @@ from dataclasses import replace
 import felupe
 import numpy as np
 from bodies import model_of
-from shapes import cube, distorted, swept, triangle
+from shapes import cube, distorted, octant
 from verification_rows import Row
 
 from warpbrain.mesh import TetMesh, boundary_faces
@@ -168,15 +168,10 @@ def test_viscoelasticity(verify: Row) -> None:
 
 def test_live_pressure(verify: Row) -> None:
     """An octant of a thick sphere, inflated from radius 1 to 1.06: FElupe's `SolidBodyPressure` on the inner faces."""
-
-    def place(xy: np.ndarray, s: np.ndarray) -> np.ndarray:
-        direction = np.stack([xy[:, 0], xy[:, 1], 1.0 - xy.sum(axis=1)], axis=1)
-        return (1.0 + s)[:, None] * direction / np.linalg.norm(direction, axis=1)[:, None]
-
-    plain = swept(triangle(3), 3, place)
-    points = np.where(np.abs(plain.points) < 1e-12, 0.0, plain.points)
+    mesh = octant(3, 3, lambda s: 1.0 + s)
+    points = mesh.points
     inner = np.linalg.norm(points, axis=1) < 1.0 + 1e-9
-    mesh = replace(plain, points=points, node_sets={"inner": inner})
+    mesh = replace(mesh, node_sets={"inner": inner})
     model = model_of(mesh, MATERIAL, constrained=points == 0.0, mechanisms=[Pressure(nodes="inner", value=200.0)])
     # FElupe has no boundary of tetrahedra: the element behind each face, with one point of integration on the face
     faces = boundary_faces(mesh.tetrahedra)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from bodies import model_of
 from manufactured_problem import uncoupled_mooney_rivlin, uncoupled_neo_hookean
-from shapes import box, disc, oriented, quarter, swept, triangle
+from shapes import box, disc, octant, oriented, quarter, swept
 from twisted_cylinder import TwistedCylinder
 from verification_rows import Row
 
@@ -49,12 +49,7 @@ def incompressible(value: Callable[[float], np.ndarray]) -> np.ndarray:
 
 def sphere(n: int) -> TetMesh:
     """An octant of a thick sphere."""
-
-    def place(xy: np.ndarray, s: np.ndarray) -> np.ndarray:
-        direction = np.stack([xy[:, 0], xy[:, 1], 1.0 - xy.sum(axis=1)], axis=1)
-        return 2.0 ** s[:, None] * direction / np.linalg.norm(direction, axis=1)[:, None]
-
-    return swept(triangle(n), n, place)
+    return octant(n, n, lambda s: 2.0**s)
 
 
 def cylinder(n: int) -> TetMesh:

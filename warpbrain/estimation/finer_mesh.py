@@ -16,8 +16,8 @@ and Richardson's extrapolation, `a = b`, where `k` is small. `b` is 4/3 for p = 
 p = 1, as at the edges of what is held and where elements lock: `b ~ N(5/3, 0.4^2)` holds both. What is missing is not
 quite of the shape of d, nor of one amount everywhere: `B` is a matrix field, affine in the position, whose coefficients
 (of the unit matrices, and of positions in units of the body's root mean square radius) are independent, `N(0, 0.2^2)`.
-All are estimated along with the tissue and integrated out. `s` is what displacement within elements is beyond what
-they say (`warpbrain.estimation.surplus`).
+All are estimated along with the tissue and integrated out. `s` is the displacement
+within elements that is not linear between their nodes (`warpbrain.estimation.surplus`).
 
 `d` depends on the tissue as the displacement itself does. It is taken to first order in the tissue about the estimate:
 held fixed, it would make the displacement change too little with a modulus, by the share that d is of it.
@@ -39,7 +39,7 @@ from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.forward import Forward, State
-from warpbrain.estimation.surplus import Surplus, surplus_of
+from warpbrain.estimation.surplus import Surplus
 from warpbrain.inference.beliefs import belief
 from warpbrain.recordings.comparison import root_mean_square
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
@@ -95,7 +95,7 @@ class Difference:
 
     u: Floats  # (n, 3), at the nodes of the mesh [m]
     reactions: Floats  # (n, 3) [N]
-    surplus: Surplus  # within the elements of the mesh, which has none
+    surplus: Surplus  # of the state on elements of half the size; linear elements have none
     theta: Floats  # (p,), where it was computed
 
     @property
@@ -114,7 +114,7 @@ class Difference:
         return Difference(factor * self.u, factor * self.reactions, self.surplus.times(factor), self.theta)
 
     def extrapolated(self, amount: float) -> Difference:
-        """The whole error, of which this is a part, `amount` times as large; the surplus is nearly all there is."""
+        """The whole error: `amount` times this at the nodes, and the surplus as it is (`estimation.surplus`)."""
         return replace(self.times(amount), surplus=self.surplus)
 
 
@@ -125,7 +125,7 @@ class DiscretisationError:
     change: Difference  # `d`: what elements of half the size change
     du: Floats  # (p, s n, 3), its derivatives by `theta`
     dR: Floats
-    dsurplus: Floats  # (p, s, E, 3), of its surplus (s, E, 3)
+    dsurplus: Floats  # (p, s, E, 3), derivatives by `theta` of its surplus (s, E, 3)
     positions: Floats  # (s n, 3), of nodes, from the mean of all in units of their root mean square radius
     part: float  # `k`: the part of the displacement on elements of half the size that is `d`, its projection
 
@@ -228,10 +228,10 @@ class FinerMesh:
     def derivatives(
         self, theta: Floats, materials: Callable[[Floats], Mapping[int, Material]]
     ) -> tuple[Floats, Floats, Floats]:
-        """Derivatives of the last state there: displacement and reactions (p, n, 3) at the nodes of the mesh, surplus.
+        """Derivatives of the last state there by parameters (p,).
 
-        `materials` are those of parameters (p,) by label. The surplus is (p, E, 3). `SolveError` if the state is
-        unstable.
+        `materials` are those of parameters by label. Returns displacement and reactions (p, n, 3) at the nodes of the
+        mesh, and surplus (p, E, 3). `SolveError` if the state is unstable.
         """
         assert self._system is not None and self._last is not None
         finer, model, u = self._last
@@ -239,7 +239,7 @@ class FinerMesh:
         sensitivities = solver.solve(u, lambda at: model.with_materials(materials(at)), theta)
         each = zip(sensitivities.u, sensitivities.reactions, strict=True)
         du, dR = map(np.array, zip(*(restricted(finer.prolongation, *one) for one in each), strict=True))
-        return du, dR, surplus_of(finer.edges, np.asarray(sensitivities.u))
+        return du, dR, Surplus.of(finer.edges, np.asarray(sensitivities.u)).values
 
     def _system_of(self, model: Model) -> System:
         """The system of the last state with other parameters, or a new one if more than parameters changed."""

@@ -23,7 +23,7 @@ from warpbrain.cases.checking import too_few_for_noise
 from warpbrain.cases.moments import Moments
 from warpbrain.errors import InputError
 from warpbrain.estimation.registration import moved_back, moved_back_columns
-from warpbrain.estimation.surplus import RowsOnEdges, Surplus
+from warpbrain.estimation.surplus import Surplus, rows_by_surplus
 from warpbrain.estimation.within_element import change_over_element, turn_over_element
 from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.noise import noise_covariance, noise_factor
@@ -116,35 +116,36 @@ class Sensors:
         return np.asarray(self.by_displacement @ du.ravel() + self.by_reactions @ dR.ravel())
 
     def answer_within(self, surplus: Surplus) -> Floats:
-        """Change (n,) of what is computed by displacement within elements at its time alone."""
-        return self._on_edges(surplus.edges).answers(surplus.values[None])[:, 0]
+        """Response (n,) [m] to the displacement within elements (E, 3) at its time alone; zero of forces."""
+        return np.asarray(rows_by_surplus(self.by_displacement, surplus.edges) @ surplus.values.ravel())
 
     def answers_within_in_time(self, edges: Int32s, surplus: Floats) -> Floats:
-        """The same (n, p) of the surplus (p, s, E, 3) of s states, one after the other, from which rows are counted."""
-        on_edges, total = self._on_edges(edges), np.zeros((len(self), len(surplus)))
-        for number in range(surplus.shape[1]):
-            share = (self.after == number) * 1.0 - (self.before == number)
-            if share.any():
-                total += share[:, None] * on_edges.answers(surplus[:, number])
-        return total
+        """The same (n, p) of the surplus (p, s, E, 3) [m] of s states, from which rows are counted, too."""
+        matrix = rows_by_surplus(self.by_displacement, edges)
+        flat = surplus.reshape(*surplus.shape[:2], -1)
+        return self._in_time(len(flat), flat.shape[1], lambda number: np.asarray(matrix @ flat[:, number].T))
 
-    def moved(self, change: Floats) -> Sensors:
-        """The same rows where the state is others by a change (n,) of what is computed."""
+    def with_change(self, change: Floats) -> Sensors:
+        """The same rows with a change (n,) of what was computed [m] or [N], which is taken off the residuals."""
         return replace(self, residual=self.residual - change, computed=self.computed + change)
-
-    def _on_edges(self, edges: Int32s) -> RowsOnEdges:
-        return RowsOnEdges.of(self.by_displacement, edges)
 
     def answers_in_time(self, du: Floats, dR: Floats) -> Floats:
         """The same (n, p) of changes (p, s N, 3) of s states, one after the other, from which rows are counted, too."""
         count, size = len(du), self.by_displacement.shape[1]
         u, R = du.reshape(count, -1, size), dR.reshape(count, -1, size)
+
+        def response(number: int) -> Floats:
+            return np.asarray(self.by_displacement @ u[:, number].T + self.by_reactions @ R[:, number].T)
+
+        return self._in_time(count, u.shape[1], response)
+
+    def _in_time(self, count: int, states: int, response: Callable[[int], Floats]) -> Floats:
+        """Responses (n, p) to p changes, by those (n, p) to the changes of each state alone, by its number."""
         total = np.zeros((self.by_displacement.shape[0], count))
-        for number in range(u.shape[1]):
+        for number in range(states):
             share = (self.after == number) * 1.0 - (self.before == number)
             if share.any():
-                change = np.asarray(self.by_displacement @ u[:, number].T + self.by_reactions @ R[:, number].T)
-                total += share[:, None] * change
+                total += share[:, None] * response(number)
         return total
 
 

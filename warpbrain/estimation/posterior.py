@@ -102,7 +102,7 @@ def predictions(
     rest = np.zeros_like(point.state.u)
     seen = problem.nuisances.observed(point.state, point.nuisances)
     before = observations.at(rest, rest, centre)
-    after = problem.nuisances.within_elements(observations.at(*seen, centre, motion), estimate.theta)
+    after = problem.seen(point.state, point.nuisances, observations)
     moments = problem.forward.moments
     run = compared(case, point.state.u, point.state.reactions, moments)
     surplus = problem.nuisances.surplus_at(estimate.theta)
@@ -154,7 +154,7 @@ def compared(
     `within`: displacement within elements, of values (s, E, 3), where it is known.
     """
     count, mesh = len(moments.cases), case.remaining[0]
-    fields = np.stack(np.split(u, count)), np.stack(np.split(reactions, count))
+    fields = u.reshape(count, -1, 3), reactions.reshape(count, -1, 3)
     if within is not None:
         mesh, nothing = finer_mesh(mesh)[0], np.zeros_like(within.values)
         fields = within.with_middles(fields[0]), np.concatenate([fields[1], nothing], axis=1)

@@ -70,13 +70,6 @@ class Nuisances:
         u, reactions = self.error.at(state.theta, values[: len(DISCRETISATION_NAMES)])
         return state.u + u, state.reactions + reactions
 
-    def within_elements(self, rows: Sensors, theta: Floats) -> Sensors:
-        """Rows beside the displacement within elements, where it is known."""
-        surplus = self.surplus_at(theta)
-        if surplus is None:
-            return rows
-        return rows.moved(rows.answers_within_in_time(surplus.edges, surplus.values[None])[:, 0])
-
     def surplus_at(self, theta: Floats) -> Surplus | None:
         """Displacement within elements at parameters (p,), of values (s, E, 3); None where it is not known."""
         return None if self.error is None else self.error.surplus_at(theta)
@@ -144,10 +137,13 @@ class Problem:
     def parameters(self) -> Parameters:
         return self.forward.parameters
 
-    def seen(self, state: State, nuisances: Floats) -> Sensors:
-        """What was recorded beside a state, values of nuisances (q,) taken off."""
+    def seen(self, state: State, nuisances: Floats, observations: Observations | None = None) -> Sensors:
+        """What was recorded beside a state, values of nuisances (q,) taken off; of other observations if given."""
         observed, motion = self.nuisances.observed(state, nuisances), self.nuisances.motion(nuisances)
-        return self.nuisances.within_elements(self.observations.at(*observed, motion=motion), state.theta)
+        rows = (observations or self.observations).at(*observed, self.observations.centre, motion)
+        if (surplus := self.nuisances.surplus_at(state.theta)) is None:
+            return rows
+        return rows.with_change(rows.answers_within_in_time(surplus.edges, surplus.values[None])[:, 0])
 
     def at(self, state: State, nuisances: Floats, noise: Noise, model: GaussianModel | None = None) -> Point:
         """The objective at a state, nuisances linear about some values (q,) of them; or with the columns of a model."""

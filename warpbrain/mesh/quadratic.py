@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpbrain.arrays import Bools, Floats, Int32s, Ints
-from warpbrain.mesh.refinement import finer_mesh, inherited
+from warpbrain.mesh.refinement import edge_numbers, finer_mesh, inherited
 from warpbrain.mesh.surface import EDGES, nodes_of
 from warpbrain.mesh.tet_mesh import TetMesh
 
@@ -49,9 +49,7 @@ class QuadraticMesh:
     def middles(self, edges: NDArray[np.integer]) -> Ints:
         """Node in the middle of each edge (..., 2), its ends ascending."""
         count = len(self.corners.points)
-        factors = np.array([count, 1])
-        numbers = np.searchsorted(self.ends[count:].astype(np.int64) @ factors, edges.astype(np.int64) @ factors)
-        return np.asarray(count + numbers, dtype=np.int64)
+        return count + edge_numbers(self.ends[count:], edges, count)
 
     @property
     def points(self) -> Floats:

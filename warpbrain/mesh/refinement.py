@@ -7,6 +7,7 @@ from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.mesh.surface import EDGES, in_rows, nodes_of
@@ -42,6 +43,12 @@ def refined(mesh: TetMesh) -> tuple[TetMesh, Int32s]:
     finer = TetMesh(points, children, tissue, {}, element_sets, element_vectors)
     finer = replace(finer, cut=_finer_cut(mesh.cut, ends, finer)) if len(mesh.cut) else finer
     return finer.with_node_sets(inherited_sets(mesh.node_sets, ends, finer)), ends
+
+
+def edge_numbers(edges: Int32s, wanted: NDArray[np.integer], count: int) -> Ints:
+    """Numbers (...,) of edges (..., 2), their ends ascending, among all edges (E, 2) of a mesh of `count` nodes."""
+    factors = np.array([count, 1])
+    return np.searchsorted(edges.astype(np.int64) @ factors, wanted.astype(np.int64) @ factors).astype(np.int64)
 
 
 #: Finer meshes by those they are of.

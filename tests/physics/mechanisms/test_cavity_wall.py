@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bodies import energy_at, forces_at, model_of
-from shapes import cube, distorted, swept, triangle
+from shapes import cube, distorted, octant
 
 from warpbrain.cases.assuming import assume
 from warpbrain.cases.shipped import find_case
@@ -121,18 +121,12 @@ def _along_rim(faces: np.ndarray) -> list[tuple[int, int]]:
     return [(a, b) for a, b in sides if (min(a, b), max(a, b)) in rim]
 
 
-def octant(n: int) -> TetMesh:
+def around_a_shell(n: int) -> TetMesh:
     """An octant of a thick sphere, radii 1 and 2, around a shell down to 1 / sqrt 2 that is an element set."""
-
-    def place(xy: np.ndarray, s: np.ndarray) -> np.ndarray:
-        direction = np.stack([xy[:, 0], xy[:, 1], 1.0 - xy.sum(axis=1)], axis=1)
-        return 2.0 ** (1.5 * s[:, None] - 0.5) * direction / np.linalg.norm(direction, axis=1)[:, None]
-
-    mesh = swept(triangle(n), 3 * n // 2, place)
-    points = np.where(np.abs(mesh.points) < 1e-9, 0.0, mesh.points)
+    mesh = octant(n, 3 * n // 2, lambda s: 2.0 ** (1.5 * s - 0.5))
     # layers are as thick as they are far away, whatever the facets
     layer = np.arange(len(mesh.tetrahedra)) // (3 * n * n)
-    return replace(mesh, points=points, element_sets={"inner": layer < n // 2})
+    return replace(mesh, element_sets={"inner": layer < n // 2})
 
 
 def test_a_cavity_in_a_sphere_is_as_wide_as_its_pressure_makes_it(device, verify):
@@ -145,7 +139,7 @@ def test_a_cavity_in_a_sphere_is_as_wide_as_its_pressure_makes_it(device, verify
     material = Material(NeoHookean(1000.0), 0.45, "uncoupled")
 
     def widened(n: int) -> np.ndarray:
-        mesh = octant(n)
+        mesh = around_a_shell(n)
         acts = [Cavity(elements="inner", pressure=100.0, left=1e-6)]
         model = model_of(mesh, material, constrained=mesh.points == 0.0, mechanisms=acts, elements="tet10")
         u = EquilibriumSolver(System(model, device)).solve().u[: len(mesh.points)]

@@ -348,7 +348,7 @@ class States:
         share = shares[sensors.after] - np.where(sensors.before < 0, 0.0, shares[sensors.before])
         if len({id(instant.system) for instant in instants}) > 1 or not sensors.is_counted_from_rest:
             sensors = replace(sensors, share=share)
-        return sensors if expected is None else sensors.moved(share * sensors.answer_within(expected.surplus))
+        return sensors if expected is None else sensors.with_change(share * sensors.answer_within(expected.surplus))
 
     def _factors_of(self, system: System) -> KeptFactors:
         """Kept while the same mechanisms act: a fit has many states of those, one after the other."""
