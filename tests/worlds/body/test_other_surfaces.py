@@ -1,5 +1,6 @@
 """A traction on the wall of a cavity that is first looked for on the outer surface, from which no fit goes over."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -48,6 +49,26 @@ def test_what_an_unlikely_place_gains_is_no_gain_of_all(search: HypothesisSearch
         gains.append(refined.hypothesis.log_evidence - known)
     assert abs(gains[0]) > 0.1
     assert abs(gains[1]) < 1e-9
+
+
+def test_a_far_place_does_not_stand_for_all_where_the_fit_of_the_best_has_lost(search: HypothesisSearch) -> None:
+    """The sum over all places is the same for each of them: what acts beside a far one would gain all of its loss."""
+    names = ("traction",)
+    best = search.get(names)
+    assert best is not None
+    by_surface = {each.effects[0].surface: each for each in (best, *best.alternatives)}
+    [wall] = [surface for surface in by_surface if "outer" not in surface]
+    [outer] = [surface for surface in by_surface if "outer" in surface]
+    fitted, _ = search._fitted(replace(by_surface[wall], alternatives=()))
+    lost = fitted.with_evidence(by_surface[outer].hypothesis.log_evidence - 3.0)
+    far = replace(by_surface[outer], alternatives=(), log_share=-20.0)
+    kept = copy.copy(search)
+    kept._sets = {**search._sets, fitted.names: replace(lost, log_share=0.0, alternatives=(far,))}
+    kept._move(kept._sets[fitted.names])
+    moved = kept.get(names)
+    assert moved is not None
+    assert moved.moved
+    assert moved.effects[0].surface == wall
 
 
 def test_each_surface_has_a_fit_of_its_own(search: HypothesisSearch) -> None:

@@ -247,7 +247,7 @@ class HypothesisSearch:
         if UNKNOWN in names:
             candidates = [replace(candidate, alternatives=()), *candidate.inheriting_alternatives]
         fits = map(self._fitted, candidates)
-        fitted, gain = max(fits, key=lambda fit: (fit[0].refit is not None, fit[0].hypothesis.log_evidence))
+        fitted, gain = max(fits, key=lambda fit: (fit[0].refit is not None, fit[0].log_evidence_here))
         self._sets[names] = fitted
         if fitted.refit is not None:
             self._pass_on(gain, names)
@@ -300,7 +300,7 @@ class HypothesisSearch:
         moved_fits = (
             moved_about_fit(self.base, self._fitter, fit, self.spacing) for fit in fits if fit.refit is not None
         )
-        moved = max(moved_fits, key=lambda each: each.hypothesis.log_evidence)
+        moved = max(moved_fits, key=lambda each: each.log_evidence_here)
         self._sets[fitted.names] = moved = replace(moved, alternatives=())
         if moved.refit is not fitted.refit:
             self._forget_supersets(fitted.names)

@@ -228,6 +228,15 @@ class WeightedSet:
         return self.hypothesis.of_kind(Kind.PHYSICS)
 
     @property
+    def log_evidence_here(self) -> float:
+        """Its log evidence in the cells of its places alone, by which placements of the same causes are compared.
+
+        The sum over all places is the same for each of them: one far from the best, whose fit has lost nothing, must
+        not stand for all of it, or what acts beside it would seem to gain all that a better place explains.
+        """
+        return self.hypothesis.log_evidence + self.log_share
+
+    @property
     def is_open(self) -> bool:
         """Whether a fit of it, or at neighbouring places, is still to be done."""
         return self.may_move if self.refit is not None else not self.failure
