@@ -14,6 +14,7 @@ from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 from warpbrain.worlds.body.placing import with_refined_places
+from warpbrain.worlds.body.weighing import best_of_placements
 
 #: Edge [m], noise [m], tracked points.
 SIDE, NOISE, POINTS = 0.06, 4e-4, 40
@@ -51,6 +52,22 @@ def test_what_an_unlikely_place_gains_is_no_gain_of_all(search: HypothesisSearch
     assert abs(gains[1]) < 1e-9
 
 
+@pytest.mark.parametrize("share", [0.4, 0.1, 1e-9])
+def test_placements_that_lose_nothing_by_fits_have_the_evidence_that_they_had(share: float, search: HypothesisSearch):
+    best = search.get(("traction",))
+    assert best is not None
+    fitted = search._fitted(replace(best, alternatives=()))
+    known = [replace(fitted, log_share=np.log(part)) for part in (1.0 - share, share)]
+    chosen = best_of_placements(known, known)
+    np.testing.assert_allclose(chosen.hypothesis.log_evidence, fitted.hypothesis.log_evidence, atol=1e-9)
+    np.testing.assert_allclose(chosen.log_share, np.log(1.0 - share), atol=1e-9)
+    # where the likeliest loses nearly all, what is left is the share of the other one
+    lost = [known[0].with_evidence(fitted.hypothesis.log_evidence - 100.0), known[1]]
+    chosen = best_of_placements(lost, known)
+    expected = fitted.hypothesis.log_evidence + np.log(share)
+    np.testing.assert_allclose([chosen.hypothesis.log_evidence, chosen.log_share], [expected, 0.0], atol=1e-6)
+
+
 def test_a_far_place_does_not_stand_for_all_where_the_fit_of_the_best_has_lost(search: HypothesisSearch) -> None:
     """The sum over all places is the same for each of them: what acts beside a far one would gain all of its loss."""
     names = ("traction",)
@@ -59,7 +76,7 @@ def test_a_far_place_does_not_stand_for_all_where_the_fit_of_the_best_has_lost(s
     by_surface = {each.effects[0].surface: each for each in (best, *best.alternatives)}
     [wall] = [surface for surface in by_surface if "outer" not in surface]
     [outer] = [surface for surface in by_surface if "outer" in surface]
-    fitted, _ = search._fitted(replace(by_surface[wall], alternatives=()))
+    fitted = search._fitted(replace(by_surface[wall], alternatives=()))
     lost = fitted.with_evidence(by_surface[outer].hypothesis.log_evidence - 3.0)
     far = replace(by_surface[outer], alternatives=(), log_share=-20.0)
     kept = copy.copy(search)
@@ -69,6 +86,7 @@ def test_a_far_place_does_not_stand_for_all_where_the_fit_of_the_best_has_lost(s
     assert moved is not None
     assert moved.moved
     assert moved.effects[0].surface == wall
+    np.testing.assert_allclose(moved.hypothesis.log_evidence, lost.hypothesis.log_evidence, atol=0.1)
 
 
 def test_each_surface_has_a_fit_of_its_own(search: HypothesisSearch) -> None:

@@ -45,7 +45,7 @@ from warpbrain.worlds.body.parameters import log_overlap
 from warpbrain.worlds.body.placing import with_refined_places
 from warpbrain.worlds.body.states import SolvedState, States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
-from warpbrain.worlds.body.weighing import Weighing, keep_better, search_of
+from warpbrain.worlds.body.weighing import Weighing, best_of_placements, keep_better, search_of
 from warpbrain.worlds.body.weighted_set import Refit, WeightedSet
 
 #: Places of each cause whose columns are made anew about a fit, and of releases for which states are solved.
@@ -246,18 +246,16 @@ class HypothesisSearch:
         candidates = [candidate]
         if UNKNOWN in names:
             candidates = [replace(candidate, alternatives=()), *candidate.inheriting_alternatives]
-        fits = map(self._fitted, candidates)
-        fitted, gain = max(fits, key=lambda fit: (fit[0].refit is not None, fit[0].log_evidence_here))
+        fits = [self._fitted(each) for each in candidates]
+        fitted = best_of_placements(fits, candidates)
         self._sets[names] = fitted
         if fitted.refit is not None:
-            self._pass_on(gain, names)
+            gain = fitted.hypothesis.log_evidence - candidate.hypothesis.log_evidence
+            self._pass_on((candidate.inherited_gain or 0.0) + gain, names)
             self._refit_subsets(names)
 
-    def _fitted(self, candidate: WeightedSet) -> tuple[WeightedSet, float]:
-        """The set at its fit, and the gain in log evidence over the linear model about the base.
-
-        If it cannot be fitted, the set with the reason (`failure`), and zero.
-        """
+    def _fitted(self, candidate: WeightedSet) -> WeightedSet:
+        """The set at its fit; if it cannot be fitted, the set with the reason (`failure`)."""
         subset = self._fitted_subset(candidate)
         if candidate.refit is None:
             source = self.base.effects if subset is None else self._expanded[subset.names]
@@ -272,16 +270,15 @@ class HypothesisSearch:
         try:
             refit = self._fitter.fit(candidate.effects, candidate.columns, starts, screened, nearby, about)
         except CANNOT_BE_FITTED as error:
-            return replace(candidate, failure=str(error)), 0.0
+            return replace(candidate, failure=str(error))
         gain = refit.log_evidence - candidate.marginal.log_evidence
         if not candidate.names:
             # what the fit without any cause gains is of tissue and registration, and is gained by all others; a search
             # that ended too early must not make everything else look better
             gain = max(gain, 0.0)
-        inherited, known = candidate.inherited_gain or 0.0, candidate.hypothesis.log_evidence
+        inherited = candidate.inherited_gain or 0.0
         overlap = self._overlap(candidate, refit, 0 if subset is None else len(subset.effects))
-        fitted = candidate.fitted(refit).with_gain(gain - inherited).with_overlap(overlap)
-        return fitted, inherited + fitted.hypothesis.log_evidence - known
+        return candidate.fitted(refit).with_gain(gain - inherited).with_overlap(overlap)
 
     def _overlap(self, candidate: WeightedSet, refit: Refit, placed: int) -> float:
         """Sum of `log_overlap` of the effects of a fit but the first ones, which were `placed` with a fitted subset."""
@@ -296,11 +293,15 @@ class HypothesisSearch:
     def _move(self, fitted: WeightedSet) -> None:
         """Fit a fitted set and its alternatives where their mechanisms are better placed; the best of these is kept."""
         self._listener.stage(f"fit at better places: {' and '.join(sorted(fitted.names))}")
-        fits = [fitted, *(self._fitted(alternative)[0] for alternative in fitted.inheriting_alternatives)]
-        moved_fits = (
-            moved_about_fit(self.base, self._fitter, fit, self.spacing) for fit in fits if fit.refit is not None
+        known = [fitted, *fitted.inheriting_alternatives]
+        fits = [fitted, *map(self._fitted, known[1:])]
+        moved = best_of_placements(
+            [
+                moved_about_fit(self.base, self._fitter, fit, self.spacing) if fit.refit is not None else fit
+                for fit in fits
+            ],
+            known,
         )
-        moved = max(moved_fits, key=lambda each: each.log_evidence_here)
         self._sets[fitted.names] = moved = replace(moved, alternatives=())
         if moved.refit is not fitted.refit:
             self._forget_supersets(fitted.names)

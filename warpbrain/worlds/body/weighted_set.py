@@ -229,11 +229,7 @@ class WeightedSet:
 
     @property
     def log_evidence_here(self) -> float:
-        """Its log evidence in the cells of its places alone, by which placements of the same causes are compared.
-
-        The sum over all places is the same for each of them: one far from the best, whose fit has lost nothing, must
-        not stand for all of it, or what acts beside it would seem to gain all that a better place explains.
-        """
+        """Its log evidence in the cells of its places alone."""
         return self.hypothesis.log_evidence + self.log_share
 
     @property
