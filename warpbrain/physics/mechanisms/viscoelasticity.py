@@ -117,6 +117,7 @@ class Viscoelasticity(Mechanism):
                 region="all tissue",
                 unscaled=tuple(range(1, len(middle))),
                 positive=(0,),
+                odds="causes.creep",
             )
             for times in (*alone, *combinations(_LOOKED_FOR, 2))
         ]
