@@ -218,6 +218,8 @@ class Proposal:
     pace: Callable[[Floats], float] | None = None
     centre: Floats | None = None  # (3,), where it acts, if somewhere [m]
     radius: float | None = None  # [m]
+    #: The smallest and the largest radius that a scan looks for [m], between which all are as probable
+    radii: tuple[float, float] | None = None
     region: str = ""  # where it acts in words
     #: Numbers of the coefficients that say how it acts, such as how fast, not how much: their standard deviations stay
     #: where those of the others are scaled
@@ -288,6 +290,7 @@ class Proposal:
         from scipy.spatial import cKDTree
 
         middles = cKDTree(situation.mesh.centres)
+        range_of_radii = (min(radii) * situation.mesh.radius, max(radii) * situation.mesh.radius)
 
         def ball(centre: Floats, radius: float) -> Proposal:
             away, nearest = middles.query(centre)
@@ -295,8 +298,17 @@ class Proposal:
                 # beside the body, or in a mesh that is too coarse for it: it would hold no element
                 centre = situation.mesh.centres[nearest]
             x, y, z = centre.tolist()
-            where: dict[str, Any] = {"elsewhere": ball, "centre": centre, "radius": radius, "varying": varying}
-            return cls.of_one(lambda coefficient: make(coefficient, (x, y, z), radius), 0.0, sd, "smooth", **where)
+            return cls.of_one(
+                lambda coefficient: make(coefficient, (x, y, z), radius),
+                0.0,
+                sd,
+                "smooth",
+                elsewhere=ball,
+                centre=centre,
+                radius=radius,
+                radii=range_of_radii,
+                varying=varying,
+            )
 
         return [ball(site, part * situation.mesh.radius) for site in situation.volume_sites for part in radii]
 

@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from scipy.stats import norm
 
 from warpbrain.physics.mechanisms import mechanisms
+from warpbrain.physics.mechanisms.traction import Traction
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
 from warpbrain.physics.proposal import Proposal
 from warpbrain.worlds.body.effects import Effect
@@ -59,3 +60,18 @@ def test_of_what_is_never_negative_half_of_a_normal_prior_cannot_be(seen, noise)
     assert log_within_expected(effect, z, np.array([[1.0 / precision]])) == pytest.approx(
         np.log(half / whole), abs=1e-3
     )
+
+
+@pytest.mark.parametrize(
+    ("radius", "expected"), [(0.009, 0.0), (0.017, 0.0), (0.014 * 1.25**3, -2.0), (0.009 / 1.25**2, -0.5)]
+)
+def test_a_radius_far_from_those_that_are_looked_for_is_improbable(radius, expected):
+    proposal = Proposal.of_one(
+        lambda c: Traction(centre=(0.0, 0.0, 0.0), value=(c, 0.0, 0.0), radius=radius),
+        0.0,
+        1.0,
+        radius=radius,
+        radii=(0.009, 0.014),
+    )
+    effect = Effect(proposal, np.zeros(3), np.ones((3, 1)))
+    assert log_within_expected(effect, np.zeros(1), np.eye(1)) == pytest.approx(expected)

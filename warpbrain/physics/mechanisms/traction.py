@@ -148,6 +148,7 @@ class Traction(Load, Mechanism):
             on_surface=True,
             centre=site,
             radius=radius,
+            radii=(min(_RADII) * situation.mesh.radius, max(_RADII) * situation.mesh.radius),
             region=situation.surface_at(site),
             varying=(0, 1, 2),
         )

@@ -14,6 +14,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.proposal import Proposal
 from warpbrain.physics.words import Smallest, Value
 from warpbrain.worlds.body.effects import Effect
+from warpbrain.worlds.body.places import RADII
 
 #: Least probability of being in a range that is told from none.
 _LEAST = 1e-30
@@ -64,7 +65,9 @@ def log_within_expected(effect: Effect, z: Floats, covariance: Floats) -> float:
 
     The evidence of a prior that ends there is so many times that of one that does not (Gelfand, Smith and Lee 1992):
     a fit must not explain recordings by a Poisson ratio of 0.1. Of a half-normal prior that ratio is the probability
-    of a positive coefficient a posteriori over that a priori (Klugkist and Hoijtink 2007).
+    of a positive coefficient a posteriori over that a priori (Klugkist and Hoijtink 2007). The radius of what acts in
+    one place is as probable anywhere in the cells of those that are looked for; beyond, its logarithm is normal, as
+    wide as such a cell: a fit that is moved to where it is better placed must not become another thing.
 
     `z` (k,), `covariance` (k, k): of the coefficients, a posteriori.
     """
@@ -82,6 +85,10 @@ def log_within_expected(effect: Effect, z: Floats, covariance: Floats) -> float:
         sd = proposed.sd[number]
         after, before = c[number] / (sd * math.sqrt(covariance[number, number])), proposed.mean[number] / sd
         total += math.log(max(float(ndtr(after)), _LEAST) / float(ndtr(before)))
+    if proposed.radii is not None and proposed.radius is not None:
+        smallest, largest = RADII[0] * proposed.radii[0], RADII[-1] * proposed.radii[1]
+        beyond = math.log(max(smallest / proposed.radius, proposed.radius / largest, 1.0)) / math.log(RADII[-1])
+        total -= 0.5 * beyond**2
     return total
 
 

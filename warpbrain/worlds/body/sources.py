@@ -10,7 +10,7 @@ the source that it is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 
 import numpy as np
 
@@ -93,13 +93,19 @@ def sources(at: Linearisation, spacing: float, size: float) -> tuple[Effect, ...
 
     effects: list[Effect] = []
     for is_force, lengths in ((True, beliefs("unknown.force_lengths")), (False, beliefs("unknown.stress_lengths"))):
+        of_scan = (spacing * float(lengths.min()), spacing * float(lengths.max()))
         for length in (spacing * lengths).tolist():
-            effects += _sources(at, places(max(spacing, _APART * length)), length, is_force, size)
+            effects += _sources(at, places(max(spacing, _APART * length)), length, of_scan, is_force, size)
     return tuple(effects)
 
 
-def _sources(at: Linearisation, centres: Floats, length: float, is_force: bool, size: float) -> list[Effect]:
-    """Effects of one length [m], of forces or of stresses, at each centre (s, 3) [m]; `size` as of `sources`."""
+def _sources(
+    at: Linearisation, centres: Floats, length: float, of_scan: tuple[float, float], is_force: bool, size: float
+) -> list[Effect]:
+    """Effects of one length [m], of forces or of stresses, at each centre (s, 3) [m].
+
+    `of_scan`: the smallest and the largest length [m]. `size`: as of `sources`.
+    """
     columns_about = _force_columns if is_force else _stress_columns
     columns = at.summed(lambda moment: columns_about(moment.at, centres, length))  # (n, 6, s)
     if not columns.any():
@@ -111,12 +117,14 @@ def _sources(at: Linearisation, centres: Floats, length: float, is_force: bool, 
         sd[part] = size * np.sqrt(share) / max(root_mean_square(columns[rows, part]), 1e-300)
     nothing = np.zeros(len(columns))
     return [
-        Effect(_proposal(sd, is_force, centre, length), nothing, np.ascontiguousarray(sd * columns[:, :, number]))
+        Effect(
+            _proposal(sd, is_force, of_scan, centre, length), nothing, np.ascontiguousarray(sd * columns[:, :, number])
+        )
         for number, centre in enumerate(centres)
     ]
 
 
-def _proposal(sd: Floats, is_force: bool, centre: Floats, length: float) -> Proposal:
+def _proposal(sd: Floats, is_force: bool, of_scan: tuple[float, float], centre: Floats, length: float) -> Proposal:
     """Six coefficients at a centre (3,) [m], with deviations `sd` (6,): force and turn [N], or stresses [Pa]."""
     x, y, z = centre.tolist()
 
@@ -125,10 +133,8 @@ def _proposal(sd: Floats, is_force: bool, centre: Floats, length: float) -> Prop
             return Source(centre=(x, y, z), length=length, force=tuple(c[:3].tolist()), turn=tuple(c[3:].tolist()))
         return Source(centre=(x, y, z), length=length, stress=tuple((_STRESSES @ c).tolist()))
 
-    def elsewhere(other: Floats, radius: float) -> Proposal:
-        return _proposal(sd, is_force, other, radius)
-
-    return Proposal(make, np.zeros(len(sd)), sd, elsewhere=elsewhere, centre=centre, radius=length)
+    elsewhere = partial(_proposal, sd, is_force, of_scan)
+    return Proposal(make, np.zeros(len(sd)), sd, elsewhere=elsewhere, centre=centre, radius=length, radii=of_scan)
 
 
 def _force_columns(at: Linearisation, centres: Floats, length: float) -> Floats:
