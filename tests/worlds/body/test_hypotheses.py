@@ -137,29 +137,6 @@ def test_a_fit_that_has_missed_its_optimum_is_mended_by_one_with_a_cause_more(se
     assert all(one.refit is not None for one in left)
 
 
-def test_a_fit_of_nothing_that_has_not_converged_is_mended_by_one_of_a_cause(search):
-    """Or that cause, which does nothing, and every other one would seem probable."""
-    mended = copy.copy(search)
-    mended._sets, mended._expanded = dict(search._sets), dict(search._expanded)
-    nothing, single = search.nothing, frozenset(("swelling",))
-    missed = replace(nothing.marginal, log_evidence=nothing.marginal.log_evidence - 30.0)
-    worse = replace(nothing, marginal=missed, refit=replace(nothing.refit, marginal=missed))
-    mended_from = nothing.hypothesis.log_evidence - 30.0
-    mended._sets[nothing.names] = worse.with_evidence(mended_from)
-    not_fitted_yet = {
-        one.names: one.hypothesis.log_evidence
-        for one in mended.weighted_sets
-        if len(one.names) == 1 and one.refit is None and one.names != single
-    }
-    assert not_fitted_yet
-    mended._fit(single)
-    again = mended.nothing.hypothesis.log_evidence
-    np.testing.assert_allclose(again, nothing.hypothesis.log_evidence, atol=1.0)
-    # what these have inherited of it was too little, too
-    gains = [mended.get(names).hypothesis.log_evidence - known for names, known in not_fitted_yet.items()]
-    np.testing.assert_allclose(gains, again - mended_from, atol=1e-9)
-
-
 @pytest.mark.parametrize("share", [1.0, 0.3, 0.01])
 @pytest.mark.parametrize("gain", [-4.0, 0.0, 2.0, 40.0])
 def test_a_gain_at_a_place_is_of_its_share(gain: float, share: float, search: HypothesisSearch) -> None:

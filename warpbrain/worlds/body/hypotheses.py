@@ -312,11 +312,11 @@ class HypothesisSearch:
 
         The evidence has several local optima, with other points as gross errors, or the unknown as a source. A
         mechanism with no effect must not seem probable because the fit with it has reached a better one than the fit
-        without it. Nor must a fit without any cause that has not converged make every other set probable.
+        without it.
         """
         superset = self._sets[names]
         assert superset.refit is not None
-        for cause in superset.acting:
+        for cause in superset.acting if len(names) > 1 else ():
             subset = self._sets.get(names - {cause})
             if subset is None:
                 continue
@@ -325,9 +325,6 @@ class HypothesisSearch:
                 continue
             # a field without a name that is not fitted, and may be a source, has that of the linear model
             known = subset.marginal.log_evidence if subset.refit is None else subset.refit.log_evidence
-            if not subset.names:
-                # that of the linear model, where its search has ended before it was as good
-                known = max(known, subset.hypothesis.log_evidence)
             # what neither search has come to counts for neither
             reached = reduced.marginal.log_evidence - superset.refit.unreached
             if reached < known + _BETTER:
@@ -340,7 +337,6 @@ class HypothesisSearch:
                 better = replace(refitted, hypothesis=subset.hypothesis, log_share=subset.log_share)
                 self._sets[subset.names] = better.with_gain(gain)
                 self._forget_supersets(subset.names)
-                self._pass_on_further(gain, subset.names)
 
     def _fitted_less(
         self, superset: WeightedSet, mechanisms: Sequence[str], wanted: float = -np.inf
@@ -384,14 +380,6 @@ class HypothesisSearch:
         for other in list(self._sets.values()):
             if names < other.names and other.refit is None and other.inherited_gain is not None:
                 self._sets[other.names] = other.inheriting(gain)
-
-    def _pass_on_further(self, gain: float, names: frozenset[str]) -> None:
-        """Add what a fit has gained when it was done again to supersets that have inherited from it."""
-        fits = [s.names for s in self._sets.values() if names < s.names and s.refit is not None]
-        for other in list(self._sets.values()):
-            inherits = names < other.names and not any(fit < other.names for fit in fits)
-            if inherits and other.refit is None and other.inherited_gain is not None:
-                self._sets[other.names] = other.inheriting(other.inherited_gain + gain)
 
     def _fitted_subset(self, candidate: WeightedSet) -> WeightedSet | None:
         """The fitted set whose fit the linear model of another is about; None if that is about the base."""
