@@ -218,7 +218,7 @@ class Proposal:
     pace: Callable[[Floats], float] | None = None
     centre: Floats | None = None  # (3,), where it acts, if somewhere [m]
     radius: float | None = None  # [m]
-    #: The smallest and the largest radius that a scan looks for [m], between which all are as probable
+    #: Smallest and largest radius of a scan [m]; the prior of the logarithm is uniform between them
     radii: tuple[float, float] | None = None
     region: str = ""  # where it acts in words
     #: Numbers of the coefficients that say how it acts, such as how fast, not how much: their standard deviations stay

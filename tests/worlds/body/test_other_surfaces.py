@@ -15,6 +15,7 @@ from warpbrain.simulation.system import System
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 from warpbrain.worlds.body.placing import with_refined_places
 from warpbrain.worlds.body.weighing import best_of_placements
+from warpbrain.worlds.body.weighted_set import WeightedSet
 
 #: Edge [m], noise [m], tracked points.
 SIDE, NOISE, POINTS = 0.06, 4e-4, 40
@@ -37,6 +38,16 @@ def search() -> HypothesisSearch:
     rng = np.random.default_rng(0)
     at = points[rng.choice(len(points), POINTS, replace=False)]
     return screened(with_beads(case, u, at, NOISE, rng), "cpu", mesh_error=False, mechanisms=["traction"])
+
+
+def placements(search: HypothesisSearch) -> tuple[dict[str, WeightedSet], str, str]:
+    """The traction by its surface, and the names of the wall and of the outer surface."""
+    best = search.get(("traction",))
+    assert best is not None
+    by_surface = {each.effects[0].surface: each for each in (best, *best.alternatives)}
+    [wall] = [surface for surface in by_surface if "outer" not in surface]
+    [outer] = [surface for surface in by_surface if "outer" in surface]
+    return by_surface, wall, outer
 
 
 def test_what_an_unlikely_place_gains_is_no_gain_of_all(search: HypothesisSearch) -> None:
@@ -71,11 +82,7 @@ def test_placements_that_lose_nothing_by_fits_have_the_evidence_that_they_had(sh
 def test_a_far_place_does_not_stand_for_all_where_the_fit_of_the_best_has_lost(search: HypothesisSearch) -> None:
     """The sum over all places is the same for each of them: what acts beside a far one would gain all of its loss."""
     names = ("traction",)
-    best = search.get(names)
-    assert best is not None
-    by_surface = {each.effects[0].surface: each for each in (best, *best.alternatives)}
-    [wall] = [surface for surface in by_surface if "outer" not in surface]
-    [outer] = [surface for surface in by_surface if "outer" in surface]
+    by_surface, wall, outer = placements(search)
     fitted = search._fitted(replace(by_surface[wall], alternatives=()))
     lost = fitted.with_evidence(by_surface[outer].hypothesis.log_evidence - 3.0)
     far = replace(by_surface[outer], alternatives=(), log_share=-20.0)
@@ -91,12 +98,8 @@ def test_a_far_place_does_not_stand_for_all_where_the_fit_of_the_best_has_lost(s
 
 def test_each_surface_has_a_fit_of_its_own(search: HypothesisSearch) -> None:
     names = ("traction",)
-    best = search.get(names)
-    assert best is not None
-    by_surface = {each.effects[0].surface: each for each in (best, *best.alternatives)}
+    by_surface, wall, outer = placements(search)
     assert len(by_surface) == 2
-    [wall] = [surface for surface in by_surface if "outer" not in surface]
-    [outer] = [surface for surface in by_surface if "outer" in surface]
     alternatives = (replace(by_surface[wall], alternatives=()),)
     search._sets[frozenset(names)] = replace(by_surface[outer], alternatives=alternatives)
     search.fit()

@@ -276,9 +276,8 @@ class HypothesisSearch:
             # what the fit without any cause gains is of tissue and registration, and is gained by all others; a search
             # that ended too early must not make everything else look better
             gain = max(gain, 0.0)
-        inherited = candidate.inherited_gain or 0.0
         overlap = self._overlap(candidate, refit, 0 if subset is None else len(subset.effects))
-        return candidate.fitted(refit).with_gain(gain - inherited).with_overlap(overlap)
+        return candidate.fitted(refit).with_gain(gain - (candidate.inherited_gain or 0.0)).with_overlap(overlap)
 
     def _overlap(self, candidate: WeightedSet, refit: Refit, placed: int) -> float:
         """Sum of `log_overlap` of the effects of a fit but the first ones, which were `placed` with a fitted subset."""

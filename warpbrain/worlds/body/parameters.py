@@ -65,9 +65,9 @@ def log_within_expected(effect: Effect, z: Floats, covariance: Floats) -> float:
 
     The evidence of a prior that ends there is so many times that of one that does not (Gelfand, Smith and Lee 1992):
     a fit must not explain recordings by a Poisson ratio of 0.1. Of a half-normal prior that ratio is the probability
-    of a positive coefficient a posteriori over that a priori (Klugkist and Hoijtink 2007). The radius of what acts in
-    one place is as probable anywhere in the cells of those that are looked for; beyond, its logarithm is normal, as
-    wide as such a cell: a fit that is moved to where it is better placed must not become another thing.
+    of a positive coefficient a posteriori over that a priori (Klugkist and Hoijtink 2007). The logarithm of
+    a radius has a uniform prior over the radii of a scan and their cells, with normal tails as wide as a cell beyond:
+    a fit that is moved must not end at a radius that no scan would look for.
 
     `z` (k,), `covariance` (k, k): of the coefficients, a posteriori.
     """

@@ -93,18 +93,23 @@ def sources(at: Linearisation, spacing: float, size: float) -> tuple[Effect, ...
 
     effects: list[Effect] = []
     for is_force, lengths in ((True, beliefs("unknown.force_lengths")), (False, beliefs("unknown.stress_lengths"))):
-        of_scan = (spacing * float(lengths.min()), spacing * float(lengths.max()))
+        range_of_lengths = (spacing * float(lengths.min()), spacing * float(lengths.max()))
         for length in (spacing * lengths).tolist():
-            effects += _sources(at, places(max(spacing, _APART * length)), length, of_scan, is_force, size)
+            effects += _sources(at, places(max(spacing, _APART * length)), length, range_of_lengths, is_force, size)
     return tuple(effects)
 
 
 def _sources(
-    at: Linearisation, centres: Floats, length: float, of_scan: tuple[float, float], is_force: bool, size: float
+    at: Linearisation,
+    centres: Floats,
+    length: float,
+    range_of_lengths: tuple[float, float],
+    is_force: bool,
+    size: float,
 ) -> list[Effect]:
     """Effects of one length [m], of forces or of stresses, at each centre (s, 3) [m].
 
-    `of_scan`: the smallest and the largest length [m]. `size`: as of `sources`.
+    `range_of_lengths`: the smallest and the largest length [m]. `size`: as of `sources`.
     """
     columns_about = _force_columns if is_force else _stress_columns
     columns = at.summed(lambda moment: columns_about(moment.at, centres, length))  # (n, 6, s)
@@ -118,13 +123,17 @@ def _sources(
     nothing = np.zeros(len(columns))
     return [
         Effect(
-            _proposal(sd, is_force, of_scan, centre, length), nothing, np.ascontiguousarray(sd * columns[:, :, number])
+            _proposal(sd, is_force, range_of_lengths, centre, length),
+            nothing,
+            np.ascontiguousarray(sd * columns[:, :, number]),
         )
         for number, centre in enumerate(centres)
     ]
 
 
-def _proposal(sd: Floats, is_force: bool, of_scan: tuple[float, float], centre: Floats, length: float) -> Proposal:
+def _proposal(
+    sd: Floats, is_force: bool, range_of_lengths: tuple[float, float], centre: Floats, length: float
+) -> Proposal:
     """Six coefficients at a centre (3,) [m], with deviations `sd` (6,): force and turn [N], or stresses [Pa]."""
     x, y, z = centre.tolist()
 
@@ -133,8 +142,10 @@ def _proposal(sd: Floats, is_force: bool, of_scan: tuple[float, float], centre: 
             return Source(centre=(x, y, z), length=length, force=tuple(c[:3].tolist()), turn=tuple(c[3:].tolist()))
         return Source(centre=(x, y, z), length=length, stress=tuple((_STRESSES @ c).tolist()))
 
-    elsewhere = partial(_proposal, sd, is_force, of_scan)
-    return Proposal(make, np.zeros(len(sd)), sd, elsewhere=elsewhere, centre=centre, radius=length, radii=of_scan)
+    elsewhere = partial(_proposal, sd, is_force, range_of_lengths)
+    return Proposal(
+        make, np.zeros(len(sd)), sd, elsewhere=elsewhere, centre=centre, radius=length, radii=range_of_lengths
+    )
 
 
 def _force_columns(at: Linearisation, centres: Floats, length: float) -> Floats:

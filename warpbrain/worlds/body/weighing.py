@@ -154,26 +154,25 @@ def keep_better(sets: dict[frozenset[str], WeightedSet], candidate: WeightedSet)
 
 
 def best_of_placements(fits: Sequence[WeightedSet], known: Sequence[WeightedSet]) -> WeightedSet:
-    """The best placed of several fits of the same causes, its log evidence that of all of them.
+    """The best of several fits of the same causes, with the log evidence of all of them.
 
-    The first one stands for all places but those of the others, each of which stands for its own cells alone: before
-    the fits all have the evidence of the sum over all places. Where the fit of the best has lost that, one of the
-    others must not keep it, or what acts beside it would seem to gain all that the best one explains.
+    Before the fits each has the evidence of the sum over all places. The first fit stands for all places but the cells
+    of the others, each other one for its own cells. One must not keep that sum where the places that made it large have
+    lost it in their own fit: further causes would be credited with what those places explain.
 
-    `known`: the same before they were fitted.
+    `known`: the same sets before they were fitted, with their shares of the sum.
     """
-    fitted = [number for number, each in enumerate(fits) if each.refit is not None]
+    first, fitted = fits[0], [number for number, fit in enumerate(fits) if fit.refit is not None]
     if not fitted:
-        return fits[0]
-    logs = np.full(len(fits), -np.inf)
-    logs[fitted] = [fits[number].log_evidence_here for number in fitted]
-    best = fits[int(np.argmax(logs))]
-    if fits[0].refit is not None:
+        return first
+    best = max((fits[number] for number in fitted), key=lambda fit: fit.log_evidence_of_cells)
+    logs = [fits[number].log_evidence_of_cells for number in fitted if number > 0]
+    if first.refit is not None:
         of_others = sum(np.exp(known[number].log_share) for number in fitted[1:])
         # shares of sets that were weighed with other gross errors may add up to more than one
-        logs[0] = fits[0].hypothesis.log_evidence + max(np.log1p(-min(of_others, 0.5)), fits[0].log_share)
+        logs.append(first.hypothesis.log_evidence + max(np.log1p(-min(of_others, 0.5)), first.log_share))
     total = float(np.logaddexp.reduce(logs))
-    return replace(best.with_evidence(total), log_share=min(best.log_evidence_here - total, 0.0))
+    return replace(best.with_evidence(total), log_share=min(best.log_evidence_of_cells - total, 0.0))
 
 
 def search_of(most: int) -> Search:

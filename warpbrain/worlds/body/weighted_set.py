@@ -228,8 +228,8 @@ class WeightedSet:
         return self.hypothesis.of_kind(Kind.PHYSICS)
 
     @property
-    def log_evidence_here(self) -> float:
-        """Its log evidence in the cells of its places alone."""
+    def log_evidence_of_cells(self) -> float:
+        """The part of its log evidence [nats] that the cells of its places have in the sum over all places."""
         return self.hypothesis.log_evidence + self.log_share
 
     @property
