@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import signal
+from collections import defaultdict
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 import hypothesis
 import pytest
 import warp as wp
-from drawn_for_commit import ALL
+from drawn_for_commit import ALL, HALF, half_for_this_commit
 from verification_rows import Row, Rows
 
 from warpbrain.kernels.module import PRECISIONS, Precision
@@ -53,12 +54,30 @@ def pytest_collection() -> Iterator[None]:
     return collected
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if HALF in os.environ and ALL not in os.environ:
+        _leave_half_of_the_slow(config, items)
     for item in items:
         if "verify" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.verification)
     # the longest first, so that no process of pytest-xdist is left with one of them at the end
     items.sort(key=_slowness, reverse=True)
+
+
+def _leave_half_of_the_slow(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Slow tests of half of the files, which share what they set up, run with this commit."""
+    seconds: dict[str, float] = defaultdict(float)
+    for item in items:
+        if item.get_closest_marker("slow"):
+            seconds[_file(item)] += _slowness(item)
+    run = half_for_this_commit(seconds)
+    left = {item for item in items if item.get_closest_marker("slow") and _file(item) not in run}
+    config.hook.pytest_deselected(items=list(left))
+    items[:] = [item for item in items if item not in left]
+
+
+def _file(item: pytest.Item) -> str:
+    return item.nodeid.partition("::")[0]
 
 
 def _slowness(item: pytest.Item) -> float:

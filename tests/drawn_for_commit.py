@@ -5,18 +5,19 @@ from __future__ import annotations
 import hashlib
 import os
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-import pytest
 
 T = TypeVar("T")
 #: Variable of the environment of all processes of tests, set by `--verification-rows`.
 ALL = "ALL_SLOW_TESTS"
+#: Variable with which .ci/run leaves half of the files of slow tests to other commits.
+HALF = "HALF_OF_SLOW_TESTS"
 
 
 @cache
@@ -38,10 +39,11 @@ def drawn_for_this_commit(of: int, count: int) -> list[int]:
     return sorted(np.random.default_rng(_seed()).choice(of, count, replace=False).tolist())
 
 
-def with_every_other_commit(name: str) -> pytest.MarkDecorator:
-    """Mark of a test that takes minutes: half of those with such a mark run, others with every commit."""
-    runs = ALL in os.environ or _seed(name) % 2 == 0
-    return pytest.mark.skipif(not runs, reason=f"runs with every other commit, or with {ALL}=1")
+def half_for_this_commit(seconds: Mapping[str, float]) -> set[str]:
+    """Half of some files of tests that take so long: of each two that take about as long, one or the other."""
+    slowest_first = sorted(seconds, key=lambda name: (-seconds[name], name))
+    pairs = [slowest_first[start : start + 2] for start in range(0, len(slowest_first), 2)]
+    return {pair[_seed(pair[0]) % len(pair)] for pair in pairs}
 
 
 def one_for_this_commit(of: Sequence[T]) -> list[T]:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_for_commit import with_every_other_commit
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 #: The ICBM152 template in voxels of 4 mm.
@@ -15,7 +14,6 @@ MAPS = Path(__file__).parent / "icbm152"
 RAS_TO_LPS = np.array([-1.0, -1.0, 1.0])
 
 
-@with_every_other_commit("there and back")
 @pytest.mark.slow(60)
 def test_there_and_back(tmp_path, verify):
     for package in ("mmgpy", "nibabel"):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_for_commit import one_for_this_commit, with_every_other_commit
+from drawn_for_commit import one_for_this_commit
 
 from warpbrain.cases.shipped import BEAM, find_case
 from warpbrain.diagnosis.diagnose import diagnose
@@ -45,7 +45,6 @@ def test_what_is_declared(name):
     assert case.tissues[1].accuracy == (None if name == BEAM[0] else 0.043)
 
 
-@with_every_other_commit("weight")
 @pytest.mark.slow(90)
 @pytest.mark.parametrize("gravity", one_for_this_commit([True, False]))
 def test_the_weight_that_was_withheld_is_named_or_in_a_group_to_10_percent(gravity):

@@ -8,7 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from drawn_for_commit import one_for_this_commit, with_every_other_commit
+from drawn_for_commit import one_for_this_commit
 
 pytest.importorskip("scipy")
 
@@ -138,7 +138,6 @@ def test_every_clinical_case_can_be_built():
 
 # the others take minutes each and differ by side and seed alone; one of the other side is made again, to the bit and
 # finer, by tests/concealed/test_stand_ins.py: by the same process, which has smoothed the template then
-@with_every_other_commit("building")
 @pytest.mark.slow(90)
 @pytest.mark.xdist_group("building")
 @pytest.mark.parametrize("name", one_for_this_commit(["phantom", "0529"]))

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from drawn_for_commit import one_for_this_commit, with_every_other_commit
+from drawn_for_commit import one_for_this_commit
 from scipy.spatial.transform import Rotation
 
 from warpbrain.cases.shipped import RESECT, files_of, find_case
@@ -63,7 +63,6 @@ def test_it_is_said_whose_they_are_and_that_the_mesh_is_not(name):
         assert "10.1002/mp.12268" in notice and "10.11582/2017.00004" in notice and "What was changed" in notice
 
 
-@with_every_other_commit("registration")
 @pytest.mark.slow(65)
 # all 15: bench/real/resect.py; any of them with each commit: tests/subsets
 @pytest.mark.parametrize("name", one_for_this_commit(["resect-01", "resect-14"]))

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_for_commit import with_every_other_commit
 
 from concealed.check import SAME, intact, main, remade
 from concealed.observing import rms
@@ -158,7 +157,6 @@ def test_fine_meshes_are_kept_outside_the_repository():
     assert not list((ROOT / "concealed").rglob("*.vtu"))
 
 
-@with_every_other_commit("motion")
 @pytest.mark.slow(80)
 @pytest.mark.xdist_group("building")
 def test_motion_can_be_found_again_from_a_truth(tmp_path):

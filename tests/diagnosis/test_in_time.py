@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawn_for_commit import one_for_this_commit, with_every_other_commit
+from drawn_for_commit import one_for_this_commit
 from slow_block import CAUSES, PERMEABILITY, TIMES, write_slow
 
 from warpbrain.arrays import Floats
@@ -181,7 +181,6 @@ def test_it_is_said_when_an_unknown_force_set_in(number: int, shape: str, diagno
     assert found.course in (("", shape) if number < 2 else ("",))
 
 
-@with_every_other_commit("no law")
 @pytest.mark.slow
 def test_what_relaxes_by_no_law_that_is_looked_for_has_no_name(tmp_path) -> None:
     """Where nothing that is looked for relaxes, a force that sets in fits what was recorded nearly as well."""

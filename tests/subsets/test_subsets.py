@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 from command import warpbrain
-from drawn_for_commit import drawn_for_this_commit
+from drawn_for_commit import drawn_for_this_commit, half_for_this_commit
 from reliability.kinds import KINDS
 
 from subsets.tries import case_of, every_subset, one_try, subsets
@@ -20,6 +20,13 @@ def test_all_subsets():
 def test_a_commit_draws_the_same_in_every_process():
     drawn = drawn_for_this_commit(86, 3)
     assert drawn == drawn_for_this_commit(86, 3) and len(set(drawn)) == 3 and set(drawn) <= set(range(86))
+
+
+def test_half_of_the_slow_files_takes_half_of_the_time():
+    seconds = {f"test_{number}.py": 400.0 / (1 + number) for number in range(60)}
+    half = half_for_this_commit(seconds)
+    assert len(half) == 30 and half == half_for_this_commit(seconds)
+    assert sum(seconds[name] for name in half) == pytest.approx(sum(seconds.values()) / 2, rel=0.3)
 
 
 def test_without_recordings_it_is_a_sentence():

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from bodies import model_of
-from drawn_for_commit import with_every_other_commit
 from manufactured import norm, quadrature
 from manufactured_problem import (
     ORDERS,
@@ -165,7 +164,7 @@ def test_order_in_time_of_tissue_that_relaxes(elements: str, verify: Row) -> Non
     # a second halving of averaged elements takes minutes of one core
     [
         *((elements, 1) for elements in LINEAR),
-        pytest.param("tet4", 2, marks=[pytest.mark.slow(65), with_every_other_commit("orders")]),
+        pytest.param("tet4", 2, marks=pytest.mark.slow(65)),
     ],
 )
 def test_orders_in_space_and_time_of_tissue_that_relaxes(elements: str, halvings: int, verify: Row) -> None:
