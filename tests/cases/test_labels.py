@@ -338,6 +338,7 @@ def test_mesh_lies_where_the_affine_says(made):
     np.testing.assert_allclose((upper - lower) / 2, (48, 58, 46), atol=1.0)
 
 
+@pytest.mark.slow(8)
 def test_a_cavity_may_open_to_the_outside(tmp_path):
     affine = grid_affine((3, 3, 3), (40, 42, 40))
     labels = ellipsoids(affine, (40, 42, 40))

@@ -191,6 +191,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.slow(4)
 def test_killed_it_goes_on_where_it_was(folder, tmp_path):
     """`kill -9` in the middle: what was computed is there and is not computed again, and the result is the same."""
     arguments = ["ensemble", "--case", str(folder), "--samples", "6", "--steps", "4"]
@@ -211,6 +212,7 @@ def test_killed_it_goes_on_where_it_was(folder, tmp_path):
     assert (tmp_path / "whole" / "samples.csv").read_bytes() == (out / "samples.csv").read_bytes()
 
 
+@pytest.mark.slow(9)
 @pytest.mark.skipif(os.name != "posix", reason="looks for processes as POSIX has them")
 def test_killed_it_leaves_no_process(tmp_path):
     arguments = ["ensemble", "--case", "0529", "--tissue", "single", "--samples", "32", "--steps", "20"]

@@ -107,6 +107,7 @@ def nothing_else_acts(printed, said):
         assert low < alone["estimate"] < high and low < averaged["middle"] < high
 
 
+@pytest.mark.slow(4)
 def test_too_few_points_to_know_what_else_may_act(tmp_path):
     case = block({"brain": WHITE}, "pushed")
     recording = replace(beads(truth(case), count=4, noise=1e-4), file="b.csv")
@@ -162,6 +163,7 @@ def test_a_case_without_recordings(tmp_path):
     assert done.status == 2 and "no [[recording]] to estimate from" in done.err
 
 
+@pytest.mark.slow(5)
 def test_gross_errors_only(tmp_path):
     case = block({"brain": WHITE}, "pushed")
     recording = beads(truth(case), count=60)

@@ -43,6 +43,7 @@ def test_pressure_follows_the_wall():
     assert np.linalg.norm(internal - rest) > 1e-2 * np.linalg.norm(rest)
 
 
+@pytest.mark.slow(6)
 def test_where_it_starts_does_not_matter():
     body = hollow()[0]
     settler = Settler(body, TISSUE)

@@ -40,6 +40,7 @@ def test_all_commands(tmp_path):
         assert [killed for killed in map(kill, seeds) if killed.defect] == []
 
 
+@pytest.mark.slow(5)
 def test_a_defect_is_seen(killing_builds, monkeypatch):
     """The tool itself: files that are written in place are found half-written."""
     from contextlib import contextmanager

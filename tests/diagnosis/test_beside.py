@@ -46,6 +46,7 @@ def in_one_and_two_threads(pressed: Case) -> list[Diagnosis]:
     return found
 
 
+@pytest.mark.slow(40)
 def test_it_is_the_same_to_the_bit_in_one_thread_and_in_two(in_one_and_two_threads: list[Diagnosis]) -> None:
     one, two = in_one_and_two_threads
     assert one.decision == two.decision and one.rejected == two.rejected and one.p_value == two.p_value
@@ -57,6 +58,7 @@ def test_it_is_the_same_to_the_bit_in_one_thread_and_in_two(in_one_and_two_threa
     assert one.search.base.states.solves == two.search.base.states.solves and one.confusion.rows == two.confusion.rows
 
 
+@pytest.mark.slow(1)
 def test_a_pressure_on_a_set_that_touches_what_is_held_is_named_beside_it(
     in_one_and_two_threads: list[Diagnosis],
 ) -> None:
@@ -69,6 +71,7 @@ def test_a_pressure_on_a_set_that_touches_what_is_held_is_named_beside_it(
     assert abs(value.value - 150.0) < 4.0 * value.sd
 
 
+@pytest.mark.slow(10)
 def test_what_no_mechanism_explains_gets_no_name_beside_one(pressed: Case) -> None:
     options = replace(OPTIONS, candidates=("gravity", "swelling", "falx"))
     found = Diagnosing(pressed, options, "cpu").run()

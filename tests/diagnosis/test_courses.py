@@ -101,6 +101,7 @@ def test_between_two_loaded_states_a_cause_is_what_changed(between: Diagnosis, v
     )
 
 
+@pytest.mark.slow(4)
 def test_what_is_declared_of_both_states_leaves_nothing_missing(verify) -> None:
     truth = block(4, falling((10.0, 80.0), (0.05, 0.02)))
     found = diagnosed(replace(truth, recordings=(recorded(truth, (80.0,), 40, reference=10.0),)))

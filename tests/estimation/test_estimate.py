@@ -159,6 +159,7 @@ def test_gross_errors_only_are_no_estimate() -> None:
         found(replace(case, recordings=(nonsense,)))
 
 
+@pytest.mark.slow(4)
 def test_noise_that_is_not_given_is_estimated() -> None:
     case = block({"brain": WHITE}, "pushed")
     posterior = found(replace(case, recordings=(beads(truth(case), count=300, noise=1e-4, sigma=None),)), EXACT)
@@ -183,6 +184,7 @@ def test_a_wrong_registration_is_found_along_with_the_tissue() -> None:
     assert low < np.log(1000.0) < high
 
 
+@pytest.mark.slow(4)
 def test_the_error_of_the_mesh_is_no_stiffness() -> None:
     """Observed with quadratic tetrahedra on a finer mesh. This mesh is a third too stiff."""
     case = block({"brain": WHITE}, "gravity")

@@ -43,6 +43,7 @@ def test_tissues_of_one_group_are_one_tissue() -> None:
         Parameters.of(replace(case, tissues=one))
 
 
+@pytest.mark.slow(10)
 def test_exponents_of_either_sign_are_modes() -> None:
     case = block({"brain": WHITE}, "pushed").with_law("ogden")
     modes = prior_modes(prior_of(case), Parameters.of(case))

@@ -1,5 +1,6 @@
 """Names in a case that are HTML are words in its report: opened in headless Chromium, nothing of them runs."""
 
+import pytest
 from browser import EVIL, needs_browser, runs
 from command import run
 from folders import write_recorded
@@ -12,6 +13,7 @@ CHANGES = [
 BEADS = f"id,x,y,z,ux,uy,uz\n{EVIL},10,10,10,0.1,0.0,-0.2\nb,20,15,25,0.0,0.1,-0.5\nc,5,5,30,0.3,0,-1\n"
 
 
+@pytest.mark.slow(12)
 @needs_browser
 def test_nothing_of_a_name_runs(tmp_path):
     folder = write_recorded(tmp_path / "case", *CHANGES, files={"recordings/beads.csv": BEADS})

@@ -40,6 +40,7 @@ def modes(model: Model) -> np.ndarray:
     return np.sqrt(np.sort(eigsh(K, 2, M, sigma=0.0, return_eigenvectors=False)))
 
 
+@pytest.mark.slow(3)
 @pytest.mark.parametrize("mass", [0.0, 0.2])
 @pytest.mark.parametrize("step", [8e-3, 3e-2])
 def test_a_motion_to_rest_swings_as_the_first_mode_does(mass: float, step: float, device: str) -> None:

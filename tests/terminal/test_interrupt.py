@@ -112,6 +112,7 @@ with stop_promptly(), whole_file(Path({str(tmp_path)!r}) / "result.vtu") as temp
     assert files(tmp_path) == []
 
 
+@pytest.mark.slow(3)
 def test_while_benching(tmp_path):
     file = tmp_path / "bench.json"
     with started("-m", "warpbrain.bench", "--rows", "mt/fine", "--device", "cpu", "--json", str(file)) as process:

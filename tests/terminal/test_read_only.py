@@ -41,6 +41,7 @@ def run_where(folder, read_only, **environment):
     return ran.returncode, "".join(lines)
 
 
+@pytest.mark.slow(7)
 @pytest.mark.usefixtures("undrawn")
 def test_a_cache_that_has_all_kernels_is_enough(tmp_path, cache):
     # where this machine has not yet compiled them

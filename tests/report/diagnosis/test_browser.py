@@ -5,6 +5,7 @@ import itertools
 import json
 import re
 
+import pytest
 from browser import EVIL, LISTEN, needs_browser, opened, runs
 
 from warpbrain.report.diagnosis.page import page_of
@@ -83,6 +84,7 @@ def test_without_webgl_the_page_says_so(diagnosed, tmp_path):
     assert 'data-wrong="0"' in document and 'data-shown="block"' in document
 
 
+@pytest.mark.slow(6)
 def test_nothing_of_a_name_runs(small_diagnosis, summary, tmp_path):
     text, evil = json.dumps(summary), json.dumps(EVIL)[1:-1]
     for name in ("gel", "beads", "others"):

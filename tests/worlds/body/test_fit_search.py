@@ -162,6 +162,7 @@ def test_a_search_that_expects_to_reach_too_little_ends(sets):
     assert fit.log_evidence < wanted
 
 
+@pytest.mark.slow(15)
 def test_a_fit_takes_the_most_probable_size(sets):
     """Of those that its cause may have, though it begins with another one: that of the linear model about the base."""
     weighed = sets.get(("unknown",))

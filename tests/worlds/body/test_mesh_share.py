@@ -37,6 +37,7 @@ def test_a_mechanism_that_is_left_out_keeps_its_part():
     np.testing.assert_allclose(without.at(z[[0, 2]]), share.at(z), rtol=1e-14)
 
 
+@pytest.mark.slow(3)
 @pytest.mark.parametrize("poisson", [0.3, 0.47])
 def test_a_body_that_moves_less_while_stress_relaxes_has_less_of_the_error(tmp_path, poisson, verify):
     """A block under its weight, on its mesh and on elements of half the size, followed in time on both."""

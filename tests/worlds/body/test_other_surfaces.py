@@ -96,6 +96,7 @@ def test_a_far_place_does_not_stand_for_all_where_the_fit_of_the_best_has_lost(s
     np.testing.assert_allclose(moved.hypothesis.log_evidence, lost.hypothesis.log_evidence, atol=0.1)
 
 
+@pytest.mark.slow(8)
 def test_each_surface_has_a_fit_of_its_own(search: HypothesisSearch) -> None:
     names = ("traction",)
     by_surface, wall, outer = placements(search)
