@@ -284,11 +284,13 @@ def of_freesurfer(tmp_path_factory):
     return start_from_labels(place / "mine", place / "aseg.nii.gz", ["500=resection"], size=14.0, program="freesurfer")
 
 
+@pytest.mark.slow(8)
 def test_a_preset_names_what_there_is(of_freesurfer):
     assert of_freesurfer.tissues == {41: "white matter", 500: "resection", 1017: "grey matter"}
     assert of_freesurfer.notes[0] == "outside the mesh: 0.729 cm3, labels 24 (0.729 cm3)"
 
 
+@pytest.mark.slow(1)
 def test_tissue_of_a_resection_label_is_taken_out(of_freesurfer):
     case = read_case(of_freesurfer.folder)
     removed = case.mesh.tissue == 500
@@ -297,6 +299,7 @@ def test_tissue_of_a_resection_label_is_taken_out(of_freesurfer):
     assert case.remaining[0].volume == pytest.approx(case.mesh.volumes[~removed].sum())
 
 
+@pytest.mark.slow(1)
 def test_a_new_case_has_the_density_of_brain(of_freesurfer):
     assert read_case(of_freesurfer.folder).density == 1040.0
 
@@ -321,6 +324,7 @@ def test_a_preset_of_another_program_is_refused(tmp_path):
     assert not (tmp_path / "mine").exists()
 
 
+@pytest.mark.slow(1)
 def test_a_case_in_which_nothing_acts_says_so(started, of_freesurfer):
     for case, _ in (started, (of_freesurfer, None)):
         # a resection alone moves nothing

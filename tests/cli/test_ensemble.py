@@ -231,6 +231,7 @@ def test_killed_it_leaves_no_process(tmp_path):
         time.sleep(0.1)
 
 
+@pytest.mark.slow(8)
 @pytest.mark.usefixtures("ctrl_c")
 def test_interrupted_it_is_gone_within_two_seconds(tmp_path):
     arguments = ["ensemble", "--case", "0529", "--tissue", "single", "--samples", "32", "--steps", "500"]

@@ -27,6 +27,7 @@ def test_killed_and_repeated(killing, name, seeds):
     assert [killed for killed in map(killing[name], seeds) if killed.defect] == []
 
 
+@pytest.mark.slow(3)
 def test_builds_killed_and_repeated(killing_builds):
     assert [killed for killed in map(killing_builds, range(6)) if killed.defect] == []
 

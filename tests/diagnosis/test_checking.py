@@ -18,6 +18,7 @@ def test_what_is_named_leaves_noise(small_diagnosis):
     assert 0.9 * NOISE < explained / 3**0.5 < 1.2 * NOISE < refitted / 3**0.5 < declared
 
 
+@pytest.mark.slow(4)
 def test_a_wrong_registration_is_as_wrong_where_it_is_not_fitted(small_diagnosis):
     case = small_diagnosis.case
     moved_by = np.array([8e-4, -5e-4, 6e-4, 0.01, -0.005, 0.008])

@@ -75,7 +75,7 @@ def test_a_paper_is_left_out_with_all_its_studies():
         CoregionalisedCandidate("one a group", separate=True),
         CoregionalisedCandidate("with a mean", mean_modulus=1500.0),
         pytest.param(HierarchicalCandidate("hierarchical"), marks=pytest.mark.slow(4)),
-        HierarchicalCandidate("moduli only", without=OF_CURVES + OF_SIDES),
+        pytest.param(HierarchicalCandidate("moduli only", without=OF_CURVES + OF_SIDES), marks=pytest.mark.slow(5)),
     ],
     ids=lambda candidate: candidate.name,
 )

@@ -79,6 +79,7 @@ def test_densities_of_one_point_are_numbers(neo_hookean):
     assert isinstance(one, float) and one == pytest.approx(neo_hookean.log_density(neo_hookean.mean[None])[0])
 
 
+@pytest.mark.slow(6)
 def test_an_exponent_of_either_sign(ogden):
     """Two clusters with nothing between them, which a Gaussian would fill."""
     alpha = ogden.theta[:, 1]

@@ -135,7 +135,8 @@ def test_a_body_without_any_set(picture):
     assert len(places(image, LARGEST_SET)) == 0
 
 
-@pytest.mark.parametrize("size", [pytest.param(1.0, marks=pytest.mark.slow(2)), 1e-5])
+@pytest.mark.slow(3)
+@pytest.mark.parametrize("size", [1.0, 1e-5])
 def test_one_tetrahedron(rendered, size):
     image = rendered(case_of(tetrahedron(size)))
     for row, column in ((0, 0), (0, 1), (1, 0)):
@@ -153,7 +154,8 @@ def test_where_nothing_can_be_rendered(tmp_path, monkeypatch):
 
 
 # each side once: to take one axis for the other would be seen
-@pytest.mark.parametrize(("right", "front"), [(True, False), pytest.param(False, True, marks=pytest.mark.slow(2))])
+@pytest.mark.slow(3)
+@pytest.mark.parametrize(("right", "front"), [(True, False), (False, True)])
 def test_a_body_is_seen_from_where_there_is_most_to_see(rendered, right, front):
     """What is taken out, whatever its name, lies at the outside, where another side would hide it."""
     plain = body()
@@ -301,6 +303,7 @@ def test_specimens(picture, shape, size):
     assert len(places(panel(image, 0, 0), LARGEST_SET)) > 0 or shape == "block"
 
 
+@pytest.mark.slow(2)
 def test_a_large_mesh_in_reasonable_time(picture):
     mesh = box((26, 26, 26), (0.15, 0.16, 0.13))
     assert len(mesh.tetrahedra) > 100_000

@@ -62,6 +62,7 @@ def test_every_group_has_its_panels(models):
         assert all(label == "stretch" or label.endswith(" [Pa]") for label in labels)
 
 
+@pytest.mark.slow(4)
 def test_one_group(models, tmp_path):
     for figure, panels in zip(pictures(*models, BRAIN), (1, 1, 2), strict=True):
         assert len(figure.axes) == panels and figure.get_suptitle() == BRAIN
@@ -87,6 +88,7 @@ def test_names_stand_apart():
     assert places[0] >= 0.0 and places[-1] <= 1.0
 
 
+@pytest.mark.slow(3)
 def test_a_users_study_of_any_name(tmp_path):
     model = trained()
     names = ("A study of " + "very " * 40 + "stiff tissue, $E_0$", "Études\nd'ailleurs 脳", "_")

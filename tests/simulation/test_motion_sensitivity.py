@@ -101,11 +101,11 @@ def relative(found: Floats, expected: Floats) -> float:
         (1, 0.02, "tet4", (BRANCHES, *LOADS), 4),
         (6, 0.02, "tet4", (BRANCHES, *LOADS[:2]), 4),
         (8, 1.0, "tet4", (SLOW,), 4),
-        (6, 0.02, "tet4-averaged", (BRANCHES,), 4),
+        pytest.param(6, 0.02, "tet4-averaged", (BRANCHES,), 4, marks=pytest.mark.slow(3)),
         # steps of two fields are dear
         pytest.param(1, 0.02, "tet4", (FLUID, BRANCHES), 4, marks=pytest.mark.slow(3)),
         pytest.param(5, 0.02, "tet4-averaged", (FLUID,), 2, marks=pytest.mark.slow(4)),
-        (5, 1.0, "tet4", (SLOW_FLUID,), 2),
+        pytest.param(5, 1.0, "tet4", (SLOW_FLUID,), 2, marks=pytest.mark.slow(4)),
     ],
 )
 def test_against_motions_beside(

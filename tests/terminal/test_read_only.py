@@ -61,6 +61,7 @@ def test_a_cache_without_kernels(tmp_path, cache, begun):
     assert said.count("\n") == 1 and not (tmp_path / "out" / "result.vtu").exists()
 
 
+@pytest.mark.slow(4)
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="a folder that nobody can make")
 def test_a_home_that_is_not_there(tmp_path):
     status, said = run_where(tmp_path, None, HOME="/proc/none", XDG_CACHE_HOME="", WARP_CACHE_PATH="")

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from bodies import model_of
 from scipy.integrate import solve_ivp
 from shapes import box, cube, room, sphere
@@ -111,6 +112,7 @@ def slide(time_step: float, end: float, device: str) -> tuple[np.ndarray, float,
     return np.array(angles), start, V + simulator.kinetic_energy(), lost
 
 
+@pytest.mark.slow(3)
 def test_a_block_in_a_bowl_swings_as_a_pendulum_and_its_energy_is_accounted_for(device: str, verify: Row) -> None:
     end, time_step = 0.25, 1e-3
     angles, before, after, lost = slide(time_step, end, device)

@@ -163,7 +163,7 @@ def test_order_in_time_of_tissue_that_relaxes(elements: str, verify: Row) -> Non
     ("elements", "halvings"),
     # a second halving of averaged elements takes minutes of one core
     [
-        *((elements, 1) for elements in LINEAR),
+        *(pytest.param(elements, 1, marks=[pytest.mark.slow(7)] if elements == "tet4" else []) for elements in LINEAR),
         pytest.param("tet4", 2, marks=pytest.mark.slow(65)),
     ],
 )

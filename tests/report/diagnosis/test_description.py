@@ -67,6 +67,7 @@ def test_the_referee_reads_all_of_it(small_diagnosis, verdict, tmp_path):
         assert {value.name for value in told.named[0].values} == set(read.parameters)
 
 
+@pytest.mark.slow(4)
 def test_what_was_not_tried_is_in_the_ranking(diagnosed):
     ranking = json.loads((diagnosed / "diagnosis.json").read_text(encoding="utf-8"))["ranking"]
     assert {"gravity", "pressure", "swelling", "falx", "unknown"} <= {one["mechanism"] for one in ranking}

@@ -78,9 +78,8 @@ def as_it_is(case: Case) -> HypothesisSearch:
     return search(case)
 
 
-@pytest.mark.parametrize(
-    "change", [pytest.param("turned, mirrored and shifted", marks=pytest.mark.slow(6)), "counted anew"]
-)
+@pytest.mark.slow(8)
+@pytest.mark.parametrize("change", ["turned, mirrored and shifted", "counted anew"])
 def test_sets_are_as_probable(change: str, case: Case, as_it_is: HypothesisSearch) -> None:
     found = search(_ANEW[change](case))
     chances = dict(zip((one.names for one in found.weighted_sets), found.probabilities.tolist(), strict=True))
