@@ -169,8 +169,8 @@ def best_of_placements(fits: Sequence[WeightedSet], known: Sequence[WeightedSet]
     logs = [fits[number].log_evidence_of_cells for number in fitted if number > 0]
     if first.refit is not None:
         of_others = sum(np.exp(known[number].log_share) for number in fitted[1:])
-        # shares of sets that were weighed with other gross errors may add up to more than one
-        logs.append(first.hypothesis.log_evidence + max(np.log1p(-min(of_others, 0.5)), first.log_share))
+        # shares of sets that were weighed with other gross errors may add up to more than one: its own cells are left
+        logs.append(first.hypothesis.log_evidence + np.log(max(1.0 - of_others, np.exp(first.log_share))))
     total = float(np.logaddexp.reduce(logs))
     return replace(best.with_evidence(total), log_share=min(best.log_evidence_of_cells - total, 0.0))
 
