@@ -49,6 +49,18 @@ def test_a_result_says_the_point_in_its_own_columns(search):
     np.testing.assert_allclose(result.residual + result.columns @ z, result.linear, atol=1e-12)
 
 
+def test_without_an_equilibrium_on_the_way_to_the_base_the_start_stays(search, monkeypatch):
+    """As where tissue that is as soft as the base's does not hold what acts."""
+    z = search.z.copy()
+
+    def fails(*_arguments: object) -> None:
+        raise SolveError("no equilibrium")
+
+    monkeypatch.setattr(FitSearch, "_evaluate", fails)
+    search.backtrack_to_base()
+    np.testing.assert_array_equal(search.z, z)
+
+
 def test_another_size_of_the_mesh_error_is_the_same_point(base, search):
     nuisances = base.nuisances
     fit = search.result()

@@ -194,8 +194,12 @@ class FitSearch:
         base = self._at_base(self.z)
         far = self.z
         for share in (0.5, 0.0):
-            between = base + share * (far - base)
-            if not self._accept_if_better(*self._trial(between, self.state)):
+            try:
+                better = self._accept_if_better(*self._trial(base + share * (far - base), self.state))
+            except (SolveError, InputError):
+                # a body that holds what acts with the tissue of the start need not do so with softer tissue
+                return
+            if not better:
                 return
 
     def minimise(self, enough: float = ENOUGH) -> None:
