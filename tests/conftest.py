@@ -16,7 +16,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 import hypothesis
 import pytest
 import warp as wp
-from drawn_for_commit import ALL, HALF, half_for_this_commit
+from drawn_for_commit import ALL, SOME, files_for_this_commit
 from verification_rows import Row, Rows
 
 from warpbrain.kernels.module import PRECISIONS, Precision
@@ -55,8 +55,8 @@ def pytest_collection() -> Iterator[None]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if HALF in os.environ and ALL not in os.environ:
-        _leave_half_of_the_slow(config, items)
+    if SOME in os.environ and ALL not in os.environ:
+        _leave_to_other_commits(config, items)
     for item in items:
         if "verify" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.verification)
@@ -64,13 +64,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=_slowness, reverse=True)
 
 
-def _leave_half_of_the_slow(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Slow tests of half of the files, which share what they set up, run with this commit."""
+def _leave_to_other_commits(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Slow tests of some files run with this commit: those of one file share what they set up."""
     seconds: dict[str, float] = defaultdict(float)
     for item in items:
         if item.get_closest_marker("slow"):
             seconds[_file(item)] += _slowness(item)
-    run = half_for_this_commit(seconds)
+    run = files_for_this_commit(seconds)
     left = {item for item in items if item.get_closest_marker("slow") and _file(item) not in run}
     config.hook.pytest_deselected(items=list(left))
     items[:] = [item for item in items if item not in left]

@@ -16,8 +16,10 @@ import numpy as np
 T = TypeVar("T")
 #: Variable of the environment of all processes of tests, set by `--verification-rows`.
 ALL = "ALL_SLOW_TESTS"
-#: Variable with which .ci/run leaves half of the files of slow tests to other commits.
-HALF = "HALF_OF_SLOW_TESTS"
+#: Variable with which .ci/run leaves most of the files of slow tests to other commits.
+SOME = "SOME_SLOW_TESTS"
+#: Processor seconds of the tests of a file from which it runs with one of four commits, not two.
+_LONG = 60.0
 
 
 @cache
@@ -39,11 +41,13 @@ def drawn_for_this_commit(of: int, count: int) -> list[int]:
     return sorted(np.random.default_rng(_seed()).choice(of, count, replace=False).tolist())
 
 
-def half_for_this_commit(seconds: Mapping[str, float]) -> set[str]:
-    """Half of some files of tests that take so long: of each two that take about as long, one or the other."""
+def files_for_this_commit(seconds: Mapping[str, float]) -> set[str]:
+    """Of each four files of tests that take more than a minute, and of each two others that take about as long, one."""
     slowest_first = sorted(seconds, key=lambda name: (-seconds[name], name))
-    pairs = [slowest_first[start : start + 2] for start in range(0, len(slowest_first), 2)]
-    return {pair[_seed(pair[0]) % len(pair)] for pair in pairs}
+    long = sum(taken > _LONG for taken in seconds.values())
+    groups = [slowest_first[start : min(start + 4, long)] for start in range(0, long, 4)]
+    groups += [slowest_first[start : start + 2] for start in range(long, len(slowest_first), 2)]
+    return {group[_seed(group[0]) % len(group)] for group in groups}
 
 
 def one_for_this_commit(of: Sequence[T]) -> list[T]:
