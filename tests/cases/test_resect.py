@@ -64,7 +64,7 @@ def test_it_is_said_whose_they_are_and_that_the_mesh_is_not(name):
 
 
 @pytest.mark.slow(65)
-# all 15: bench/real/resect.py; any of them with each commit: tests/subsets
+# all 15: bench/real/resect.py; any of them: tests/subsets
 @pytest.mark.parametrize("name", one_for_this_commit(["resect-01", "resect-14"]))
 def test_a_wrong_registration_is_no_missing_physics(name):
     found = Diagnosing(find_case(name), device="cpu").run()

@@ -49,6 +49,10 @@ def write_block(path, unit="mm", axes="RAS", mesh=None):
     return path
 
 
+# two processes would each make what these tests share
+pytestmark = pytest.mark.xdist_group("starting")
+
+
 @pytest.fixture(scope="module")
 def started(tmp_path_factory):
     for package in ("mmgpy", "nibabel"):

@@ -14,6 +14,9 @@ from warpbrain.inference.decide import NAMED, NAMED_AND_REST
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.mechanisms.traction import Traction
 
+# two processes would each make what these tests share
+pytestmark = pytest.mark.xdist_group("beside")
+
 
 @pytest.fixture(scope="module")
 def pressed(tmp_path_factory: pytest.TempPathFactory) -> Case:

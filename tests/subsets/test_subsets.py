@@ -62,7 +62,7 @@ def test_every_case_without_recordings_is_a_sentence(tmp_path):
         assert not (tmp_path / "out").exists()
 
 
-#: Subsets that are not empty, and how many of them are diagnosed with each commit: a try takes up to seven minutes.
+#: Subsets that are not empty, and how many of them are diagnosed at a time: a try takes up to seven minutes.
 _WITH_RECORDINGS, _WITH_EACH_COMMIT = 86, 1
 
 

@@ -22,6 +22,10 @@ from warpbrain.worlds.body.states import States
 _KINDS = ("gravity", "pressure", "swelling", "traction")
 
 
+# two processes would each make what these tests share
+pytestmark = pytest.mark.xdist_group("any frame")
+
+
 @pytest.fixture(scope="module")
 def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
     """The block that sinks, its nodes off their lattice, so that no two places are alike."""

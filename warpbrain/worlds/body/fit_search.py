@@ -190,16 +190,17 @@ class FitSearch:
         self._mesh_share = share
 
     def backtrack_to_base(self) -> None:
-        """Move tissue and field toward the base while that is better: far from it the linear model may fail."""
+        """Move tissue and field toward the base while that is better: far from it the linear model may fail.
+
+        The best point stays where there is no equilibrium on the way: the body may collapse with softer tissue.
+        """
         base = self._at_base(self.z)
         far = self.z
         for share in (0.5, 0.0):
             try:
-                better = self._accept_if_better(*self._trial(base + share * (far - base), self.state))
+                if not self._accept_if_better(*self._trial(base + share * (far - base), self.state)):
+                    return
             except (SolveError, InputError):
-                # a body that holds what acts with the tissue of the start need not do so with softer tissue
-                return
-            if not better:
                 return
 
     def minimise(self, enough: float = ENOUGH) -> None:
