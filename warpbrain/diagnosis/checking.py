@@ -267,10 +267,10 @@ def _sensors(checks: States, state: SolvedState, error: Difference | None) -> Se
     """What is checked beside a state; at times at which something else acts, beside the states of these."""
     case = checks.case_of(state.hypothesis)
     moments = Moments.of(case, checks.times)
-    ended = moments.cases[0] is case and not state.course and len({id(i.system) for i in state.instants}) == 1
+    ended = moments.cases[0] is case and state.creep is None and len({id(i.system) for i in state.instants}) == 1
     if ended or checks.times == (math.inf,):
         instants = tuple(replace(state.instants[-1], time=time) for time in checks.times)
-        return checks.corrected(replace(state, instants=instants), error).sensors
+        return checks.corrected(replace(state, instants=instants, creep=None), error).sensors
     return checks.solve(state.hypothesis, state.u, error).sensors
 
 

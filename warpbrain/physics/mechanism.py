@@ -28,7 +28,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Literal, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -184,6 +184,10 @@ class Facts:
         return mesh
 
 
+#: What a mechanism adds or changes.
+Changed = Literal["loads", "stiffness", "volumes"]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Mechanism(Ramped, abc.ABC):
     """A piece of physics that a case assumes."""
@@ -208,6 +212,9 @@ class Mechanism(Ramped, abc.ABC):
     switches: ClassVar[bool] = False
     #: Whether what it does changes in time while loads do not.
     changes_by_itself: ClassVar[bool] = False
+    #: What it adds or changes. In a body that creeps a load has its response by and by, another stiffness in proportion
+    #: to what has moved, and another volume at once: what relaxes is isochoric.
+    changes: ClassVar[Changed] = "stiffness"
     #: Whether a case can have several.
     several: ClassVar[bool] = False
     #: Whether it means something in a laboratory specimen between its grips.

@@ -211,9 +211,9 @@ class Proposal:
     #: have no face there stays as it is, and a ball that would hold no element is about the nearest one
     elsewhere: Callable[[Floats, float], Proposal] | None = None
     on_surface: bool = False  # whether that place is one of the surface
-    #: Of a fading one: from coefficients (k,) and the time since the load came [s] to how many times what it does at
-    #: once at `start` is there, in proportion to the first of them; nothing is left in the end
-    history: Callable[[Floats, float], float] | None = None
+    #: Of a fading one: from coefficients (k,) and times since strain came (...) [s] to how many times the stress that
+    #: it has at once at `start` is left (...), in proportion to the first of them; nothing is in the end
+    history: Callable[[Floats, Floats], Floats] | None = None
     #: Of a course: from coefficients to how many times faster than at `start` all of it goes
     pace: Callable[[Floats], float] | None = None
     centre: Floats | None = None  # (3,), where it acts, if somewhere [m]

@@ -74,17 +74,6 @@ def test_another_size_of_the_mesh_error_is_the_same_point(base, search):
     np.testing.assert_allclose(search.residual + search.columns @ search.z, linear, atol=1e-12)
 
 
-def test_where_the_stiffness_field_stays_its_step_is_none(base, search):
-    field = search._layout.field
-    columns = np.random.default_rng(3).normal(size=search.columns[:, field].shape)
-    search.columns = search.columns.copy()
-    search.columns[:, field] = base.noise[:, None] * columns
-    step, _ = search._gauss_newton_step(True)
-    assert not step[field].any()
-    assert np.delete(step, np.r_[field]).any()
-    assert search._gauss_newton_step(False)[0][field].any()
-
-
 def test_a_fit_begins_at_that_of_a_subset(sets, base, search):
     search.minimise()
     fit = search.result()

@@ -31,7 +31,7 @@ from warpbrain.kernels.following_pressure import pressure_kernels
 from warpbrain.mesh import TetMesh, faces_of, rim_edges
 from warpbrain.mesh.integrals import triangle_rule
 from warpbrain.mesh.surface import SIDES
-from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, Reading, parameter
+from warpbrain.physics.mechanism import Changed, Expectation, Mechanism, ParameterError, Reading, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_with
@@ -63,6 +63,7 @@ class Pressure(Mechanism):
     kind: ClassVar[str] = "pressure"
     quadratic: ClassVar[bool] = True
     enters: ClassVar[Enters] = Enters("beside", "W_pressure")
+    changes: ClassVar[Changed] = "loads"
     together: ClassVar[Mapping[str, str]] = {
         "pressure": "A face of both node sets carries the sum.",
         "resection": "It acts on the faces of the node set that the surface of what is left has.",

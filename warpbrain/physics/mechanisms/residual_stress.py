@@ -15,7 +15,7 @@ import numpy as np
 import warp as wp
 
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.mechanism import Expectation, Mechanism, parameter
+from warpbrain.physics.mechanism import Changed, Expectation, Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import element_directions, elements_of, unit_vector
@@ -74,6 +74,7 @@ class ResidualStress(Mechanism):
     quadratic: ClassVar[bool] = True
     of_specimens: ClassVar[bool] = True
     enters: ClassVar[Enters] = Enters("tension", "T")
+    changes: ClassVar[Changed] = "loads"
     together: ClassVar[Mapping[str, str]] = {
         "inclusion": "A tension is a stress that is said in Pa, no modulus: it stays.",
         "swelling": "The tension is that of the swollen tissue, along the grown direction.",

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.mechanism import Expectation, Mechanism, parameter
+from warpbrain.physics.mechanism import Changed, Expectation, Mechanism, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Place, Proposal, Situation
 from warpbrain.physics.regions import region_weights
@@ -46,6 +46,7 @@ class Swelling(Mechanism):
     kind: ClassVar[str] = "swelling"
     of_specimens: ClassVar[bool] = True
     enters: ClassVar[Enters] = Enters("growth", "g")
+    changes: ClassVar[Changed] = "volumes"
     together: ClassVar[Mapping[str, str]] = {
         "inclusion": "The moduli are those of the swollen tissue.",
         "cavity": "What swells is what is left.",

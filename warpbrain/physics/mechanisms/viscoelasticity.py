@@ -173,10 +173,10 @@ def _spectrum(c: Floats) -> tuple[Floats, Floats]:
     return np.array([first, 1.0 - first]), np.exp(c[1:3])
 
 
-def _left(c: Floats, time: float) -> float:
-    """Modulus that has not relaxed at a time [s], as a proposal has it: that of strain that is held."""
+def _left(c: Floats, time: Floats) -> Floats:
+    """Modulus that has not relaxed at times (...) [s], as a proposal has it: that of strain that is held."""
     shares, times = _spectrum(c)
-    return float(c[0] * (shares @ np.exp(-time / times)))
+    return np.asarray(c[0] * (np.exp(-time[..., None] / times) @ shares))
 
 
 def _time_in_words(value: Value) -> str:

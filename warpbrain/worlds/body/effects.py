@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any, cast
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Floats
 from warpbrain.errors import InputError
 from warpbrain.physics.load import Load
 from warpbrain.physics.mechanism import Following, Growing, Mechanism, Substituting, Weakening
@@ -19,6 +19,7 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.model import substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
+from warpbrain.worlds.body.creep import Changes, crept
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.sensors import Sensors, row_products
 from warpbrain.worlds.body.states import SolvedState, States
@@ -221,12 +222,13 @@ class Effects:
     def _over_time(self, proposal: Proposal, by_moment: Sequence[Effect]) -> Effect:
         """The effect over all rows: of each state at its time, less at that from which it is counted."""
         varying, effect = proposal.over_time, by_moment[0]
-        if varying is None and len(by_moment) == 1:
+        if varying is None and self.at.is_at_one_time:
             return effect
+        changes = _changes(proposal, effect)
 
         def total(of: Callable[[Effect, Moment], Floats]) -> Floats:
             effects = iter(by_moment)
-            return self.at.summed(lambda moment: of(next(effects), moment))
+            return self.at.summed(lambda moment: of(next(effects), moment), changes)
 
         def columns(e: Effect, moment: Moment) -> Floats:
             return e.columns if varying is None else _expanded(e.columns, varying, moment.times)
@@ -267,7 +269,7 @@ class Effects:
         sensors = self.at.sensors
 
         def change(c: Floats) -> Floats:
-            return instant * faded(parts_of(proposal, c, sensors), sensors.is_displacement)
+            return instant * faded(proposal, c, sensors)
 
         axes = _STEP * np.diag(proposal.sd)
         columns = [(change(proposal.mean + axis) - change(proposal.mean - axis)) / (2.0 * _STEP) for axis in axes]
@@ -395,6 +397,14 @@ class Effects:
         return change
 
 
+def _changes(proposal: Proposal, effect: Effect) -> Changes:
+    """What a proposal changes; `effect`: of one time."""
+    # a course of its own, or a state that was solved for at each time
+    if proposal.history is not None or proposal.pace is not None or effect.is_solved:
+        return "known"
+    return proposal.make(proposal.mean).changes
+
+
 def _expanded(columns: Floats, varying: Varying, times: Floats) -> Floats:
     """Columns (n, k) of what acts at one time as those of modes, for rows at times (n,)."""
     changing = row_products(columns[:, list(varying.base.varying)], varying.modes_at(times))
@@ -412,7 +422,7 @@ def columns_over_time(at: Linearisation, proposal: Proposal, c: Floats) -> Float
         [effect] = Effects(moment.at).of([smooth], varying.base.make(here))
         return _expanded(effect.columns, varying, moment.times)
 
-    return at.summed(about)
+    return at.summed(about, varying.base.make(varying.base.mean).changes)
 
 
 def _sd_of(proposal: Proposal, varying: Varying) -> Floats:
@@ -444,29 +454,19 @@ def _faces(kind: Hashable) -> frozenset[type]:
     return frozenset(face for face in _ACTING if issubclass(cast(type, kind), face))
 
 
-def faded(parts: Floats, is_displacement: Bools) -> Floats:
-    """Factor on the instantaneous effect of a fading proposal where it is present so many times (n,).
+def faded(proposal: Proposal, c: Floats, sensors: Sensors) -> Floats:
+    """Part (n,) of the instantaneous effect of a fading proposal that there is when a number was recorded.
 
-    Tissue that is `1 + p` times as stiff has forces larger by `p`, and displacements smaller by `p / (1 + p)`.
+    Of forces the part that has not relaxed; of displacements, under loads that stay, that to which they have not crept.
     """
-    return np.asarray(np.where(is_displacement, parts / (1.0 + np.maximum(parts, 0.0)), parts))
-
-
-def parts_of(proposal: Proposal, c: Floats, sensors: Sensors) -> Floats:
-    """How many times its instantaneous stiffness a fading proposal has (n,) when each number was recorded."""
     assert proposal.history is not None
+    left = partial(proposal.history, c)
     times, rows = np.unique(sensors.times, return_inverse=True)
-    parts = [proposal.history(c, time) if np.isfinite(time) else 0.0 for time in times.tolist()]
-    return np.array(parts)[rows]
-
-
-def relaxation_factor(effects: Sequence[Effect], coefficients: Sequence[Floats], sensors: Sensors) -> Floats:
-    """How many times its effect in the end (n, 1) tissue has when a number was recorded, where stress still relaxes."""
-    stiffness = np.ones(len(sensors))
-    for effect, z in zip(effects, coefficients, strict=True):
-        if effect.proposed.history is not None:
-            stiffness += np.maximum(parts_of(effect.proposed, effect.coefficients(z), sensors), 0.0)
-    return np.where(sensors.is_displacement, 1.0 / stiffness, stiffness)[:, None]
+    # softer tissue, as columns ask for, has no course of its own
+    creeps = float(left(np.zeros(1))[0]) > 0.0
+    relaxed = np.where(np.isfinite(times), left(np.where(np.isfinite(times), times, 0.0)), 0.0)
+    behind = [1.0 - crept(left, time) if np.isfinite(time) else 0.0 for time in times.tolist()] if creeps else relaxed
+    return np.where(sensors.is_displacement, np.asarray(behind)[rows], relaxed[rows])
 
 
 def _effect_of_course(proposal: Proposal, course: Course) -> Effect:

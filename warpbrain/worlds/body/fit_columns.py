@@ -11,13 +11,12 @@ from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.errors import SolveError
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.dictionary import is_linear
-from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, relaxation_factor, width_of
+from warpbrain.worlds.body.effects import Effect, Effects, column_slices, columns_over_time, width_of
 from warpbrain.worlds.body.evidence import Sizes
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.mesh_error import MeshErrors
 from warpbrain.worlds.body.nuisances import (
     FIELD,
-    ISOCHORIC,
     LAW,
     Nuisances,
     field_columns,
@@ -94,10 +93,9 @@ def columns_about(
     Returns columns (n, q), and the linear model. `SolveError` if the state is unstable or a mechanism not linear there.
     """
     at, columns = state.linearised(), columns.copy()
-    relaxed = relaxation_factor(effects, [z[part] for part in layout.effects], state.sensors)
-    tissue = relaxed * tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
+    tissue = tissue_columns(at, base.states, state.hypothesis.theta, base.prior)
     columns[:, layout.tissue] = tissue + mesh_by_tissue(state.sensors, mesh_errors)
-    columns[:, layout.field] = layout.field_size * relaxed * field_columns(at, base.states)
+    columns[:, layout.field] = layout.field_size * field_columns(at, base.states)
     made = Effects(at)
     first = layout.coefficients.start
     for effect, part in zip(effects, layout.effects, strict=True):
@@ -145,8 +143,6 @@ def shape_columns_about(
     deforms. It is not where a mechanism strains tissue by half, and would be taken for a cause. The column of a
     `SharedParameter` is zero.
     """
-    relaxed, columns = relaxation_factor(effects, coefficients, at.sensors), law_columns(Effects(at), states)
-    # branches are isochoric: what another bulk modulus does is the same at all times, as far as tissue hardly gives way
-    columns[:, ISOCHORIC] *= relaxed
+    columns = law_columns(Effects(at), states)
     columns[:, [each.column for each in map(shared_parameter, effects) if each is not None]] = 0.0
     return np.hstack([columns, columns_of_other_shapes(at, effects, coefficients)])

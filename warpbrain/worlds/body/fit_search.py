@@ -42,8 +42,6 @@ _SHORTER, _SHORT = 0.1, 0.5
 _RELINEARISE = 0.3
 #: The same at the end of a search: rounding decides which step is the last one, and the result must not depend on it.
 _NEAR = 0.1
-#: Step [standard deviations] of a difference between states.
-_DIFFERENCE = 0.05
 #: Earlier states from which the next one is extrapolated at most.
 _KEPT = 9
 #: Steps that are expected to gain less of the log posterior density than this end the search (half the square of
@@ -206,19 +204,14 @@ class FitSearch:
     def minimise(self, enough: float = ENOUGH) -> None:
         """Go to the best point nearby by Gauss-Newton's method, with columns made anew on the way.
 
-        Where something relaxes, columns of a state that does not help are replaced by differences of states: tissue
-        that is several times as stiff at first is no small change of what it is in the end.
-
         `enough`: what a step has to gain to be taken.
         """
-        self.converged, by_differences, elsewhere = False, False, np.full(len(self.z), np.inf)
+        self.converged, elsewhere = False, np.full(len(self.z), np.inf)
         for iteration in range(_ITERATIONS):
             if self._outdated or (iteration > 0 and self._moved() > _RELINEARISE):
                 self._relinearise()
-                if by_differences:
-                    self.columns = self._difference_columns()
             self.columns = self._rigid.renewed(self.columns, self.state.sensors, self.z)
-            (step, gain), current = self._gauss_newton_step(by_differences), np.array_equal(self._linearised_at, self.z)
+            (step, gain), current = self._gauss_newton_step(), np.array_equal(self._linearised_at, self.z)
             if gain < enough:
                 self.converged = not _NEAR < self._moved() < np.inf
                 if self.converged or enough > ENOUGH:
@@ -232,10 +225,7 @@ class FitSearch:
             elif gained < ENOUGH:
                 # what is left is rounding, or no better point lies this way: the last good one stands
                 self.converged = gain < _ROUNDING
-                relaxing = any(effect.proposed.history for effect in self.effects)
-                if self.converged or by_differences or not relaxing:
-                    return
-                by_differences, self._linearised_at = True, elsewhere
+                return
 
     def _moved(self) -> float:
         """How far the best point is from where its columns were made [standard deviations]; infinite if not known.
@@ -246,7 +236,7 @@ class FitSearch:
 
     def expected_gain(self) -> float:
         """Of the log posterior density by another step, in the linear model."""
-        return self._gauss_newton_step(False)[1]
+        return self._gauss_newton_step()[1]
 
     def update_noise(self, fit: Refit) -> None:
         """Take noise, gross errors, the mesh's unknown error and the size of the stiffness field of a result."""
@@ -379,16 +369,13 @@ class FitSearch:
         self._U[:, part] = self.columns[:, part] = columns
         self._renew(residual)
 
-    def _gauss_newton_step(self, field_stays: bool) -> tuple[Floats, float]:
+    def _gauss_newton_step(self) -> tuple[Floats, float]:
         """The step and what it gains in the linear model.
-
-        Without the stiffness field, whose columns are rough where something relaxes, if that stays.
 
         Coordinates at a limit that the step would leave stay there (projected Newton, Bertsekas 1982): clipped with the
         others as they are, the step need not be downhill.
         """
         free, limited = np.ones(len(self.z), dtype=bool), np.zeros(len(self.z), dtype=bool)
-        free[self._layout.field] = not field_stays
         limited[self._layout.tissue] = limited[self._layout.field] = True
         limited &= np.abs(self.z) >= belief("tissue.farthest") * (1.0 - 1e-9)
         white = self._noise.whitened(np.column_stack([self.residual, self.columns]))
@@ -531,15 +518,3 @@ class FitSearch:
             return
         self.columns, self._nearby = columns, at
         self._about = at, tuple(self.z[part] for part in self._layout.effects)
-
-    def _difference_columns(self) -> Floats:
-        """Columns with those of tissue and mechanisms as differences between states."""
-        columns = self.columns.copy()
-        numbers = np.arange(len(self.z))
-        for k in (*numbers[self._layout.tissue].tolist(), *numbers[self._layout.coefficients].tolist()):
-            shifted = self.z + _DIFFERENCE * np.eye(1, len(self.z), k)[0]
-            try:
-                columns[:, k] = (self.residual - self._evaluate(shifted, self.state)[1]) / _DIFFERENCE
-            except (SolveError, InputError):
-                continue
-        return columns

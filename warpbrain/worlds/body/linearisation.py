@@ -39,6 +39,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.multisecant import toward_equilibrium
 from warpbrain.simulation.system import System
 from warpbrain.threads import fill_columns, in_threads
+from warpbrain.worlds.body.creep import Changes, Creep, Reached
 from warpbrain.worlds.body.factors import Factors
 from warpbrain.worlds.body.sensors import Sensors
 
@@ -181,6 +182,7 @@ class Moment:
     rows: Ints  # (k,)
     times: Floats  # (k,), of these rows [s]
     sign: float  # -1 if they are counted from it
+    reached: Reached
 
 
 class Linearisation:
@@ -203,6 +205,8 @@ class Linearisation:
         self._equilibria = 0
         # time, linear model and share of the end of each state, where several count
         self._states: tuple[tuple[float, Linearisation, float], ...] = ()
+        # where the state is the end of a course, which was followed to it
+        self._creep: Creep | None = None
         system.u.assign(u)
         S, skew = system.stiffness().tocsr(), system.skew_stiffness()
         free = ~system.model.constrained.ravel()
@@ -220,8 +224,15 @@ class Linearisation:
         `states`: of each time [s] that time, the linear model about its state, and the part of the last state that it
         is.
         """
+        return self._with(_states=tuple(states))
+
+    def after(self, creep: Creep) -> Linearisation:
+        """The same where the state is the end of a course over time, on which rows were recorded."""
+        return self._with(_creep=creep)
+
+    def _with(self, **changed: Any) -> Linearisation:
         other = copy.copy(self)
-        other._states = tuple(states)
+        other.__dict__.update(changed)
         other.__dict__.pop("_moments", None)
         return other
 
@@ -230,12 +241,21 @@ class Linearisation:
         """By the time of the state; one where all rows are of one state, counted from rest."""
         sensors = self.sensors
         # not kept: a model that knows itself would keep its factors
-        return self._moments or (Moment(-1, math.inf, self, np.arange(len(sensors)), sensors.times, 1.0),)
+        every, whole = np.arange(len(sensors)), Reached(*np.ones((2, len(sensors))))
+        return self._moments or (Moment(-1, math.inf, self, every, sensors.times, 1.0, whole),)
+
+    @property
+    def is_at_one_time(self) -> bool:
+        """Whether all rows are of one state, which did not creep to where it is."""
+        return not self._moments
 
     @cached_property
     def _moments(self) -> tuple[Moment, ...]:
-        """Where there are several states; else none."""
+        """Where there are several states, or it was followed over time; else none."""
         sensors, moments = self.sensors, []
+        if self._creep is not None and not self._states:
+            reached, every = self._creep.at(sensors.after, sensors.is_displacement), np.arange(len(sensors))
+            return (Moment(-1, math.inf, self._with(_creep=None), every, sensors.times, 1.0, reached),)
         for number, (time, about, share) in enumerate(self._states):
             last = number == len(self._states) - 1
             for sign, of_rows in ((1.0, sensors.after), (-1.0, sensors.before)):
@@ -243,27 +263,30 @@ class Linearisation:
                 if len(rows):
                     model = about.with_sensors(replace(sensors.of_rows(rows, time), share=share))
                     times = np.full(len(rows), time)
-                    moments.append(Moment(number, time, model.in_time(()), rows, times, sign))
+                    lengths, single = sensors.is_displacement[rows], model._with(_states=(), _creep=None)
+                    if self._creep is None:
+                        reached = Reached(*np.ones((2, len(rows))))
+                    else:
+                        reached = self._creep.at(of_rows[rows], lengths)
+                    moments.append(Moment(number, time, single, rows, times, sign, reached))
         return tuple(moments)
 
-    def summed(self, answer: Callable[[Moment], Floats]) -> Floats:
+    def summed(self, answer: Callable[[Moment], Floats], changes: Changes) -> Floats:
         """What something changes of each row (n, ...): at its time, less at that from which it is counted.
 
-        `answer`: from the state of one time to what it changes of the rows of that.
+        `answer`: from the state of one time to what it changes of the rows of that. `changes`: what it is.
         """
-        changes = [(moment, answer(moment)) for moment in self.moments]
-        total = np.zeros((len(self.sensors), *changes[0][1].shape[1:]))
-        for moment, change in changes:
-            total[moment.rows] += moment.sign * change
+        answers = [(moment, answer(moment)) for moment in self.moments]
+        total = np.zeros((len(self.sensors), *answers[0][1].shape[1:]))
+        for moment, of_rows in answers:
+            reached = moment.sign * moment.reached.by(changes)
+            total[moment.rows] += reached.reshape(-1, *[1] * (of_rows.ndim - 1)) * of_rows
         return total
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:
         """The same state with other sensors, without factorising again."""
-        other = copy.copy(self)
-        other.sensors = sensors
-        other._surface_responses, other._equilibria = {}, 0
-        for name in ("_rows", "_moments"):
-            other.__dict__.pop(name, None)
+        other = self._with(sensors=sensors, _surface_responses={}, _equilibria=0)
+        other.__dict__.pop("_rows", None)
         return other
 
     @cached_property

@@ -101,6 +101,6 @@ class FinerStates:
         there is no equilibrium on the finer mesh.
         """
         uniform = replace(hypothesis, field=np.zeros_like(hypothesis.field))
-        coarse = self.states.solve(uniform, nearby.u)
+        coarse = self.states.solve(uniform, nearby.u, in_the_end=True)
         case = self.states.case_of(uniform)
         return self._finer.difference(case, uniform.theta, coarse.system, coarse.u, coarse.reactions, tolerance)

@@ -33,8 +33,6 @@ from warpbrain.worlds.body.states import FieldSizes, Hypothesis, States
 LAW = "shape of the law"
 #: Beliefs of its first columns, each of which is a mechanism that every tissue has to a degree.
 _ALWAYS = ("tissue.volume", "tissue.exponent")
-#: Those of its columns that change the isochoric part of the law alone: all but the volume.
-ISOCHORIC = slice(1, None)
 #: The family of stiffness that varies from place to place.
 FIELD = "stiffness field"
 #: The family of what is not known of the case's loads.
@@ -181,12 +179,12 @@ def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaus
         system.set_model(system.model.with_materials(states.parameters.materials(theta)))
         return state.answers(forces) @ prior.factor
 
-    return at.summed(about)
+    return at.summed(about, "stiffness")
 
 
 def field_columns(at: Linearisation, states: States) -> Floats:
     """What one standard deviation of each mode of the stiffness field changes of what is recorded: (n, k)."""
-    return at.summed(lambda moment: moment.at.answers_of_elements(moment.at.element_forces, states.modes))
+    return at.summed(lambda moment: moment.at.answers_of_elements(moment.at.element_forces, states.modes), "stiffness")
 
 
 def law_columns(effects: Effects, states: States) -> Floats:
@@ -269,7 +267,7 @@ def load_columns(at: Linearisation) -> Floats:
             columns[:, 1] = direct + state.answers(np.where(model.constrained, 0.0, -forces))
         return belief("loads.size") * columns
 
-    columns = at.summed(about)
+    columns = at.summed(about, "loads")
     return columns[:, columns.any(axis=0)]
 
 

@@ -61,7 +61,7 @@ class PlaceCoordinates:
             [moved] = Effects(moment.at).of([moving], moving.make(none), columns_alone=True)
             return moved.columns
 
-        return at.summed(about)
+        return at.summed(about, self.proposed.make(self.proposed.mean).changes)
 
 
 @dataclass(frozen=True, eq=False)

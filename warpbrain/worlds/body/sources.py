@@ -112,7 +112,7 @@ def _sources(
     `range_of_lengths`: the smallest and the largest length [m]. `size`: as of `sources`.
     """
     columns_about = _force_columns if is_force else _stress_columns
-    columns = at.summed(lambda moment: columns_about(moment.at, centres, length))  # (n, 6, s)
+    columns = at.summed(lambda moment: columns_about(moment.at, centres, length), "loads")  # (n, 6, s)
     if not columns.any():
         # between two states that are the same a constant load moves nothing, whatever its size
         return []

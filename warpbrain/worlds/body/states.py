@@ -40,6 +40,7 @@ from warpbrain.simulation.quasi_static import follow_slowly
 from warpbrain.simulation.system import System
 from warpbrain.threads import beside
 from warpbrain.worlds.body.consolidation import bound_term, consolidation
+from warpbrain.worlds.body.creep import Creep
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import Sensors, spread_points
 from warpbrain.worlds.body.surfaces import with_free_surfaces
@@ -124,16 +125,20 @@ class SolvedState:
     course: tuple[Floats, ...] = ()
     #: The state at each of the times, of which `system`, `u` and `reactions` are the last.
     instants: tuple[Instant, ...] = ()
+    #: Where tissue relaxes, or fluid flows, on the way to that state.
+    creep: Creep | None = None
 
     def linearised(self, sensors: Sensors | None = None) -> Linearisation:
         """The linear model about the state; of its own sensors unless given.
 
-        A state that was followed over time is linear about its end.
+        A state that was followed over time is linear about its end, as if nothing relaxed any more (`Creep`).
 
         `SolveError` if it is unstable.
         """
         sensors = self.sensors if sensors is None else sensors
         last = Linearisation(self.system, self.u, self.reactions, sensors)
+        if self.creep is not None:
+            last = last.after(self.creep)
         systems = {id(instant.system) for instant in self.instants}
         if sensors.is_counted_from_rest and (self.course or len(systems) <= 1):
             return last
@@ -216,26 +221,30 @@ class States:
         iterations: int = EquilibriumOptions.max_total_newton,
         nearby: Linearisation | None = None,
         known: Floats | None = None,
+        in_the_end: bool = False,
     ) -> SolvedState:
         """The equilibrium under a hypothesis.
 
         `start` (N, 3): a displacement [m] that is near to it. `expected`: error of the mesh, by which the sensors are
         corrected. `course`: of a state that is near to it, if it is followed over time. `iterations`: of Newton's
         method in all, after which there is taken to be none. `nearby`: of a state that is near to it. `known` (N, 3): a
-        state [m] on whose branch it is to be, see `_equilibrium`. `InputError` if a law is not stable, `SolveError` if
+        state [m] on whose branch it is to be, see `_equilibrium`. `in_the_end`: when nothing relaxes or flows any more,
+        whatever was recorded before. `InputError` if a law is not stable, `SolveError` if
         there is none.
         """
         system = self._system(hypothesis)
         flowing = self._flowing(hypothesis, system)
-        if flowing is not None:
+        if flowing is not None and not in_the_end:
             others = tuple(mechanism for mechanism in hypothesis.mechanisms if mechanism is not flowing)
             end = self.solve(replace(hypothesis, mechanisms=others), start, expected, (), iterations, nearby, known)
             return _on_the_way(end, hypothesis, flowing)
         self.solves += 1
         # relaxing stress or a fluid of the case's own: no other memory of a term changes a state in time
-        in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
+        in_time = not in_the_end
+        in_time &= any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
         options = EquilibriumOptions(tolerance=TOLERANCE, max_total_newton=iterations)
         taken: tuple[Floats, ...] = ()
+        creep: Creep | None = None
         if in_time and np.isfinite(self.times).all():
             starts, factors = course or (() if start is None else (start,)), self._factors_of(system)
             moments = follow_slowly(system, steps_to(self.times), options, near=starts, factors=factors)
@@ -244,11 +253,27 @@ class States:
             instants = [
                 self._instant(time, system, by_time[time], system.model.external_forces(time)) for time in self.times
             ]
+            creep = self._creep(instants, options)
         else:
             instants = self._at_rest(hypothesis, system, start, options, nearby, known)
-        sensors = self._sensors(instants, expected)
+        sensors = self._sensors(instants, creep, expected)
         last = instants[-1]
-        return SolvedState(hypothesis, last.system, last.u, last.reactions, sensors, taken, tuple(instants))
+        return SolvedState(hypothesis, last.system, last.u, last.reactions, sensors, taken, tuple(instants), creep)
+
+    def _creep(self, instants: Sequence[Instant], options: EquilibriumOptions) -> Creep:
+        """On the way to the last instant; from then on its system is in equilibrium, and has no memory."""
+        last = end = instants[-1]
+        external = last.system.model.external_forces()
+        try:
+            end = self._instant(
+                np.inf, last.system, self._equilibrium(last.system, external, last.u, options, None), external
+            )
+        except SolveError:
+            # what still relaxes keeps it from collapse: then the last instant is all that is known
+            last.system.set_time_step(np.inf)
+            last.system.forget()
+        by_loads, of_reactions = _parts(instants, end)
+        return Creep(by_loads, _parts(instants, last)[0], of_reactions)
 
     def _at_rest(
         self,
@@ -333,21 +358,19 @@ class States:
 
     def corrected(self, state: SolvedState, expected: Difference | None) -> SolvedState:
         """A state with sensors where it is without the error of the mesh."""
-        return replace(state, sensors=self._sensors(state.instants, expected))
+        return replace(state, sensors=self._sensors(state.instants, state.creep, expected))
 
-    def _sensors(self, instants: Sequence[Instant], expected: Difference | None) -> Sensors:
-        u, reactions = ([getattr(instant, name) for instant in instants] for name in ("u", "reactions"))
-        shares = np.array([_projection(each, u[-1]) for each in u])
+    def _sensors(self, instants: Sequence[Instant], creep: Creep | None, expected: Difference | None) -> Sensors:
+        u, reactions = (np.array([getattr(instant, name) for instant in instants]) for name in ("u", "reactions"))
+        parts = _parts(instants, instants[-1]) if creep is None else (creep.by_loads, creep.of_reactions)
         if expected is not None:
             # known for the end; earlier in proportion to the state
-            of_reactions = [_projection(each, reactions[-1]) for each in reactions]
-            u = [each + share * expected.u for each, share in zip(u, shares, strict=True)]
-            pairs = zip(reactions, of_reactions, strict=True)
-            reactions = [each + share * expected.reactions for each, share in pairs]
+            of_u, of_reactions = (part[:, None, None] for part in parts)
+            u, reactions = u + of_u * expected.u, reactions + of_reactions * expected.reactions
         sensors = self.observations.at(np.concatenate(u), np.concatenate(reactions), self.centre)
-        share = shares[sensors.after] - np.where(sensors.before < 0, 0.0, shares[sensors.before])
-        if len({id(instant.system) for instant in instants}) > 1 or not sensors.is_counted_from_rest:
-            sensors = replace(sensors, share=share)
+        of_rows = (part[sensors.after] - np.where(sensors.before < 0, 0.0, part[sensors.before]) for part in parts)
+        share = np.where(sensors.is_displacement, *of_rows)
+        sensors = replace(sensors, share=share)
         return sensors if expected is None else sensors.with_change(share * sensors.answer_within(expected.surplus))
 
     def _factors_of(self, system: System) -> KeptFactors:
@@ -377,12 +400,20 @@ def _on_the_way(end: SolvedState, hypothesis: Hypothesis, flowing: Mechanism) ->
     Step by step it takes minutes, and a fit has a hundred states. What is recorded before the end is 4 to 8 % off.
     """
     change = consolidation(end.linearised(), cast(Following, flowing)).at(1.0)
-    sensors = replace(end.sensors, residual=end.sensors.residual - change, computed=end.sensors.computed + change)
-    return replace(end, hypothesis=hypothesis, sensors=sensors)
+    sensors = end.sensors.with_change(change)
+    rows = [sensors.is_displacement & (sensors.after == number) for number in range(len(end.instants))]
+    of_u = np.array([_projection(sensors.computed[of_time], end.sensors.computed[of_time]) for of_time in rows])
+    return replace(end, hypothesis=hypothesis, sensors=sensors, creep=Creep(of_u, of_u, np.ones(len(of_u))))
+
+
+def _parts(instants: Sequence[Instant], end: Instant) -> tuple[Floats, Floats]:
+    """Of displacement and reactions at the end that there are at each instant (t,)."""
+    of_u = np.array([_projection(each.u, end.u) for each in instants])
+    return of_u, np.array([_projection(each.reactions, end.reactions) for each in instants])
 
 
 def _projection(field: Floats, whole: Floats) -> float:
-    """Coefficient of the projection of a field (N, 3) on another one."""
+    """Coefficient of the projection of a field on another one of its shape."""
     square = float(np.vdot(whole, whole))
     return float(np.vdot(field, whole)) / square if square > 0.0 else 1.0
 

@@ -23,7 +23,7 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.inference.causes import Hypothesis
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.causes import UNKNOWN
-from warpbrain.worlds.body.effects import Effect, column_slices, relaxation_factor, width_of
+from warpbrain.worlds.body.effects import Effect, column_slices, width_of
 from warpbrain.worlds.body.evidence import SetMarginal, evidence_of
 from warpbrain.worlds.body.mesh_error import ENOUGH, FinerStates, MeshErrors, expected_answer
 from warpbrain.worlds.body.nuisances import LAW, shared_parameter
@@ -105,8 +105,7 @@ def mesh_share_of(
     gradient = scaled / square if any(sized) else np.zeros(len(scaled))
     constant = float(gradient @ mean) if any(sized) else 1.0
     sensors = state.sensors
-    whole = relaxation_factor(effects, coefficients, sensors)[:, 0] * expected_answer(sensors, error)
-    return MeshShare(whole - expected_answer(sensors, of_tissue), gradient, constant)
+    return MeshShare(expected_answer(sensors, error) - expected_answer(sensors, of_tissue), gradient, constant)
 
 
 def _size(effect: Effect, z: Floats) -> Floats:
