@@ -18,8 +18,10 @@ T = TypeVar("T")
 ALL = "ALL_SLOW_TESTS"
 #: Variable with which .ci/run leaves most of the files of slow tests to other commits.
 SOME = "SOME_SLOW_TESTS"
-#: Processor seconds of the tests of a file from which it runs with one of four commits, not two.
+#: Processor seconds of the tests of a file from which it runs with one of eight commits, not four.
 _LONG = 60.0
+#: Of how many files one runs with a commit.
+_OF_LONG, _OF_OTHERS = 8, 4
 
 
 @cache
@@ -42,11 +44,11 @@ def drawn_for_this_commit(of: int, count: int) -> list[int]:
 
 
 def files_for_this_commit(seconds: Mapping[str, float]) -> set[str]:
-    """Of each four files of tests that take more than a minute, and of each two others that take about as long, one."""
+    """Of each eight files of tests that take more than a minute, and of each four others that take about as long, one."""
     slowest_first = sorted(seconds, key=lambda name: (-seconds[name], name))
     long = sum(taken > _LONG for taken in seconds.values())
-    groups = [slowest_first[start : min(start + 4, long)] for start in range(0, long, 4)]
-    groups += [slowest_first[start : start + 2] for start in range(long, len(slowest_first), 2)]
+    groups = [slowest_first[start : min(start + _OF_LONG, long)] for start in range(0, long, _OF_LONG)]
+    groups += [slowest_first[start : start + _OF_OTHERS] for start in range(long, len(slowest_first), _OF_OTHERS)]
     return {group[_seed(group[0]) % len(group)] for group in groups}
 
 
