@@ -5,22 +5,12 @@ A kind is a file with a class of its own that derives from `Recording`, and its 
 
 from __future__ import annotations
 
-from warpbrain.recordings.base import Recording, TrackedPoints
-from warpbrain.recordings.force import ForceRecording
-from warpbrain.recordings.points import PointsRecording
-from warpbrain.recordings.surface import SurfaceRecording
-from warpbrain.recordings.test import TestRecording, turn_of
-
-__all__ = [
-    "RECORDINGS",
-    "ForceRecording",
-    "PointsRecording",
-    "Recording",
-    "SurfaceRecording",
-    "TestRecording",
-    "TrackedPoints",
-    "turn_of",
-]
+from warpbrain.recordings.base import Recording as Recording
+from warpbrain.recordings.base import TrackedPoints as TrackedPoints
+from warpbrain.recordings.force import ForceRecording as ForceRecording
+from warpbrain.recordings.points import PointsRecording as PointsRecording
+from warpbrain.recordings.surface import SurfaceRecording as SurfaceRecording
+from warpbrain.recordings.test import TestRecording as TestRecording
 
 #: By the names that `case.toml` gives them.
 RECORDINGS: dict[str, type[Recording]] = {

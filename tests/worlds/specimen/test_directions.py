@@ -11,7 +11,7 @@ from warpbrain.cases.specimen import Specimen
 from warpbrain.cases.writing import write_case
 from warpbrain.errors import InputError
 from warpbrain.physics.mechanisms.fibres import Fibres
-from warpbrain.recordings.recording import turn_of
+from warpbrain.recordings.test import turn_of
 from warpbrain.simulation.specimen import Rig
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
