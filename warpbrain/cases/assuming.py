@@ -1,7 +1,5 @@
 """Mechanisms that are said in one line, as on the command line: `gravity:level=60`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from pathlib import Path

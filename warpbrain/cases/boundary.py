@@ -1,7 +1,5 @@
 """What is assumed to act on sets of nodes: one class a kind, plain data in SI units and RAS axes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar

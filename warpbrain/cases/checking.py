@@ -1,8 +1,6 @@
 """Checks a case completely: what is wrong with it, how good its mesh is, what a person should look at again, and
 whether its recordings hold enough numbers: the one count that all commands share."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Laws of a case's tissues from the generative model: a draw of its prior, or the middle of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

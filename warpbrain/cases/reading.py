@@ -1,7 +1,5 @@
 """Reads a case folder, checking everything before anything is computed."""
 
-from __future__ import annotations
-
 import math
 import os
 from pathlib import Path

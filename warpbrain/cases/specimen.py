@@ -1,7 +1,5 @@
 """A laboratory specimen: its shape, and the mesh of that shape."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

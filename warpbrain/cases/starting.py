@@ -1,7 +1,5 @@
 """A new case folder, ready to run, from a segmentation or from a mesh."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

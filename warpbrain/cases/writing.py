@@ -1,7 +1,5 @@
 """Writes a case folder that reads back as the same case."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import os

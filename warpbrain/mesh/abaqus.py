@@ -6,8 +6,6 @@ are taken out before it reads, and read here. Keywords: Abaqus Analysis User's G
 whatever their case.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -11,8 +11,6 @@ Conventions of the files
       but no sense, as fibres do, must not cancel.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import tempfile

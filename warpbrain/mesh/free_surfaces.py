@@ -1,7 +1,5 @@
 """Surfaces of a body: of sets of nodes, and what nothing holds, its outside, the walls of its voids, that of a cut."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal

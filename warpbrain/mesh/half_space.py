@@ -8,8 +8,6 @@ speed `r` along its normal changes the integral over what is above it by
     d/dt int_(above) N_a dV = int_(plane) N_a (-r) dA.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

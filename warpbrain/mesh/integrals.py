@@ -1,7 +1,5 @@
 """Forces on nodes from forces in the volume and on the surface: `int N_a b dV` and `int N_a t dA`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

@@ -1,7 +1,5 @@
 """A patch of a surface: the connected piece of it near a point, seen from one side; and points nearest on triangles."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,8 +1,6 @@
 """Limits on what the reading of a file may take and do: some readers wait for ever for the end of one that is cut off,
 ask for all the memory that a counter in it speaks of, print, or leave the program."""
 
-from __future__ import annotations
-
 import io
 import os
 import signal

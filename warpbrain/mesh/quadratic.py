@@ -3,8 +3,6 @@
 Sides are straight: a midside node lies halfway between the ends of its edge in the reference shape, and only there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

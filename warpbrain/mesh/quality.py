@@ -1,7 +1,5 @@
 """How good a mesh is: dihedral angles, and the pieces that faces hold together."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

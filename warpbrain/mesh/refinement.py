@@ -1,7 +1,5 @@
 """The same body in smaller elements: every tetrahedron cut into eight of an eighth of its volume."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from weakref import WeakKeyDictionary

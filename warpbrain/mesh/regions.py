@@ -7,8 +7,6 @@
   whole-number array of the points.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Surfaces of tetrahedra, as arrays of node ids: boundary, closed surfaces that make it up, interfaces of tissues."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -6,8 +6,6 @@ or `.vtp` is a field of text, `SPACE`, that holds RAS or LPS: `GetCoordinateSyst
 has written, and taken out before it reads.
 """
 
-from __future__ import annotations
-
 import re
 import tempfile
 from pathlib import Path

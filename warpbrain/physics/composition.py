@@ -1,7 +1,5 @@
 """Which mechanisms cannot act together."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 

@@ -13,8 +13,6 @@ excludes each other (`warpbrain.physics.composition`). Quadratic elements have i
 elements a patch around a node has the mean of `J_g^(1/3)` of its elements, and its volume times their `c w`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 #: What a mechanism can be in the total potential: a place in the formula above.

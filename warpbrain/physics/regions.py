@@ -1,7 +1,5 @@
 """Where in a body something is: a ball, an element set, or all of it; and which way it points there."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

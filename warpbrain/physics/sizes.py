@@ -1,7 +1,5 @@
 """Sizes of mechanisms in words, whatever their kind; what is particular to one is said in its file."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,8 +1,6 @@
 """What all recordings have and do, and how well they are registered; a file for each kind says the rest: keys, data,
 reading, writing, checks."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """The points of a triangulated surface that are closest to given points."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain

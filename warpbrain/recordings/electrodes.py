@@ -3,8 +3,6 @@
 https://bids-specification.readthedocs.io/en/stable/modality-specific-files/intracranial-electroencephalography.html
 """
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

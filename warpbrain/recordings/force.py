@@ -1,7 +1,5 @@
 """The resultant with which a boundary acts on a body."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar

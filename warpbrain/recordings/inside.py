@@ -1,7 +1,5 @@
 """What cannot have been recorded of a body, known before anything is computed: units and axes that were mixed up."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Where points are in a tetrahedral mesh: what makes the displacement of a point that is no node."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -4,8 +4,6 @@ Both kinds carry their own axes, and are in mm. A ``.mrk.json`` that names no co
 says; a ``.fcsv`` that names none may be either, depending on the version that wrote it, and is refused.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """Tracked points of a body."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar

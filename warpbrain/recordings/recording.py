@@ -3,8 +3,6 @@
 A kind is a file with a class of its own that derives from `Recording`, and its place in `RECORDINGS`.
 """
 
-from __future__ import annotations
-
 from warpbrain.recordings.base import Recording as Recording
 from warpbrain.recordings.base import TrackedPoints as TrackedPoints
 from warpbrain.recordings.force import ForceRecording as ForceRecording

@@ -1,7 +1,5 @@
 """Points on a moved surface of a body, not paired with places of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Surface meshes that were recorded: triangles from any file that meshio reads, and from ``.vtp``."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

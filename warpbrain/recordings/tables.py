@@ -5,8 +5,6 @@ columns that nobody asks for may hold anything; a remark names them. Fields are 
 tabs if the header has those and no comma.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -1,7 +1,5 @@
 """A laboratory test on a specimen."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files of a case that are text, opened with care: what is no readable text is a problem, and not an exception."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

@@ -1,7 +1,5 @@
 """Which rows of a recording a state is compared with."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from warpbrain.arrays import Floats, Ints

@@ -1,7 +1,5 @@
 """Files with tracked points: a reader for each ending, those of other packages among them."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable
 from contextlib import suppress

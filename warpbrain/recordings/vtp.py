@@ -4,8 +4,6 @@ An array is written as text, as base64 in its place, or appended at the end of t
 ones start with their length, or are cut into compressed blocks that start with the lengths of all of them.
 """
 
-from __future__ import annotations
-
 import base64
 import re
 from pathlib import Path

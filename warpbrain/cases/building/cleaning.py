@@ -1,7 +1,5 @@
 """What every mesh goes through: crumbs removed, touching surfaces opened, angles made good."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

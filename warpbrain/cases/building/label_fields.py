@@ -5,8 +5,6 @@ to what elements of the wanted size can show. Smoothing alone would shrink whate
 weights are set such that every region keeps the volume that its labels have.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A conforming mesh of a segmentation: lattice, cuts along every surface, MMG, and what each step left out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Background mesh: the body-centred cubic lattice, and cuts of it along the zero level of a field."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

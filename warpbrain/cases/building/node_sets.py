@@ -1,7 +1,5 @@
 """Node sets of new meshes: surfaces, where a brain is held, pressed and cut, and what examples act on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

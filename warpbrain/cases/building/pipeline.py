@@ -1,8 +1,6 @@
 """What each shipped mesh must be (volume, size, individual, resection), and how all of a case are built: template maps
 in, VTU files and a record of what they are out."""
 
-from __future__ import annotations
-
 import json
 import os
 import platform

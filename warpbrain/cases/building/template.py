@@ -6,8 +6,6 @@ probability maps smoothed to what a mesh of 7 to 10 mm can show: gyri stay as ge
 longitudinal fissure stays open as a groove.
 """
 
-from __future__ import annotations
-
 import importlib.util
 from dataclasses import dataclass
 from functools import cache

@@ -2,8 +2,6 @@
 and what is done with what was not said.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Collection, Mapping, Sequence

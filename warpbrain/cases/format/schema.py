@@ -5,8 +5,6 @@ and ``#:schema case.schema.json`` on the first line of a case. It says what a fi
 with the mesh, only reading the case can tell.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from typing import Any

@@ -1,7 +1,5 @@
 """Every table of `case.toml`. The page that users read is docs/case-format.md; the JSON Schema is made from this."""
 
-from __future__ import annotations
-
 from warpbrain.cases.boundary import BOUNDARIES, RAMP
 from warpbrain.frame import AXES, METRES
 from warpbrain.gp.literature.study import GROUPS

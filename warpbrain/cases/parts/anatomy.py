@@ -1,7 +1,5 @@
 """The anatomy of a case: its mesh, or the mesh of its specimen, checked for being one sound body."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

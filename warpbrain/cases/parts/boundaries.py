@@ -1,7 +1,5 @@
 """The boundaries of a case, and whether together they make sense."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The mechanisms that a case assumes to act: whatever the registry has."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from warpbrain.cases.format.reading import Context, Reading

@@ -1,7 +1,5 @@
 """What keys of a case name: sets of the mesh, tissues, and files that add to it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

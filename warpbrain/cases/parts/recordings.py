@@ -1,7 +1,5 @@
 """The recordings of a case, each from its table and its file; and tests whose magnitude is not that of their unit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

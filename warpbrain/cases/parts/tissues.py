@@ -1,7 +1,5 @@
 """The tissues of a case: a law for every label of its mesh."""
 
-from __future__ import annotations
-
 import re
 
 from warpbrain.cases.case import Tissue

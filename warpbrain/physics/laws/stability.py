@@ -19,8 +19,6 @@ ratios from 0.3 to 0.4999; at smaller ones coupled Ogden laws with negative expo
 A negative `lam` is refused as well: the energy of a coupled law then falls without bound as `J -> 0`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

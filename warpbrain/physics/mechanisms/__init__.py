@@ -1,7 +1,5 @@
 """The registry of mechanisms: every file in this folder that defines one, and what other packages add."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import pkgutil
