@@ -149,8 +149,10 @@ class Term(abc.ABC):
         """Come closer to a constraint that a penalty stands for; whether it was worth it, so that to solve again is."""
         return False
 
-    def forget(self) -> None:  # noqa: B027
+    def forget(self) -> None:
         """Tell a term with a memory that the body is at rest in its reference shape, and always was."""
+        for name in self.memory:
+            getattr(self, name).zero_()
 
     @property
     def coupling(self) -> Coupling | None:
@@ -314,9 +316,8 @@ class ExtraEnergy:
     energy: Any
     stress: Any
     moduli: Any
-    #: ``"moduli"``: times the factor on the moduli of an element (fibres); ``"tissue"``: times the part of it that is
-    #: left (a tension, which is no modulus)
-    goes_with: str = "moduli"
+    #: Whether it goes with the moduli of an element (fibres); else with the part of it that is left (a tension)
+    of_moduli: bool = True
 
 
 class ExtraEnergyTerm(KernelTerm):
@@ -332,7 +333,7 @@ class ExtraEnergyTerm(KernelTerm):
         stencil = FOUR_NODES if body.quadratic is None else TEN_NODES
         made, *kernels = extra_kernels(code.key, code.energy, code.stress, code.moduli, body.precision, stencil)
         super().__init__(body, body.stencils[elements], kernels, ramp)
-        self.elements, self.of_moduli = elements, code.goes_with == "moduli"
+        self.elements, self.of_moduli = elements, code.of_moduli
         self._numbers = np.asarray(data)
         self._elements, self._volume = self.array(elements, int), self.zeros(len(elements))
         self._parameters = self.zeros(len(elements), self._numbers.shape[1] + 1)

@@ -5,8 +5,6 @@
 An exponent of 2 is the neo-Hookean law; a negative one stiffens in compression.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar

@@ -20,9 +20,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats
+from warpbrain.arrays import Floats, Int32s
 from warpbrain.mesh import TetMesh, interface_faces
 from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.mechanisms.pressure import PressureTerm
@@ -71,7 +70,7 @@ class Cavity(Mechanism):
         super().check(mesh)
         self.wall(mesh)
 
-    def wall(self, mesh: TetMesh) -> NDArray[np.int32]:
+    def wall(self, mesh: TetMesh) -> Int32s:
         """Triangles (k, 3) between the set and the tissue that stays, oriented into the cavity."""
         faces = interface_faces(mesh.tetrahedra, mesh.element_sets[self.elements])
         if not len(faces):

@@ -1,7 +1,5 @@
 """Another compressibility than the case says."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -30,7 +30,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Floats, Ints
+from warpbrain.arrays import Floats, Int32s, Ints
 from warpbrain.kernels.distance_field import distance_kernels, smooth_distance
 from warpbrain.kernels.module import Precision, compiled_module, threads_of_block
 from warpbrain.mesh import TetMesh, faces_of, node_areas, vertex_normals
@@ -150,7 +150,7 @@ class Contact(Mechanism):
             region=f"surface '{patch.surface}', which is held",
         )
 
-    def skull(self, mesh: TetMesh) -> tuple[Floats, NDArray[np.int32]]:
+    def skull(self, mesh: TetMesh) -> tuple[Floats, Int32s]:
         """Points [m] and outward triangles of the surface it touches."""
         if self.surface is not None:
             return self.surface.points, self.surface.outward
@@ -277,11 +277,6 @@ class ContactTerm(KernelTerm):
         reached = self.body.mesh.points[self.stencils[:, 0]] + u.numpy()[self.stencils[:, 0]]
         self._field.at(self.array(reached, self.body.precision.vec3), self._gaps, self._directions)
 
-    def forget(self) -> None:
-        self._found.zero_()
-        self._pressing.zero_()
-        self._tractions.zero_()
-
 
 class DistanceField:
     """The smoothed signed distance from a surface, on a device; see `warpbrain.kernels.distance_field`.
@@ -351,7 +346,7 @@ class DistanceField:
         wp.launch(self._evaluate, dim=len(points), inputs=inputs, device=self._device, block_dim=block_dim)
 
 
-def _edge(points: Floats, faces: NDArray[np.int32]) -> float:
+def _edge(points: Floats, faces: Int32s) -> float:
     """Median length [m] of the edges of triangles."""
     return float(np.median(np.linalg.norm(points[faces] - points[np.roll(faces, 1, axis=1)], axis=2)))
 

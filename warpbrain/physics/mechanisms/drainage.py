@@ -47,7 +47,7 @@ from warpbrain.arrays import Bools, Floats
 from warpbrain.kernels.invariants import cofactor
 from warpbrain.kernels.module import KernelSet, Precision
 from warpbrain.kernels.tetrahedron import deformation_gradient, store_blocks
-from warpbrain.mesh import TetMesh
+from warpbrain.mesh import TetMesh, nodes_of
 from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
@@ -178,11 +178,8 @@ class Drainage(Mechanism):
         faces = mesh.boundary
         if self.drained:
             faces = faces[mesh.node_sets[self.drained][faces].all(axis=1)]
-        nodes = np.zeros(len(mesh.points), dtype=bool)
-        nodes[faces] = True
-        porous = np.zeros(len(mesh.points), dtype=bool)
-        porous[mesh.tetrahedra[elements_of(mesh, self.elements)]] = True
-        return nodes & porous
+        porous = mesh.tetrahedra[elements_of(mesh, self.elements)]
+        return nodes_of(faces, len(mesh.points)) & nodes_of(porous, len(mesh.points))
 
     def bind(self, body: Body) -> "DrainageTerm":
         return DrainageTerm(body, self)
@@ -227,8 +224,6 @@ class DrainageTerm(Term):
     def coupling(self) -> Coupling:
         return Coupling(self._compliance, self._yielding, self._coupling, self._held.numpy())
 
-    # -- sums over elements ---------------------------------------------------------------------------------------
-
     def _at_nodes(self, amounts: Floats) -> Floats:
         """What each element (k,) adds to each of its nodes, summed there (n,)."""
         sums = np.bincount(self.stencils.ravel(), np.repeat(amounts, 4), minlength=len(self.body.mesh.points))
@@ -253,8 +248,6 @@ class DrainageTerm(Term):
         self.launch(self._kernels.deform, len(self.stencils), *inputs, *outputs)
         normals, change = (output.numpy().astype(np.float64, copy=False) for output in outputs)
         return normals, change
-
-    # -- the pressure's system ------------------------------------------------------------------------------------
 
     def _over_compliance(self, given: Floats) -> Floats:
         """`A^-1` times numbers of the nodes."""
@@ -325,8 +318,6 @@ class DrainageTerm(Term):
     def nodal_pressures(self) -> dict[str, Floats]:
         return {"fluid_pressure": self.pressures()}
 
-    # -- memory ---------------------------------------------------------------------------------------------------
-
     @property
     def coupled(self) -> bool:
         return bool(np.isfinite(self._h))
@@ -344,9 +335,7 @@ class DrainageTerm(Term):
         self._renew()
 
     def forget(self) -> None:
-        self._held.zero_()
-        self._shape.zero_()
-        self._beyond.zero_()
+        super().forget()
         self._renew()
 
     def recall(self, remembered: tuple[wp.array, ...]) -> None:
@@ -363,8 +352,6 @@ class DrainageTerm(Term):
         self._solve(u)
         after = self.pressures()
         return bool(np.abs(after - before).max() > _STEADY * np.abs(after).max())
-
-    # -- forces ---------------------------------------------------------------------------------------------------
 
     def evaluate_forces(self, u: wp.array) -> None:
         self._evaluate(u)

@@ -14,8 +14,8 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpbrain.arrays import Int32s
 from warpbrain.kernels.following_pressure import triangles_struct
 from warpbrain.kernels.module import Precision, compiled_module
 from warpbrain.mesh import TetMesh
@@ -74,7 +74,7 @@ class Falx(Mechanism):
             raise NotTestableError("needs a node set 'falx' or 'tentorium' in the mesh")
         return [Proposal.switch(cls(nodes=nodes), 0.3, region=nodes) for nodes in names]
 
-    def faces(self, mesh: TetMesh) -> NDArray[np.int32]:
+    def faces(self, mesh: TetMesh) -> Int32s:
         """Triangles (k, 3) of the membrane."""
         faces = all_faces(mesh.tetrahedra)
         membrane = faces[mesh.node_sets[self.nodes][faces].all(axis=1)]
@@ -87,7 +87,9 @@ class Falx(Mechanism):
 
 
 class MembraneTerm(TriangleTerm):
-    """`Falx` on a device."""
+    """`Falx` on a device: the membrane is there, however little of the load is."""
+
+    in_full = True
 
     def __init__(self, body: Body, falx: Falx) -> None:
         faces = np.sort(falx.faces(body.node_mesh), axis=1)
@@ -102,14 +104,9 @@ class MembraneTerm(TriangleTerm):
         )
         gradients = np.linalg.inv(edges).transpose(0, 2, 1)
         area = 0.5 * np.abs(np.linalg.det(edges))
-        modulus = falx.thickness * falx.stiffness / 3.0
+        modulus = falx.factor() * falx.thickness * falx.stiffness / 3.0
         data = np.concatenate([(modulus * area)[:, None], gradients.reshape(-1, 4)], axis=1)
         super().__init__(body, faces, body.node_mesh.points, data, _kernels(body.precision), falx.factor)
-        self._always = falx.factor()
-
-    def set_scale(self, scale: float) -> None:
-        # a membrane is there, however little of the load is
-        super().set_scale(self._always)
 
 
 @cache

@@ -217,7 +217,6 @@ class Gravity(BodyForce, Mechanism):
         return clauses
 
     def detail(self) -> str:
-        """What the sentence leaves open, for people to read."""
         if self.csf_level is None:
             return ""
         axis = ", ".join(f"{v:g}" for v in self.direction)

@@ -4,8 +4,6 @@ All moduli of an element are multiplied by `exp(s w)`, `w` how much it belongs t
 those of its law, of fibres and of viscosity. A residual stress is no modulus.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

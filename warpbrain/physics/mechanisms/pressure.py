@@ -24,9 +24,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Int32s
 from warpbrain.kernels.following_pressure import pressure_kernels
 from warpbrain.mesh import TetMesh, faces_of, rim_edges
 from warpbrain.mesh.integrals import triangle_rule
@@ -36,8 +35,6 @@ from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 from warpbrain.physics.regions import elements_with
 from warpbrain.physics.term import Body, TriangleTerm
-
-Ints = NDArray[np.int32]
 
 #: Nodes of the sides of triangles, one way around, by how many nodes these have.
 _SIDES = {3: SIDES, 6: np.array([[0, 3, 1], [1, 5, 2], [2, 4, 0]])}
@@ -81,7 +78,7 @@ class Pressure(Mechanism):
         super().check(mesh)
         self.faces(mesh)
 
-    def faces(self, mesh: TetMesh) -> Ints:
+    def faces(self, mesh: TetMesh) -> Int32s:
         """Triangles (k, 3) that carry the pressure, oriented outwards."""
         loaded = faces_of(mesh, mesh.node_sets[self.nodes])
         if not len(loaded):
@@ -115,7 +112,7 @@ class Pressure(Mechanism):
 class PressureTerm(TriangleTerm):
     """A pressure [Pa] on triangles (k, 3) of a body, oriented away from the tissue that it pushes on."""
 
-    def __init__(self, body: Body, faces: Ints, value: float, ramp: Callable[[float], float]) -> None:
+    def __init__(self, body: Body, faces: Int32s, value: float, ramp: Callable[[float], float]) -> None:
         order = np.argsort(faces, axis=1)
         # a permutation of three is even if it is a rotation
         even = (order[:, 1] - order[:, 0]) % 3 == 1

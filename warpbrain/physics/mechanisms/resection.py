@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpbrain.arrays import Int32s
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Mechanism, parameter
@@ -34,7 +32,6 @@ class Resection(Mechanism):
         raise NotTestableError("what was taken out is looked for as 'cavity', which empties the same elements")
 
     def detail(self) -> str:
-        """What the sentence leaves open, for people to read."""
         return f" It is the element set '{self.elements}'; the wall of the cavity is free."
 
     @classmethod
@@ -45,7 +42,7 @@ class Resection(Mechanism):
             return ""
         return f"where nothing is left of what {other.kind} acts on"
 
-    def remaining(self, mesh: TetMesh) -> tuple[TetMesh, NDArray[np.int32]]:
+    def remaining(self, mesh: TetMesh) -> tuple[TetMesh, Int32s]:
         """See `Removing`; `InputError` if the mesh has no such set, or the set is empty or everything."""
         members = mesh.element_sets.get(self.elements)
         if members is None:

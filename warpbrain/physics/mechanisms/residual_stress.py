@@ -46,7 +46,7 @@ def _moduli(F: Any, g: Any, h: Any, data: wp.array2d[Any], e: int):
     return data[e, 0] * wp.dot(a, g) * wp.dot(a, h) * wp.identity(n=3, dtype=F.dtype)
 
 
-_CODE = ExtraEnergy("residual_stress", _energy, _stress, _moduli, "tissue")
+_CODE = ExtraEnergy("residual_stress", _energy, _stress, _moduli, of_moduli=False)
 
 
 @dataclass(frozen=True, kw_only=True)

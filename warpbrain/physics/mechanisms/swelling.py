@@ -4,8 +4,6 @@
 (`warpbrain.physics.laws.device`), in fibres, in viscosity: swelling that nothing holds makes none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -14,7 +12,7 @@ from warpbrain.arrays import Floats
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.mechanism import Changed, Expectation, Mechanism, parameter
 from warpbrain.physics.potential import Enters
-from warpbrain.physics.proposal import Place, Proposal, Situation
+from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import region_weights
 
 #: Where it is looked for: usual standard deviation of the change everywhere and in a ball, which may be 2.5 times as
@@ -64,11 +62,14 @@ class Swelling(Mechanism):
         everywhere = Proposal.of_one(
             lambda g: cls(amount=g), 0.0, _EVERYWHERE, "smooth", region="all tissue", varying=(0,)
         )
-
-        def swollen(g: float, centre: Place, radius: float) -> Swelling:
-            return cls(amount=g, centre=centre, radius=radius)
-
-        return [everywhere, *Proposal.in_balls(swollen, _SOMEWHERE, _RADII, situation, varying=(0,))]
+        balls = Proposal.in_balls(
+            lambda g, centre, radius: cls(amount=g, centre=centre, radius=radius),
+            _SOMEWHERE,
+            _RADII,
+            situation,
+            varying=(0,),
+        )
+        return [everywhere, *balls]
 
     def check(self, mesh: TetMesh) -> None:
         super().check(mesh)

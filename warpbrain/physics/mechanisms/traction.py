@@ -9,8 +9,6 @@ what hangs together with the point nearest to the centre and faces the same way 
 What hangs on an edge or pulls at points has no area: the nodes of a set share its force evenly.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -137,12 +135,8 @@ class Traction(Load, Mechanism):
     @classmethod
     def _pulling(cls, situation: Situation, site: Floats, radius: float) -> Proposal:
         x, y, z = site.tolist()
-
-        def make(c: Floats) -> Traction:
-            return cls(centre=(x, y, z), value=tuple(c.tolist()), radius=radius)
-
         return Proposal(
-            make,
+            lambda c: cls(centre=(x, y, z), value=tuple(c.tolist()), radius=radius),
             np.zeros(3),
             np.full(3, _USUAL * situation.stiffness),
             elsewhere=partial(cls._pulling, situation),
@@ -157,20 +151,19 @@ class Traction(Load, Mechanism):
     @classmethod
     def _shared(cls, nodes: str, axes: Floats, sd: float) -> Proposal:
         """On a node set, with a coefficient [N] along each of some axes (k, 3)."""
-
-        def make(c: Floats) -> Traction:
-            return cls(nodes=nodes, force=tuple((c @ axes).tolist()))
-
-        varying = tuple(range(len(axes)))
         return Proposal(
-            make, np.zeros(len(axes)), np.full(len(axes), sd), region=name_of_set(nodes), declared=True, varying=varying
+            lambda c: cls(nodes=nodes, force=tuple((c @ axes).tolist())),
+            np.zeros(len(axes)),
+            np.full(len(axes), sd),
+            region=name_of_set(nodes),
+            declared=True,
+            varying=tuple(range(len(axes))),
         )
 
     def nodal_forces(self, mesh: TetMesh | QuadraticMesh) -> Floats:
         if self.force is not None:
             return NodalForce(nodes=self.nodes, total=self.force).nodal_forces(mesh)
-        assert self.centre is not None and self.radius is not None
-        assert self.value is not None
+        assert self.centre is not None and self.radius is not None and self.value is not None
         nodes, areas = _patch(mesh, tuple(map(float, self.centre)), float(self.radius))
         forces = np.zeros(mesh.points.shape)
         forces[nodes] = np.outer(areas, self.value)
@@ -180,7 +173,6 @@ class Traction(Load, Mechanism):
 @lru_cache(maxsize=_KEPT)
 def _patch(mesh: TetMesh | QuadraticMesh, centre: tuple[float, ...], radius: float) -> tuple[Ints, Floats]:
     """Nodes of a patch, and areas [m2] with which a traction at its centre acts on them: a scan asks for them often."""
-
     corners = mesh if isinstance(mesh, TetMesh) else mesh.corners
     triangles = patch_around(corners.points, corners.boundary, centre, radius)
 

@@ -217,10 +217,6 @@ class ViscoelasticTerm(KernelTerm):
         volumes = body.stiffness_factors * body.mesh.volumes
         self._weights.assign(np.stack([volumes, body.shear_moduli, body.growth_stretches], axis=1))
 
-    def forget(self) -> None:
-        self._q.zero_()
-        self._S.zero_()
-
     def advance(self, u: wp.array) -> None:
         self._launch(self._kernels[3], u)
 
