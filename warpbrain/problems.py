@@ -47,7 +47,7 @@ class Unreadable(Exception):
 
 
 class Problems:
-    """A list of problems that readers add to and go on reading; from `most` on one may stop, see `enough`."""
+    """A list of problems that readers add to and go on reading, up to `most` of them."""
 
     def __init__(self, most: int | None = None) -> None:
         self._most = most
@@ -63,8 +63,13 @@ class Problems:
         return self._most is not None and len(self.found) >= self._most
 
     def add(self, file: Path, place: str, message: str, cure: str = "") -> None:
-        """Note a problem; text that came with line breaks is put on one line, and one without an end is given one."""
+        """Note a problem; text that came with line breaks is put on one line, and one without an end is given one.
+
+        `Unreadable` once there are `enough`.
+        """
         self.found.append(Problem(file, _shortened(place, _PLACE), _shortened(message, _MESSAGE), cure))
+        if self.enough:
+            raise Unreadable
 
     def refuse(self, file: Path, place: str, message: str, cure: str = "") -> NoReturn:
         """Note a problem after which nothing more of a file can be read, and raise `Unreadable`."""

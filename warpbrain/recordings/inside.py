@@ -45,8 +45,6 @@ def check_possible(
     moved = np.zeros(0) if displacement is None else np.linalg.norm(displacement, axis=1)
     with collected(path, problems) as of_file:
         for row in np.flatnonzero(moved > size):
-            if of_file.enough:
-                break
             message = f"moves {_metres(float(moved[row]))} in a body of {_metres(size)}"
             of_file.add(path, f"point {row + 1}", message, _FAR_MOVED)
         largest = max((float(np.max(noise)) for noise in noises if noise is not None), default=0.0)

@@ -66,7 +66,7 @@ class Table:
         column = self.header.index(name)
         words = tuple(row[column] for row in self.cells)
         for index, word in enumerate(words):
-            if not word and not self.problems.enough:
+            if not word:
                 self.problem(index, name, "found nothing, expected a name")
         return words
 
@@ -75,8 +75,6 @@ class Table:
         column = self.header.index(name)
         values = np.full(len(self), np.nan)
         for index, row in enumerate(self.cells):
-            if self.problems.enough:
-                break
             cell = row[column]
             value = _number(cell)
             if value is not None and abs(value) <= LARGEST:
@@ -101,8 +99,6 @@ class Table:
         values = self.numbers(name)
         wrong = values < lowest if itself else values <= lowest
         for index in np.flatnonzero(wrong):
-            if self.problems.enough:
-                break
             limit = f"{lowest:g} or more" if itself else f"more than {lowest:g}"
             self.problem(int(index), name, f"found {values[index]:g}, expected {limit}")
         return values
@@ -115,8 +111,6 @@ class Table:
         values = self.numbers("t")
         before: dict[str, int] = {}
         for index in np.flatnonzero(np.isfinite(values)).tolist():
-            if self.problems.enough:
-                break
             key = of[index] if of is not None else ""
             if key in before:
                 last = before[key]
@@ -144,8 +138,6 @@ def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table:
     rows: list[int] = []
     broken = 0
     for number, line in enumerate(lines_of(text), 1):
-        if problems.enough:
-            break
         content = without_comment(line)
         if not content.strip():
             continue

@@ -113,8 +113,6 @@ def _read_members(path: Path, in_file: MeshInFile, problems: Problems) -> Bools 
         if words and words[0][1].lower() in ("id", "ids", "node", "nodes"):
             del words[0]
         for number, word in words:
-            if wrong.enough:
-                break
             if fault := _fault(word, where):
                 wrong.add(path, f"row {number}", fault)
             else:
