@@ -8,7 +8,7 @@ from hollow import hollow
 from shapes import box
 
 from warpbrain.mesh import TetMesh, face_vectors, faces_of, nodes_of, split_boundary
-from warpbrain.mesh.free_surfaces import FreePart, free_faces, free_parts, rim_corners, set_of
+from warpbrain.mesh.free_surfaces import FreePart, free_faces, free_parts, rim_corners
 from warpbrain.mesh.surface import in_rows
 
 
@@ -87,7 +87,7 @@ def test_a_set_stands_for_a_part_but_for_corners_and_what_is_held() -> None:
     mesh, inner = cut_open()
     held = mesh.node_sets["fixed"]
     for part in free_parts(mesh, held, inner):
-        members = set_of(mesh, part)
+        members = nodes_of(part.faces, len(mesh.points))
         own = free_faces(mesh, members, held)
         assert in_rows(part.faces, own).all()
         assert in_rows(own, np.concatenate([part.faces, rim_corners(mesh)])).all()

@@ -82,11 +82,6 @@ def _pieces(faces: Int32s, areas: Floats, rows: Ints, smallest: float) -> Iterat
         yield rows[piece == number]
 
 
-def set_of(mesh: TetMesh, part: FreePart) -> Bools:
-    """Nodes (n,) that stand for a part: a set of them holds its triangles, and beside these some of only such nodes."""
-    return nodes_of(part.faces, len(mesh.points))
-
-
 def rim_corners(mesh: TetMesh) -> Int32s:
     """Triangles (k, 3) of the cut whose nodes are all on its rim: a set of nodes of the surface beside holds them."""
     beside = mesh.boundary[~in_rows(mesh.boundary, mesh.cut)]

@@ -81,7 +81,6 @@ def measure_arrays(points: Floats, tetrahedra: Int32s, tissue: Int32s) -> Qualit
     angles = dihedral_angles(points, tetrahedra)
     volumes = signed_volumes(points, tetrahedra)
     pieces = components(tetrahedra, tissue)
-    edges = np.unique(np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1), axis=0)
     return Quality(
         nodes=len(points),
         tetrahedra=len(tetrahedra),
@@ -90,12 +89,18 @@ def measure_arrays(points: Floats, tetrahedra: Int32s, tissue: Int32s) -> Qualit
         min_dihedral=float(angles.min()),
         first_percentile_dihedral=float(np.percentile(angles.min(axis=1), 1)),
         max_dihedral=float(angles.max()),
-        mean_edge=float(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).mean()),
+        mean_edge=mean_edge(points, tetrahedra),
         components=int(components(tetrahedra).max()) + 1,
         tissue_components={int(t): len(np.unique(pieces[tissue == t])) for t in np.unique(tissue)},
         smallest_tissue_component_volume=float(np.bincount(pieces, weights=volumes).min()),
         smallest_tissue_component_tetrahedra=int(np.bincount(pieces).min()),
     )
+
+
+def mean_edge(points: Floats, tetrahedra: NDArray[np.integer]) -> float:
+    """Mean length of the edges of tetrahedra (m, 4), in the unit of points (n, 3)."""
+    edges = np.unique(np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1), axis=0)
+    return float(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).mean())
 
 
 def extent(points: NDArray[np.floating[Any]]) -> float:

@@ -11,6 +11,7 @@ from warpbrain.errors import InputError
 from warpbrain.frame import Frame
 from warpbrain.keys import Key
 from warpbrain.mesh import TetMesh
+from warpbrain.mesh.surface import unit
 from warpbrain.problems import Problems
 from warpbrain.recordings.base import POSITION, REFERENCE, Columns, Content, Recording, write_triangles
 from warpbrain.recordings.inside import check_possible, check_surface_near
@@ -52,11 +53,10 @@ class SurfaceRecording(Recording):
         elif is_markup(path):
             values = {"points": read_markup(path, problems).points}
         else:
-            mesh = read_surface_mesh(path, problems)
-            if mesh.axes not in (None, frame.axes):
-                problems.remark(path, f"the file says that its axes are {mesh.axes}, which counts for it")
-            points = Frame(frame.unit, mesh.axes or frame.axes).lengths(mesh.points)
-            values = {"points": points, "faces": mesh.faces}
+            points, faces, axes = read_surface_mesh(path, problems)
+            if axes not in (None, frame.axes):
+                problems.remark(path, f"the file says that its axes are {axes}, which counts for it")
+            values = {"points": Frame(frame.unit, axes or frame.axes).lengths(points), "faces": faces}
         return values, frame.metres
 
     @property
@@ -93,7 +93,6 @@ def _normals(table: Table, frame: Frame) -> Floats | None:
     if not any(column in table for column in NORMAL) or not table.has(*NORMAL):
         return None
     normals = frame.directions(table.vectors(*NORMAL))
-    lengths = np.linalg.norm(normals, axis=1)
-    for index in np.flatnonzero(lengths == 0.0):
+    for index in np.flatnonzero(~normals.any(axis=1)):
         table.problem(int(index), "nx", "found a normal of length zero, expected a direction")
-    return normals / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+    return unit(normals)

@@ -1,7 +1,6 @@
 """Surface meshes that were recorded: triangles from any file that meshio reads, and from ``.vtp``."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,18 +28,10 @@ _WHOLE_HEADER = {".ply": re.compile(rb"^end_header\s*$", re.MULTILINE), ".off": 
 _STL_HEADER, _STL_TRIANGLE = 84, 50
 
 
-@dataclass(frozen=True, eq=False)
-class SurfaceMesh:
-    """Points (n, 3) as the file has them, triangles (k, 3) or None for a cloud of points, and the axes it states."""
-
-    points: Floats
-    faces: Int32s | None
-    axes: str | None
-
-
-def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh:
+def read_surface_mesh(path: Path, problems: Problems) -> tuple[Floats, Int32s | None, str | None]:
     """Read a surface mesh or a cloud of points; `Unreadable` if there are problems.
 
+    Returns points (n, 3) as the file has them, triangles (k, 3) or None for a cloud, and the axes that it states.
     Polygons are cut into triangles; triangles without area are left out, and so are points that no triangle uses where
     there are triangles.
     """
@@ -74,7 +65,7 @@ def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh:
     if axes not in (None, *AXES):
         problems.refuse(path, "SPACE", f"found {shown(axes)}, expected RAS or LPS")
     if not len(faces):
-        return SurfaceMesh(points, None, axes)
+        return points, None, axes
     wrong = np.flatnonzero(((faces < 0) | (faces >= count)).any(axis=1))
     if len(wrong):
         what = "a face" if len(wrong) == 1 else f"{len(wrong)} faces"
@@ -91,7 +82,7 @@ def read_surface_mesh(path: Path, problems: Problems) -> SurfaceMesh:
     used, numbers = np.unique(faces[sound], return_inverse=True)
     if len(used) < count:
         problems.remark(path, f"{count - len(used)} of {count} points belong to no face and are left out")
-    return SurfaceMesh(points[used], numbers.reshape(-1, 3).astype(np.int32), axes)
+    return points[used], numbers.reshape(-1, 3).astype(np.int32), axes
 
 
 def _from_meshio(path: Path, problems: Problems) -> tuple[Floats, Int32s, str | None]:

@@ -15,7 +15,7 @@ from warpbrain.cases.building.node_sets import first_sets
 from warpbrain.cases.building.tissue_names import Assignment
 from warpbrain.errors import InputError
 from warpbrain.images.reading import Image
-from warpbrain.mesh.surface import EDGES
+from warpbrain.mesh.quality import mean_edge
 
 # nodes of a mesh whose size is not given: about what the shipped cases have
 NODES = 5000
@@ -157,9 +157,7 @@ def _made(cells: Cells, size: float, notes: list[str]) -> Cells:
     for trial in range(TRIALS):
         made, ratio = remesh(cells, edge), 1.0
         if made is not None:
-            ends = np.unique(np.sort(made.tetrahedra[:, EDGES].reshape(-1, 2), axis=1), axis=0)
-            sides = made.points[ends[:, 0]] - made.points[ends[:, 1]]
-            ratio = float(np.linalg.norm(sides, axis=1).mean()) / size
+            ratio = mean_edge(made.points, made.tetrahedra) / size
         if abs(ratio - 1) < NEAR:
             if made is not None:
                 if (done := finished(made, cavities=None)) is not None:

@@ -93,14 +93,11 @@ def with_example_sets(mesh: TetMesh) -> TetMesh:
 
     The mesh knows of no midline: the membrane goes along the faces nearest to it.
     """
-    middles = mesh.points[mesh.tetrahedra].mean(axis=1)
-    right = middles[:, 0] > 0.0
-    shared = np.zeros((2, len(mesh.points)), dtype=bool)
-    shared[0, mesh.tetrahedra[right]] = True
-    shared[1, mesh.tetrahedra[~right]] = True
+    right = mesh.centres[:, 0] > 0.0
+    of_right, of_left = (nodes_of(mesh.tetrahedra[side], len(mesh.points)) for side in (right, ~right))
     nodes = {
-        "falx": shared.all(axis=0) & (mesh.points[:, 2] > MEMBRANE_ABOVE),
+        "falx": of_right & of_left & (mesh.points[:, 2] > MEMBRANE_ABOVE),
         "side": mesh.node_sets["surface"] & ~mesh.node_sets["fixed"] & (mesh.points[:, 0] > SIDE_BEYOND),
     }
-    ball = np.linalg.norm(middles - CENTRE, axis=1) < RADIUS
+    ball = np.linalg.norm(mesh.centres - CENTRE, axis=1) < RADIUS
     return replace(mesh, node_sets={**mesh.node_sets, **nodes}, element_sets={"ball": ball})

@@ -137,15 +137,15 @@ def _fault(word: str, where: Ints) -> str:
 def read_closed_surface(path: Path, name: str, frame: Frame, problems: Problems) -> ClosedSurface | None:
     """The closed surface in a file, in metres and RAS, called by a name; None if it is none or is not closed."""
     with collected(path, problems) as wrong:
-        surface = read_surface_mesh(path, wrong)
-        if surface.faces is None:
+        points, faces, axes = read_surface_mesh(path, wrong)
+        if faces is None:
             wrong.refuse(path, "", "found points only, expected a surface of triangles")
-        if len(edges := open_edges(surface.faces)):
+        if len(edges := open_edges(faces)):
             first = f"first that of the points {edges[0][0]} and {edges[0][1]}"
             message = f"the surface is not closed: {len(edges)} edge(s) do not belong to two triangles, {first}"
             wrong.refuse(path, "", message, "contact needs an inside: close the surface")
-        points = Frame(frame.unit, surface.axes or frame.axes).lengths(surface.points)
-    return None if wrong else ClosedSurface(name, points, surface.faces)
+        points = Frame(frame.unit, axes or frame.axes).lengths(points)
+    return None if wrong else ClosedSurface(name, points, faces)
 
 
 def read_directions(path: Path, mesh: TetMesh, frame: Frame, problems: Problems) -> Floats | None:

@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from warpbrain.kernels.invariants import invariant_kernels
 from warpbrain.kernels.module import Precision
+from warpbrain.kernels.principal import principal_kernels
 from warpbrain.kernels.tetrahedron import ElementKernels, law_kernels, of_elastic_part
 
 
@@ -19,8 +21,6 @@ class InvariantLaw:
 
     def kernels(self, precision: Precision) -> ElementKernels:
         """Element kernels in a precision, made once."""
-        from warpbrain.kernels.invariants import invariant_kernels
-
         return invariant_kernels(self.key, self.energy, self.derivatives, self.second_invariant, precision)
 
 
@@ -34,8 +34,6 @@ class PrincipalLaw:
 
     def kernels(self, precision: Precision) -> ElementKernels:
         """Element kernels in a precision, made once."""
-        from warpbrain.kernels.principal import principal_kernels
-
         return principal_kernels(self.key, self.energy, self.derivatives, precision)
 
 

@@ -15,7 +15,7 @@ from warpbrain.arrays import Bools, Int32s
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh, faces_of, nodes_of, split_boundary
-from warpbrain.mesh.free_surfaces import FreePart, FreeSurface, free_faces, free_parts, rim_corners, set_of
+from warpbrain.mesh.free_surfaces import FreePart, FreeSurface, free_faces, free_parts, rim_corners
 from warpbrain.mesh.surface import in_rows
 from warpbrain.physics.words import name_of_set
 
@@ -47,7 +47,8 @@ def free_surfaces(case: Case) -> tuple[FreeSurface, ...]:
     """
     mesh, _ = case.remaining
     held = held_nodes(case)
-    parts = [(words, set_of(mesh, part), part.origin) for words, part in _named_parts(case)]
+    # a set of the nodes of a part holds its triangles, and beside these some of only such nodes
+    parts = [(words, nodes_of(part.faces, len(mesh.points)), part.origin) for words, part in _named_parts(case)]
     used = {boundary.nodes for boundary in case.boundaries}
     corners = rim_corners(mesh)
     known = {_triangles_key(free_faces(mesh, mesh.node_sets[name], held), corners) for name in used}
