@@ -4,8 +4,6 @@ A load with a ramp has the size at each time that its ramp says. At rest under l
 without memory is where it is then; so every time of a case is a case of its own, in which nothing depends on time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -60,7 +58,7 @@ class Moments:
     numbers: tuple[int, ...]  # for each time the number of its case
 
     @classmethod
-    def of(cls, case: Case, times: Iterable[float]) -> Moments:
+    def of(cls, case: Case, times: Iterable[float]) -> "Moments":
         """The cases at some times [s]; with none at the end alone."""
         series = tuple(sorted(set(times))) or (np.inf,)
         keys = [_key(case, time) for time in series]
@@ -72,7 +70,7 @@ class Moments:
         return cls(series, tuple(case_at(case, time) for time in first), numbers)
 
     @classmethod
-    def recorded(cls, case: Case) -> Moments:
+    def recorded(cls, case: Case) -> "Moments":
         """At which recordings are compared with a state; at the end alone where one goes on by itself."""
         return cls.of(case, () if goes_on(case) else recorded_times(case, ("fit", "check")))
 

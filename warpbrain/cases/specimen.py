@@ -38,9 +38,8 @@ class Specimen:
 
     def stress_unit(self, quantity: str) -> float:
         """Nominal stress [Pa], of torsion the torque over `int r dA`, of one unit of what a test answers."""
-        return {"stress": 1.0, "force": 1.0 / (np.pi * self.radius**2), "torque": 1.5 / (np.pi * self.radius**3)}[
-            quantity
-        ]
+        r = self.radius
+        return {"stress": 1.0, "force": 1.0 / (np.pi * r**2), "torque": 1.5 / (np.pi * r**3)}[quantity]
 
     def mesh(self) -> TetMesh:
         """The shape in tetrahedra, z from 0, centred on the z axis.

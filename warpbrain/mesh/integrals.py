@@ -1,7 +1,6 @@
 """Forces on nodes from forces in the volume and on the surface: `int N_a b dV` and `int N_a t dA`."""
 
 from collections.abc import Callable
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,6 @@ def _orbits(*orbits: tuple[float, tuple[float, ...]]) -> tuple[Floats, Floats]:
     return np.concatenate(points), weights
 
 
-@cache
 def triangle_rule() -> tuple[Floats, Floats]:
     """Six points of a rule of degree 4 on a triangle (Dunavant 1985): barycentric points (6, 3), weights (6,)."""
     a, b = 0.445948490915965, 0.091576213509771

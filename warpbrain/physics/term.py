@@ -6,8 +6,6 @@ tetrahedron), and writes the forces and tangent blocks of each into arrays that 
 The system knows no term by name.
 """
 
-from __future__ import annotations
-
 import abc
 import weakref
 from collections.abc import Callable, Sequence
@@ -193,14 +191,14 @@ class Term(abc.ABC):
         for name, values in zip(self.memory, remembered, strict=True):
             wp.copy(getattr(self, name), values)
 
-    def fits(self, other: Term) -> bool:
+    def fits(self, other: "Term") -> bool:
         """Whether `adopt` can take what another term is: stencils and arrays of the same shapes."""
         if type(self) is not type(other) or not np.array_equal(self.stencils, other.stencils):
             return False
         attributes = vars(self)
         return all(attributes[name].shape == array.shape for name, array in other._arrays().items())
 
-    def adopt(self, other: Term) -> None:
+    def adopt(self, other: "Term") -> None:
         """Become what another term on the same body is, in the same arrays: a captured graph reads these.
 
         Its ramp and plain values are taken too. What it remembers stays, and so does what is `lasting`.

@@ -5,8 +5,6 @@ no weight, and none is set aside. Of a tracked point it is the distance from whe
 surface the distance to the computed surface. Forces and pressures are rows of their own units and stand apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -78,7 +76,7 @@ class Error:
     largest: float
 
     @classmethod
-    def of(cls, residuals: ArrayLike, unit: str = "m") -> Error:
+    def of(cls, residuals: ArrayLike, unit: str = "m") -> "Error":
         """The error of residual vectors (n, 3) or distances (n,)."""
         distances = lengths(residuals)
         return cls(

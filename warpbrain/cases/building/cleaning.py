@@ -195,8 +195,7 @@ def _improve(node: int, points: Floats, star: Ints, normals: Floats, lifted: Flo
     flat = corners.reshape(-1, 4, 3)
     cell = np.arange(len(flat) * 4).reshape(-1, 4)
     angles = dihedral_angles(flat.reshape(-1, 3), cell).min(axis=1)
-    a, b, c = (flat[:, i] - flat[:, 0] for i in (1, 2, 3))
-    angles[np.einsum("ij,ij->i", np.cross(a, b), c) <= 0] = -1
+    angles[signed_volumes(flat.reshape(-1, 3), cell) <= 0] = -1
     score = angles.reshape(len(candidates) + 1, -1).min(axis=1)
     best = int(score.argmax())
     if score[best] <= score[0] + 1e-3:

@@ -4,8 +4,6 @@ MMG answers Ctrl-C by ending the process that it runs in. Here that is a child, 
 IN OUT OPTIONS`, and the program itself clears up.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import subprocess
@@ -90,11 +88,11 @@ class Cells:
     tetrahedra: Ints
     labels: Ints
 
-    def part(self, chosen: Bools) -> Cells:
+    def part(self, chosen: Bools) -> "Cells":
         """Some of the tetrahedra (m,), and all points."""
         return Cells(self.points, self.tetrahedra[chosen], self.labels[chosen])
 
-    def compact(self) -> Cells:
+    def compact(self) -> "Cells":
         """The same without points that no tetrahedron uses."""
         used, inverse = np.unique(self.tetrahedra, return_inverse=True)
         return Cells(self.points[used], inverse.reshape(self.tetrahedra.shape), self.labels)

@@ -1,7 +1,5 @@
 """Reads `case.toml`: its bytes into tables, each against what it may say, and the files of its folder that it names."""
 
-from __future__ import annotations
-
 import itertools
 import tomllib
 from dataclasses import dataclass, field, replace
@@ -49,7 +47,7 @@ class Reading:
     `where`: how a message calls it: ``"tissue.1"``, ``"boundary 2"``.
     """
 
-    def __init__(self, table: Table, values: Any, context: Context, where: str) -> None:
+    def __init__(self, table: Table, values: Any, context: "Context", where: str) -> None:
         self.context, self.where = context, where
         self._good: dict[str, Any] = {}
         self._named: set[str] = set(values) if isinstance(values, dict) else set()
