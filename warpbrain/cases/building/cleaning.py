@@ -10,7 +10,7 @@ from warpbrain.cases.building.mmg import Cells
 from warpbrain.errors import InputError
 from warpbrain.mesh import boundary_faces, pinched_nodes, split_boundary
 from warpbrain.mesh.quality import components, dihedral_angles, measure_arrays
-from warpbrain.mesh.surface import FACES, face_vectors, interface_faces, node_vectors, paired_faces
+from warpbrain.mesh.surface import FACES, face_vectors, interface_faces, node_vectors, paired_faces, unit
 from warpbrain.mesh.tet_mesh import signed_volumes
 
 # pieces of a tissue smaller than this [mm3, template] go to their neighbour
@@ -157,18 +157,13 @@ def open_angles(cells: Cells, wanted: float) -> Cells:
 
 def _normals(cells: Cells) -> list[Floats]:
     """Directions each node must not move in: none inside, the normal of its surface, two where surfaces meet."""
-    rows: list[list[Floats]] = [[] for _ in cells.points]
-    for faces in (
+    surfaces = (
         boundary_faces(cells.tetrahedra),
         interface_faces(cells.tetrahedra, cells.labels % 10),
         interface_faces(cells.tetrahedra, cells.labels // 10),
-    ):
-        total = node_vectors(cells.points, faces)
-        for node in np.unique(faces):
-            length = np.linalg.norm(total[node])
-            if length > 0:
-                rows[node].append(total[node] / length)
-    return [np.array(normal).reshape(-1, 3) for normal in rows]
+    )
+    normals = np.stack([unit(node_vectors(cells.points, faces)) for faces in surfaces], axis=1)
+    return [rows[rows.any(axis=1)] for rows in normals]
 
 
 _CORNERS = np.array([ijk for ijk in product((-1.0, 0.0, 1.0), repeat=3) if any(ijk)])

@@ -197,9 +197,8 @@ def discretise(anatomy: Anatomy, recipe: CaseRecipe, multi: bool, spacing: float
     def sampled(field: Singles) -> Field:
         return partial(anatomy.grid.sampled, field)
 
-    inside, origin = np.argwhere(anatomy.brain > 0), anatomy.grid.affine[:3, 3]
-    lower, upper = (origin + end for end in (inside.min(axis=0) - spacing, inside.max(axis=0) + spacing))
-    points, tetrahedra = bcc_lattice(lower, upper, spacing)
+    inside = anatomy.grid.positions(np.argwhere(anatomy.brain > 0))
+    points, tetrahedra = bcc_lattice(inside.min(axis=0) - spacing, inside.max(axis=0) + spacing, spacing)
     cells = Cells(points, tetrahedra, np.full(len(tetrahedra), GREY, dtype=np.int64))
     near = sampled(anatomy.brain)(points)[tetrahedra].max(axis=1) > -0.3
     cells = cells.part(near).compact()
