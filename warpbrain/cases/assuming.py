@@ -10,12 +10,9 @@ from warpbrain.cases.format.tables import MECHANISM
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError, require_kind
 from warpbrain.physics.composition import require_composable, require_left
-from warpbrain.physics.mechanism import Facts, ParameterError, ParameterSpec, Removing
+from warpbrain.physics.mechanism import NUMBERS, Facts, ParameterError, ParameterSpec, Removing
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.problems import Problems, nearest
-
-#: Kinds of parameters whose values are names.
-_NAMES = ("text", "node set", "element set", "directions", "surface")
 
 
 def assume(case: Case, said: str) -> Case:
@@ -84,7 +81,7 @@ def _with(case: Case, said: str) -> Case:
 
 
 def _value(spec: ParameterSpec, key: str, text: str) -> Any:
-    if spec.kind in _NAMES:
+    if spec.kind not in NUMBERS:
         if spec.choices and text not in spec.choices:
             raise InputError(f"{key}: found '{text}', expected one of {', '.join(spec.choices)}")
         return text
