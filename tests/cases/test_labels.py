@@ -19,7 +19,6 @@ from warpbrain.errors import InputError
 from warpbrain.images.grid import Grid
 from warpbrain.images.reading import Image
 from warpbrain.mesh import boundary_faces, components, dihedral_angles, pinched_nodes, split_boundary
-from warpbrain.mesh.tet_mesh import signed_volumes
 
 SIZE = 14.0
 SMALL = np.zeros((6, 7, 8), dtype=np.uint8)
@@ -295,44 +294,42 @@ def made(tmp_path_factory):
 
 
 def test_mesh_conforms_and_is_good(made):
-    assert components(made.tetrahedra).max() == 0
-    assert components(made.tetrahedra, made.tissue).max() == 1
-    outer, cavities = split_boundary(made.points, made.tetrahedra)
+    assert components(made.mesh.tetrahedra).max() == 0
+    assert components(made.mesh.tetrahedra, made.mesh.tissue).max() == 1
+    outer, cavities = split_boundary(made.mesh.points, made.mesh.tetrahedra)
     # every face has a partner, but for those of the outer surface and of one cavity
     assert len(cavities) == 1
-    assert len(outer) + len(cavities[0]) == len(boundary_faces(made.tetrahedra))
-    assert len(pinched_nodes(boundary_faces(made.tetrahedra))) == 0
-    assert dihedral_angles(made.points, made.tetrahedra).min() > 15
-    edges = np.diff(made.points[made.tetrahedra[:, [0, 1]]], axis=1)
+    assert len(outer) + len(cavities[0]) == len(boundary_faces(made.mesh.tetrahedra))
+    assert len(pinched_nodes(boundary_faces(made.mesh.tetrahedra))) == 0
+    assert dihedral_angles(made.mesh.points, made.mesh.tetrahedra).min() > 15
+    edges = 1e3 * np.diff(made.mesh.points[made.mesh.tetrahedra[:, [0, 1]]], axis=1)
     # a size is asked of the lattice, which is cut at surfaces: 1.8 % off
     assert np.linalg.norm(edges, axis=-1).mean() == pytest.approx(SIZE, rel=0.03)
 
 
 def test_mesh_has_the_volumes_of_the_labels(made):
-    volumes = signed_volumes(made.points, made.tetrahedra)
-    assert set(np.unique(made.tissue)) == {2, 3}
+    volumes = made.mesh.volumes
+    assert set(np.unique(made.mesh.tissue)) == {2, 3}
     # discretisation: flat faces in edges of 14 mm, on layers of half axes of 46 mm, leave out 6.9 % of grey matter and
     # 2.4 % of the whole
     for label in (2, 3):
-        assert 1e-9 * volumes[made.tissue == label].sum() == pytest.approx(volume_of(label), rel=0.08)
-        assert 1e-9 * made.labelled[label] == pytest.approx(volume_of(label), rel=0.01)
-    assert 1e-9 * volumes.sum() == pytest.approx(volume_of(2) + volume_of(3), rel=0.03)
-    np.testing.assert_allclose(
-        np.average(made.points[made.tetrahedra].mean(axis=1), axis=0, weights=volumes), CENTRE, atol=0.15
-    )
+        assert volumes[made.mesh.tissue == label].sum() == pytest.approx(volume_of(label), rel=0.08)
+        assert made.labelled[label] == pytest.approx(volume_of(label), rel=0.01)
+    assert volumes.sum() == pytest.approx(volume_of(2) + volume_of(3), rel=0.03)
+    np.testing.assert_allclose(1e3 * np.average(made.mesh.centres, axis=0, weights=volumes), CENTRE, atol=0.15)
 
 
 @pytest.mark.slow(4)
 def test_mesh_is_the_same_again(made, tmp_path):
     again = of_tilted_voxels(tmp_path / "a.nii")
-    np.testing.assert_array_equal(again.tetrahedra, made.tetrahedra)
-    np.testing.assert_array_equal(again.points, made.points)
-    np.testing.assert_array_equal(again.tissue, made.tissue)
+    np.testing.assert_array_equal(again.mesh.tetrahedra, made.mesh.tetrahedra)
+    np.testing.assert_array_equal(again.mesh.points, made.mesh.points)
+    np.testing.assert_array_equal(again.mesh.tissue, made.mesh.tissue)
 
 
 def test_mesh_lies_where_the_affine_says(made):
     assert np.linalg.det(TILTED) == pytest.approx(-1.0)
-    lower, upper = made.points.min(axis=0), made.points.max(axis=0)
+    lower, upper = 1e3 * made.mesh.points.min(axis=0), 1e3 * made.mesh.points.max(axis=0)
     # [mm], of voxels of 2 to 4 mm and edges of 14 mm: 0.3 and 0.6 off, and flat faces leave out 2.4 % of the volume
     np.testing.assert_allclose((lower + upper) / 2, CENTRE, atol=0.6)
     np.testing.assert_allclose((upper - lower) / 2, (48, 58, 46), atol=1.0)
@@ -345,12 +342,12 @@ def test_a_cavity_may_open_to_the_outside(tmp_path):
     # a channel as wide as the ventricle, to the back
     labels[16:24, :21, 17:23][labels[16:24, :21, 17:23] > 0] = 4
     made = meshed(write_labels(tmp_path / "a.nii", labels, affine), "2=grey,3=grey,4=ventricle")
-    sets = made.sets
-    assert split_boundary(made.points, made.tetrahedra)[1] == []
-    deep = np.linalg.norm((made.points - CENTRE) / (48, 58, 46), axis=1)
+    sets = made.mesh.node_sets
+    assert split_boundary(made.mesh.points, made.mesh.tetrahedra)[1] == []
+    deep = np.linalg.norm((1e3 * made.mesh.points - CENTRE) / (48, 58, 46), axis=1)
     assert (deep[sets["ventricle"]] < 0.8).sum() > 30
     assert deep[sets["surface"]].min() > 0.75
-    assert set(np.unique(made.tissue)) == {2}
+    assert set(np.unique(made.mesh.tissue)) == {2}
 
 
 def test_a_tissue_too_thin_for_the_size_is_named(tmp_path):
@@ -445,7 +442,7 @@ def test_a_lattice_that_cannot_be_meshed_is_followed_by_another(tmp_path, monkey
 
     monkeypatch.setattr(labels, "remesh", fails_at_first)
     path = write_ellipsoids(tmp_path / "a.nii.gz")
-    assert meshed(path, size=20.0).tissue.size > 100
+    assert meshed(path, size=20.0).mesh.tissue.size > 100
     assert calls[1] > calls[0]
     monkeypatch.setattr(labels, "remesh", lambda cells, edge: None)
     with pytest.raises(InputError, match=r"with elements of about 20 mm: try another --size"):

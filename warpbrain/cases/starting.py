@@ -115,14 +115,10 @@ def start_from_labels(
         unnamed = "" if others is None else f"; {len(set(volumes) - set(named))} of them are --others {others}"
         notes.append(f"outside the mesh: {total / 1000.0:.4g} cm3, labels {out}{unnamed}")
     notes += made.notes
-    tissue = made.tissue.astype(np.int32)
-    resected = [number for number, name in assignment.tissues.items() if name == RESECTION]
-    taken = {RESECTION: np.isin(tissue, resected)} if resected else {}
-    mesh = ordered(TetMesh(made.points * 1e-3, made.tetrahedra.astype(np.int32), tissue, made.sets, taken))
+    mesh, tissues = made.mesh, dict(assignment.tissues)
     cavity = _cavity_volume(mesh)
-    tissues = dict(assignment.tissues)
-    notes += _unfaithful(made, mesh, tissues)
-    if (wanted := made.labelled_cavity * 1e-9) > 0 and abs(cavity / wanted - 1) > FAITHFUL:
+    notes += _unfaithful(made, tissues)
+    if (wanted := made.labelled_cavity) > 0 and abs(cavity / wanted - 1) > FAITHFUL:
         notes.append(
             f"{VENTRICLE}: {_cm3(cavity)} closed in the mesh, {_cm3(wanted)} in the labels: it is in part thinner than "
             "an element, or opens to the outside; a smaller --size shows more of it"
@@ -133,10 +129,10 @@ def start_from_labels(
         mesh,
         tissues,
         measure(mesh),
-        {number: volume * 1e-9 for number, volume in made.labelled.items()},
+        made.labelled,
         made.in_place,
         cavity,
-        made.labelled_cavity * 1e-9,
+        made.labelled_cavity,
         tuple(notes),
     )
 
@@ -242,11 +238,11 @@ def _cm3(volume: float) -> str:
     return f"{volume * 1e6:.4g} cm3"
 
 
-def _unfaithful(made: LabelMesh, mesh: TetMesh, tissues: Mapping[int, str]) -> list[str]:
+def _unfaithful(made: LabelMesh, tissues: Mapping[int, str]) -> list[str]:
     """What to say about tissues that the mesh shows with another volume, or elsewhere."""
     notes = []
     for number, name in tissues.items():
-        wanted, got = made.labelled[number] * 1e-9, _tissue_volume(mesh, number)
+        wanted, got = made.labelled[number], _tissue_volume(made.mesh, number)
         if abs(got / wanted - 1) > FAITHFUL:
             notes.append(
                 f"{name}: {_cm3(got)} in the mesh, {_cm3(wanted)} in the labels ({100 * (got / wanted - 1):+.0f} %): "

@@ -6,15 +6,16 @@ from functools import partial
 
 import numpy as np
 
-from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.arrays import Bools, Floats
 from warpbrain.cases.building.cleaning import crumbs_given_away, cut_body, finished
 from warpbrain.cases.building.label_fields import CAVITY, LabelFields, make_fields, make_regions
 from warpbrain.cases.building.lattice import bcc_lattice, cut
 from warpbrain.cases.building.mmg import Cells, remesh
 from warpbrain.cases.building.node_sets import first_sets
-from warpbrain.cases.building.tissue_names import Assignment
+from warpbrain.cases.building.tissue_names import RESECTION, Assignment
 from warpbrain.errors import InputError
 from warpbrain.images.reading import Image
+from warpbrain.mesh import TetMesh, ordered
 from warpbrain.mesh.quality import mean_edge
 
 # nodes of a mesh whose size is not given: about what the shipped cases have
@@ -48,11 +49,8 @@ EASIER = 7.0
 class LabelMesh:
     """A mesh made from labels."""
 
-    points: Floats  # (n, 3) [mm, RAS]
-    tetrahedra: Ints  # (m, 4)
-    tissue: Ints  # (m,), numbers of the assignment
-    sets: dict[str, Bools]  # of nodes, see `first_sets`
-    #: Volume [mm3] of the labels of each tissue, by number, and of the cavities.
+    mesh: TetMesh  # with numbers of the assignment, `first_sets`, and what is called `RESECTION` as an element set
+    #: Volume [m3] of the labels of each tissue, by number, and of the cavities.
     labelled: dict[int, float]
     labelled_cavity: float
     #: Share of the voxels of each tissue that lie in that tissue of the mesh, before the cutting.
@@ -95,13 +93,14 @@ def mesh_labels(
         cavity, body = (fields.grid.sampled(field, beyond) for field in (fields.cavity, fields.body))
         return (cavity > 0) & (body > 0)
 
+    numbers = np.array([0, *assignment.tissues], dtype=np.int32)[made.labels]
+    resected = [number for number, name in assignment.tissues.items() if name == RESECTION]
+    taken = {RESECTION: np.isin(numbers, resected)} if resected else {}
+    sets = first_sets(made.points, made.tetrahedra, opens)
     return LabelMesh(
-        made.points,
-        made.tetrahedra,
-        np.array([0, *assignment.tissues])[made.labels],
-        first_sets(made.points, made.tetrahedra, opens),
-        {number: regions.labelled.get(code, 0.0) for code, number in enumerate(assignment.tissues, 1)},
-        regions.labelled.get(CAVITY, 0.0),
+        ordered(TetMesh(made.points * 1e-3, made.tetrahedra.astype(np.int32), numbers, sets, taken)),
+        {number: 1e-9 * regions.labelled.get(code, 0.0) for code, number in enumerate(assignment.tissues, 1)},
+        1e-9 * regions.labelled.get(CAVITY, 0.0),
         {number: fields.in_place.get(code, 0.0) for code, number in enumerate(assignment.tissues, 1)},
         tuple(notes),
     )
