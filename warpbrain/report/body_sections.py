@@ -15,7 +15,7 @@ from warpbrain.atomic import write_text
 from warpbrain.mesh import TetMesh
 from warpbrain.report import views
 from warpbrain.report.files import LEFT, MILLIMETRES, TRUST, UNSEEN, SavedState
-from warpbrain.report.page import Section, Top, document, part
+from warpbrain.report.page import page, part
 from warpbrain.report.page.figures import TEXT, colour_bar, data, inlined, panels
 from warpbrain.report.page.scene import Arrows, Field, View, viewer
 from warpbrain.report.picture import Moved, Pictures, arrow_colours, heading, notes_on, round_factor, scene_of
@@ -145,9 +145,10 @@ def window(state: SavedState, exaggeration: float | None) -> Any:
 
 def write_view_page(path: Path, state: SavedState, exaggeration: float | None) -> None:
     """Write a body as one HTML file; `exaggeration` is chosen if it is None."""
-    places = views.places(state.mesh)
-    body = body_view(state.mesh, state.u, fields_of(state), _NO_POINTS, places, exaggeration)
+    view = body_view(state.mesh, state.u, fields_of(state), _NO_POINTS, views.places(state.mesh), exaggeration)
     largest = MILLIMETRES * float(np.linalg.norm(state.u, axis=1).max())
-    facts = [("largest displacement", f"{largest:.3g} mm"), ("nodes", f"{len(state.mesh.points)}")]
-    top = Top(str(state.path), "a deformed body", (QUIET, "#ffffff"), [], facts)
-    write_text(path, document(f"warpbrain: {state.path.name}", top, [Section("In three dimensions", body)]))
+    text = page(
+        f"warpbrain: {state.path.name}", str(state.path), "a deformed body", (QUIET, "#ffffff"), [],
+        "view.html", view=view, largest=largest, nodes=len(state.mesh.points),
+    )  # fmt: skip
+    write_text(path, text)

@@ -19,7 +19,7 @@ from warpbrain.report.body_sections import before_and_after, body_view, fields_o
 from warpbrain.report.comparison import SHOWN, explained
 from warpbrain.report.estimate import averaged_row, parameter_row, prediction_row
 from warpbrain.report.files import MILLIMETRES, read_state
-from warpbrain.report.page import Top, document, sections_of
+from warpbrain.report.page import page
 from warpbrain.report.page.figures import inlined, side_by_side
 from warpbrain.report.picture import Moved, Pictures, begin_pictures, draw
 from warpbrain.report.run_page import BADGES
@@ -57,7 +57,10 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
         agreement = inlined(lambda narrow: agreement_figure(posterior, narrow))
     causes = [] if nothing is None else [cause for cause in nothing["causes"] if cause["probability"] >= _LIKELY]
     pictures = draw(folder / "deformation.png", begun, case["title"], subtitles)
-    sections, facts = sections_of(
+    sentences = [*summary["identifiability"]["sentences"], *judged.sentences]
+    window = f"{case['name']}: tissue of {case['title']}"
+    text = page(
+        window, case["title"], judged.verdict, BADGES[judged.verdict], sentences,
         "estimate.html", summary=summary, judged=judged, agreement=agreement,
         tissue=[parameter_row(parameter) for parameter in summary["parameters"]],
         densities=inlined(lambda narrow: densities_figure(posterior, narrow)),
@@ -74,9 +77,7 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
         seconds=[[name, f"{value:.1f}"] for name, value in summary["seconds"].items()],
         files=[[name, Markup("<code>{}</code>").format(value)] for name, value in summary["inputs_sha256"].items()],
     )  # fmt: skip
-    sentences = [*summary["identifiability"]["sentences"], *judged.sentences]
-    top = Top(case["title"], judged.verdict, BADGES[judged.verdict], sentences, facts)
-    write_text(folder / "report.html", document(f"{case['name']}: tissue of {case['title']}", top, sections))
+    write_text(folder / "report.html", text)
     return pictures
 
 

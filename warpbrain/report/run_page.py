@@ -14,7 +14,7 @@ from warpbrain.atomic import write_text
 from warpbrain.report import views
 from warpbrain.report.body_sections import before_and_after, body_view
 from warpbrain.report.comparison import IN_PART, NEARER, NO_NEARER, UNKNOWN, WORSE, explained_of, recorded_rows
-from warpbrain.report.page import Top, document, lines, sections_of
+from warpbrain.report.page import lines, page
 from warpbrain.report.page.figures import inlined
 from warpbrain.report.page.scene import Field
 from warpbrain.report.picture import Moved, Pictures, begin_pictures, draw
@@ -81,8 +81,9 @@ def _write(
     **values: Any,
 ) -> None:
     case = summary["case"]
-    sections, facts = sections_of(
-        "run.html", summary=summary, **values,
+    window = f"{case['name']}: {case['title']}"
+    text = page(
+        window, case["title"], badge, colours, sentences, "run.html", summary=summary, **values,
         recorded=recorded_rows(summary["recordings"]["compared"]),
         tissues=[
             [label, tissue["name"], f"{tissue['law']} ({tissue['formulation']})", f"{tissue['shear_modulus_Pa']:g}"]
@@ -90,5 +91,4 @@ def _write(
         ],
         seconds=[[name, f"{value:.2f}"] for name, value in summary["seconds_by_phase"].items()],
     )  # fmt: skip
-    top = Top(case["title"], badge, colours, sentences, facts)
-    write_text(path, document(f"{case['name']}: {case['title']}", top, sections))
+    write_text(path, text)

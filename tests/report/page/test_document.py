@@ -2,23 +2,26 @@
 
 import re
 
-from warpbrain.report.page import Section, Top, document, part, table
+from warpbrain.report.page import _environment, page, part, table
 
 COLOURS = ("#000", "#fff")
 EVIL = '</title><script>alert("1")</script>'
 
 
 def test_words_are_no_markup():
-    page = document(EVIL, Top(EVIL, EVIL, COLOURS, [EVIL], []), [Section(EVIL, part("listed", [EVIL]))])
-    assert "<script>" not in page and page.count("&lt;script&gt;") == 7
+    template = "{{ fact(evil, evil) }}{% call section(evil) %}{{ evil }}{{ listed }}{% endcall %}"
+    values = {"evil": EVIL, "listed": part("listed", [EVIL])}
+    text = page(EVIL, EVIL, EVIL, COLOURS, [EVIL], _environment().from_string(template), **values)
+    assert "<script>" not in text and text.count("&lt;script&gt;") == 10
 
 
 def test_contents_lead_to_sections_that_have_something():
-    sections = [Section("Before & after", "<p>a</p>"), Section("Empty", ""), Section("What was assumed", "<p>b</p>")]
-    page = document("title", Top("title", "badge", COLOURS, [], [("x", "1 mm")]), sections)
-    links = re.findall(r'<a href="#([^"]*)">', page)
-    assert links == ["before-after", "what-was-assumed"] == re.findall(r'<section id="([^"]*)">', page)
-    assert "Empty" not in page
+    bodies = {"Before & after": "<p>a</p>", "Empty": "", "What was assumed": "<p>b</p>"}
+    sections = [f'{{% call section("{title}") %}}{body}{{% endcall %}}' for title, body in bodies.items()]
+    text = page("title", "title", "badge", COLOURS, [], _environment().from_string("".join(sections)))
+    links = re.findall(r'<a href="#([^"]*)">', text)
+    assert links == ["before-after", "what-was-assumed"] == re.findall(r'<section id="([^"]*)">', text)
+    assert "Empty" not in text
 
 
 def test_a_column_in_which_nothing_stands_is_left_out():

@@ -11,7 +11,7 @@ from warpbrain.report.body_sections import known_displacement
 from warpbrain.report.diagnosis import pictures, text
 from warpbrain.report.diagnosis.files import Recorded
 from warpbrain.report.files import SavedState
-from warpbrain.report.page import Top, document, sections_of
+from warpbrain.report.page import page
 from warpbrain.report.page.scene import viewer
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, PURPLE, QUIET, SKY, VIEWS
 from warpbrain.worlds.specimen.result import SpecimenDiagnosis
@@ -44,7 +44,13 @@ def page_of(
         anatomy = pictures.Anatomy(diagnosis, summary)
         places = [float(anatomy.centre[view.axis]) for view in VIEWS]
         drawn = {**drawn, "known": known_displacement(state, anatomy.mesh, places)}
-    sections, facts = sections_of(
+    title, verdict = summary["case"]["title"], summary["verdict"]
+    return page(
+        f"{verdict}: {title}",
+        title,
+        verdict,
+        _BADGES[verdict],
+        [summary["sentence"]],
         "diagnosis.html",
         summary=summary,
         pictures=defaultdict(str, drawn),
@@ -52,9 +58,6 @@ def page_of(
         aside=[] if recorded is None else recorded.aside,
         chances={candidate["mechanism"]: candidate["probability"] for candidate in summary["ranking"]},
     )
-    title, verdict = summary["case"]["title"], summary["verdict"]
-    top = Top(title, verdict, _BADGES[verdict], [summary["sentence"]], facts)
-    return document(f"{verdict}: {title}", top, sections)
 
 
 def pictures_of(diagnosis: Diagnosis | SpecimenDiagnosis, summary: dict[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 The macros of a text template (`run.txt`, `estimate.txt`, ...) make what is printed. A template of a page (`run.html` of
 runs and tests of specimens, `estimate.html`, `diagnosis.html`) makes sections of a result, with what is said of their
-figures, and the facts on top; `document` puts them below a verdict and a table of contents into the frame, with
+figures, and the facts on top; `page` puts them below a verdict and a table of contents into the frame, with
 `page.css`. Macros of `parts.html` make what pages share, those of `notebook.html` what a notebook shows; `figures`
 makes still figures, `scene` with `scene.js` the view in three dimensions.
 """
@@ -12,7 +12,6 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -27,30 +26,6 @@ from warpbrain.physics.words import tabled
 _SHORT = 8
 #: Characters of a printed line of prose.
 _WIDTH = 110
-
-
-@dataclass(frozen=True)
-class Section:
-    """A part of a page: its title in words, and its HTML."""
-
-    title: str
-    body: str
-
-    @property
-    def anchor(self) -> str:
-        """What a link of the contents goes to."""
-        return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-")
-
-
-@dataclass(frozen=True)
-class Top:
-    """What stands on top: whose page it is, a badge with colours of its ground and letters, sentences, and numbers."""
-
-    title: str
-    badge: str
-    colours: tuple[str, str]
-    sentences: Sequence[str]
-    facts: Sequence[tuple[str, str]]
 
 
 @cache
@@ -85,13 +60,27 @@ def part(name: str, *values: Any, template: str = "parts.html") -> Markup:
     return Markup(getattr(_environment().get_template(template).module, name)(*values))
 
 
-def sections_of(template: str, **values: Any) -> tuple[list[Section], list[tuple[str, str]]]:
-    """The sections that a template makes of values, and the facts that it puts on top: words of these are no markup."""
-    sections: list[Section] = []
+def page(
+    window: str,
+    title: str,
+    badge: str,
+    colours: tuple[str, str],
+    sentences: Sequence[str],
+    template: str,
+    **values: Any,
+) -> str:
+    """A page as one HTML file: the sections that a template makes of values, whose words are no markup.
+
+    On top stand a title, a badge with the colours of its ground and letters, sentences, and the facts that the template
+    says; `window` is the title of the window. Sections without a body are left out.
+    """
+    sections: list[tuple[str, str, Markup]] = []
     facts: list[tuple[str, str]] = []
 
-    def section(title: str, caller: Callable[[], str]) -> str:
-        sections.append(Section(title, str(caller()).strip()))
+    def section(heading: str, caller: Callable[[], str]) -> str:
+        if body := str(caller()).strip():
+            anchor = re.sub(r"[^a-z0-9]+", "-", heading.lower()).strip("-")
+            sections.append((anchor, heading, Markup(body)))
         return ""
 
     def fact(name: str, value: str) -> str:
@@ -99,12 +88,7 @@ def sections_of(template: str, **values: Any) -> tuple[list[Section], list[tuple
         return ""
 
     _environment().get_template(template).render(section=section, fact=fact, **values)
-    return sections, facts
-
-
-def document(title: str, top: Top, sections: Sequence[Section]) -> str:
-    """A page as one HTML file; `title` is of the window, sections without a body are left out."""
-    return str(part("frame", title, top, [section for section in sections if section.body])) + "\n"
+    return f"{part('frame', window, title, badge, colours, sentences, facts, sections)}\n"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]], numbers: Sequence[int] = (), caption: str = "") -> Markup:
