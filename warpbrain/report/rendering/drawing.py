@@ -161,7 +161,7 @@ def _draw_cut(plotter: Any, scene: Scene, axis: int, camera: Camera) -> None:
 
 
 def _arrows(plotter: Any, where: Floats, vectors: Floats, colour: str, size: float) -> None:
-    """Arrows from places, as one surface; what is too short to be seen is not drawn.
+    """Arrows from places; what is too short to be seen is not drawn.
 
     Shafts and heads have one width, whatever the length.
     """
@@ -170,22 +170,12 @@ def _arrows(plotter: Any, where: Floats, vectors: Floats, colour: str, size: flo
     if not seen.any():
         return
     where, vectors, lengths = where[seen], vectors[seen], lengths[seen]
-    shaft, wide, head = 0.0035 * size, 0.010 * size, np.minimum(0.5 * lengths, 0.028 * size)
-    along = vectors / lengths[:, None]
-    across = np.cross(along, np.where(np.abs(along[:, :1]) < 0.8, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]))
-    across /= np.linalg.norm(across, axis=1)[:, None]
-    third = np.cross(along, across)
-    turns = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
-    around = np.cos(turns)[:, None, None] * across + np.sin(turns)[:, None, None] * third
-    neck = where + (lengths - head)[:, None] * along
-    # rings: start, end of the shaft, rim of the head, tip
-    rings = np.stack(
-        [where + shaft * around, neck + shaft * around, neck + wide * around, where + vectors + 0.0 * around]
-    )
-    number = np.arange(rings.size // 3).reshape(4, _SIDES, len(where))
-    following = np.roll(number, -1, axis=1)
-    quads = np.stack([number[:-1], following[:-1], following[1:], number[1:]], axis=-1).reshape(-1, 4)
-    arrows = pyvista.PolyData.from_regular_faces(rings.reshape(-1, 3), quads)
+    heads = np.minimum(0.5 * lengths, 0.028 * size)
+    necks = where + (1.0 - heads / lengths)[:, None] * vectors
+    # tubes from start to neck, and from neck to tip, where their radius vanishes
+    lines = pyvista.line_segments_from_points(np.stack([where, necks, necks, where + vectors], axis=1).reshape(-1, 3))
+    lines.point_data["radius"] = size * np.tile([0.0035, 0.0035, 0.010, 0.0], len(where))
+    arrows = lines.tube(scalars="radius", absolute=True, n_sides=_SIDES)
     plotter.add_mesh(arrows, color=colour, ambient=0.45)
 
 
