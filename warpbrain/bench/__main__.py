@@ -1,7 +1,5 @@
 """Command line of the bench, as `commands.toml` describes it."""
 
-from __future__ import annotations
-
 from warpbrain.terminal.arguments import call, described_in, fill
 from warpbrain.terminal.command import OneLineParser, exit_status
 

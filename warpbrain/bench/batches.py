@@ -3,8 +3,6 @@
 The time of a step and sample over the size of a batch, and the gain of several processes.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Iterator

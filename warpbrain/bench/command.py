@@ -1,7 +1,5 @@
 """What the commands of the bench share: checks, the machine that a recorded time must name, and its file."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -1,7 +1,5 @@
 """`python -m warpbrain.bench diagnose`: how long each stage of a diagnosis takes."""
 
-from __future__ import annotations
-
 import argparse
 import platform
 import time

@@ -5,8 +5,6 @@ homogeneous deformation must deform so inside, whatever its mesh (the patch test
 Newton's method and the linear solver all have to be right for that.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import platform

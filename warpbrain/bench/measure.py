@@ -8,8 +8,6 @@ identity or by bytes can answer for it. Warm are only kernels, compiled and load
 that is paid once on a machine or in a process, not for a mesh.
 """
 
-from __future__ import annotations
-
 import argparse
 import gc
 import statistics

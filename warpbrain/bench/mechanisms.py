@@ -3,8 +3,6 @@
 Steps and equilibria of a case with it and without it take turns.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ The numbers and where they are from are in `table3.toml`. The paper does not pub
 at least as large as the median clinical mesh of its Table 5.
 """
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import dataclass
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """`python -m warpbrain.bench threads`: a step and an equilibrium on the CPU by the number of threads."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import os

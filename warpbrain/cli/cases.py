@@ -1,7 +1,5 @@
 """`warpbrain cases`: list, show, check, begin and rebuild cases."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

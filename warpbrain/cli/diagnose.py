@@ -1,7 +1,5 @@
 """`warpbrain diagnose`: what was left out of a case."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`warpbrain ensemble`: many samples of a case as one batched simulation, resumed where it was left."""
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable

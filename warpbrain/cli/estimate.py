@@ -1,7 +1,5 @@
 """`warpbrain estimate`: the tissue that a case's recordings are of."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """`warpbrain gp`: show, fit, sample and compare generative models of tissue."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from itertools import product

@@ -1,7 +1,5 @@
 """What commands say of a case in their log, and of the pictures that a page has."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from warpbrain.cases.case import Case

@@ -1,8 +1,6 @@
 """`warpbrain doctor`: whether this machine computes what it should; `completion`: what its shell needs to complete
 words."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

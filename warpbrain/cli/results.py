@@ -1,7 +1,5 @@
 """`warpbrain view` and `compare`: a result in a window or a page of its own, and two side by side."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -3,8 +3,6 @@
 That is to load what renders, in a process of its own, and to compile kernels.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 

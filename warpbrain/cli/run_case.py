@@ -1,7 +1,5 @@
 """`warpbrain run` after its kernels are begun: simulate a case, print what happened and write it."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """`warpbrain warp`: images and points as a result deforms them; and the same options for commands that make results."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

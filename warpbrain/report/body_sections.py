@@ -1,7 +1,5 @@
 """What pages of bodies share: pictures before and after, a view, how well the displacement is known; and `view`."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from pathlib import Path

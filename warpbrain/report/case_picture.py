@@ -3,8 +3,6 @@
 Three cuts as a radiologist holds them, and the body from outside with a corner cut out, as PyVista renders it.
 """
 
-from __future__ import annotations
-
 import textwrap
 from itertools import cycle
 from pathlib import Path

@@ -1,8 +1,6 @@
 """Recordings beside a simulated state: errors as a table and as JSON, every row as CSV, whether the state explains
 them better than nothing at all would, and what of the errors is likely to be the mesh's."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """An ensemble: what it prints, its JSON, one table of all samples, its fields on the mesh, and their picture."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path

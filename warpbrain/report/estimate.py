@@ -1,7 +1,5 @@
 """An estimate of tissue: its JSON, what is printed, and every recorded row beside what it makes of it, as CSV."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`report.html` of an estimate, and its figures: prior and posterior, observed against predicted, what is left."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Files: bodies for ParaView and 3D Slicer, and those of results opened again; JSON with units, tables as CSV."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

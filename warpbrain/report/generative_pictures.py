@@ -4,8 +4,6 @@ Colours are Okabe and Ito's, which the colour-blind tell apart; what has a colou
 of its own too, so that a print in grey says the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any

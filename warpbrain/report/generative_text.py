@@ -1,7 +1,5 @@
 """What the generative model of tissue says of itself, of moduli and of laws: tables for the terminal, and as CSV."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

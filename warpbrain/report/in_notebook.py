@@ -1,7 +1,5 @@
 """Results and cases as a table of HTML: what a notebook shows of them. The words are in `page/notebook.html`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

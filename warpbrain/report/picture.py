@@ -1,13 +1,11 @@
 """The picture of a run: the anatomy before, after, and what was recorded of it, as PyVista renders them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -34,7 +32,7 @@ class Moved:
     computed: Floats
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording], compared: Iterable[tuple[str, Ints, Floats, Floats]]) -> Moved:
+    def of(cls, recordings: Sequence[Recording], compared: Iterable[tuple[str, Ints, Floats, Floats]]) -> Self:
         """Of all recordings of displacements at points; of each `compared` one its name, its rows (n,), and what is
         left there (n, 3) [m] with nothing moved and with the simulation."""
         by_name = {recording.name: recording for recording in recordings}

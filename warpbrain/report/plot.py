@@ -1,7 +1,5 @@
 """Results, cases and meshes drawn in three dimensions: `warpbrain.plot`, and `.plot()` of all of them."""
 
-from __future__ import annotations
-
 from functools import singledispatch
 from pathlib import Path
 from typing import Any

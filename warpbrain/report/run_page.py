@@ -3,8 +3,6 @@
 Of tests of a specimen it is their curves in the place of a body. The words are in `page/run.html`.
 """
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path

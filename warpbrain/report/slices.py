@@ -1,7 +1,5 @@
 """Plane cuts through a body of tetrahedra, as polygons that carry what their elements and nodes carry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 The picture has one panel a test: over what was imposed, or over time, if the states of a test depend on its history.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

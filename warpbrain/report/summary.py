@@ -1,15 +1,14 @@
 """What a run prints and writes as JSON: dictionaries, from which printed tables are made, too; and a case in words."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Mapping
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from warpbrain import __version__
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.checking import NOTHING_ACTS
+from warpbrain.cases.drawn import FromPrior
 from warpbrain.mesh import measure
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import tabled
@@ -18,10 +17,7 @@ from warpbrain.report.page import lines
 from warpbrain.simulation.locking import NEARLY_INCOMPRESSIBLE, largest_poisson, locking_sentences
 from warpbrain.simulation.model import Model, unaware_of_midsides
 from warpbrain.simulation.result import Result
-
-if TYPE_CHECKING:
-    from warpbrain.cases.drawn import FromPrior
-    from warpbrain.simulation.system import System
+from warpbrain.simulation.system import System
 
 #: Said wherever a stand-in is met.
 STAND_IN = "a stand-in: the MNI anatomy deformed and scaled to the paper's volume, not the patient's images"

@@ -4,8 +4,6 @@ error surface, with the posterior's estimate on it where there is one.
 Each line ends with a checksum of itself and of what the sweep is of: a point whose line is damaged is computed again.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import json

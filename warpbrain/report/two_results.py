@@ -1,7 +1,5 @@
 """Two results side by side: folders opened again, inputs, distance from recordings, displacement, tissue, verdict."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ and a machine without graphics libraries. Cuts are shown as a radiologist holds 
 the right of the picture.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 import zlib

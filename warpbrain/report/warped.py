@@ -1,7 +1,5 @@
 """A result as other programs open it: displacement, transforms, warped images, moved points, a scene for Slicer."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """How a command ends: one line and an exit status, whatever went wrong; a defect leaves a report with what a developer
 needs and nothing of a user's data."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import platform

@@ -6,8 +6,6 @@ senses shortly after, ends the process. Files are whole or not there at all (`wa
 written under a temporary name is removed first.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """Memory that a process keeps for its next arrays, instead of giving it back to the system."""
 
-from __future__ import annotations
-
 import ctypes
 import platform
 

@@ -1,7 +1,5 @@
 """How far long work has come, on standard error: a bar on a terminal, and now and then a line in a file or pipe."""
 
-from __future__ import annotations
-
 import sys
 import time
 from types import TracebackType

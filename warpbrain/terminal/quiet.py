@@ -1,7 +1,5 @@
 """Starts Warp without its greeting, and without its warning that a machine without a GPU has no GPU driver."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

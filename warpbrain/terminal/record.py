@@ -1,7 +1,5 @@
 """What a command says, on standard output and in a log file beside its results."""
 
-from __future__ import annotations
-
 import shlex
 import time
 import warnings

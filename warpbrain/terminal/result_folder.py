@@ -6,8 +6,6 @@ itself and is the system's: it leaves no file behind, and goes with the process 
 such locks (Windows, some file systems of networks) nothing is claimed.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress

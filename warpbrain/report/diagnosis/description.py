@@ -1,7 +1,5 @@
 """A diagnosis as JSON: the contract of `diagnosis.json`, docs/diagnosis.md."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any

@@ -1,13 +1,11 @@
 """The files of a diagnosis beside its JSON: the map, tables of what was recorded, and the case with what was named."""
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -102,7 +100,7 @@ class Recorded(dict[str, Any]):
     """
 
     @classmethod
-    def of(cls, diagnosis: Diagnosis) -> Recorded:
+    def of(cls, diagnosis: Diagnosis) -> Self:
         """Of a diagnosis, lengths in mm, forces in N, axes RAS.
 
         `observed` is along `direction`; `declared`, `refitted` and `explained` are what was computed of it: in the case

@@ -1,7 +1,5 @@
 """`report.html`: one file that says what a diagnosis found. Its words are in `page/diagnosis.html`."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures of a diagnosis and its view: the body with what the map says, agreement, what imitates what, curves."""
 
-from __future__ import annotations
-
 import math
 from functools import cached_property
 from typing import Any

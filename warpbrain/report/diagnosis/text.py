@@ -1,7 +1,5 @@
 """A diagnosis as lines of text and as rows of tables, made from its JSON."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

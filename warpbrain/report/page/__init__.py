@@ -7,8 +7,6 @@ figures, and the facts on top; `page` puts them below a verdict and a table of c
 makes still figures, `scene` with `scene.js` the view in three dimensions.
 """
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Sequence

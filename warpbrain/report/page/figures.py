@@ -1,7 +1,5 @@
 """Figures of a page: each in two layouts, of which a browser shows the one that fits its window."""
 
-from __future__ import annotations
-
 import base64
 import io
 from collections.abc import Callable, Sequence

@@ -3,8 +3,6 @@
 Lengths are in mm, axes RAS; arrays are 32-bit numbers in base64.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Mapping, Sequence

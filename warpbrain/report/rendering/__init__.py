@@ -5,8 +5,6 @@ in another process: where there is no graphics library, VTK does not raise but c
 there is a scene (`ready_to_render`): its libraries take as long to load as a picture to be drawn.
 """
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys

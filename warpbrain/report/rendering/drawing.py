@@ -4,8 +4,6 @@
 input; without one it ends.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import sys
