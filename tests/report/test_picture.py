@@ -2,6 +2,7 @@
 
 import os
 import warnings
+from pathlib import Path
 
 import matplotlib.image
 import matplotlib.pyplot as plt
@@ -11,7 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapes import box
 
+from warpbrain.cases.case import Case, Tissue
 from warpbrain.mesh import TetMesh
+from warpbrain.physics.mechanism import Mechanism
+from warpbrain.physics.mechanisms.resection import Resection
 from warpbrain.report import picture
 from warpbrain.report.picture import Moved, begin_pictures, draw, round_factor
 from warpbrain.report.rendering import AFTER, AXIAL, BEFORE, CORONAL, MOTION, NAMES, SAGITTAL, RenderingError
@@ -29,10 +33,15 @@ def block() -> TetMesh:
     return TetMesh(mesh.points, mesh.tetrahedra, np.where(centres[:, 0] > 0.03, 2, 1), {}, {"resection": gone})
 
 
-def rendered(whole, left, u, moved=NO_POINTS):
+def case_of(mesh: TetMesh, *mechanisms: Mechanism, names: tuple[str, ...] = ("grey", "white")) -> Case:
+    tissues = {label: Tissue(name, None) for label, name in enumerate(names, 1)}
+    return Case("a", "A title", "measured", Path("case.toml"), mesh, tissues, 1000.0, 0.45, mechanisms=mechanisms)
+
+
+def rendered(case, u, moved=NO_POINTS):
     """Pictures; what cannot be rendered here is skipped, but not where tests must not be."""
     try:
-        begun = begin_pictures(whole, left, u, {1: "grey", 2: "white"}, moved)
+        begun = begin_pictures(case, u, moved)
         _ = begun.images
     except RenderingError as error:
         if os.environ.get("CI"):
@@ -44,12 +53,12 @@ def rendered(whole, left, u, moved=NO_POINTS):
 @pytest.fixture(scope="module")
 def pictures():
     """A block that moves by 1 mm, the farther the more right, front and top, with two recorded points."""
-    whole = block()
-    left, _, _ = whole.without(whole.element_sets["resection"])
+    case = case_of(block(), Resection())
+    left, _ = case.remaining
     u = 1e-3 * left.points.sum(axis=1, keepdims=True) / 0.18 * [0.0, 0.0, 1.0]
     where = np.array([[0.01, 0.03, 0.05], [0.05, 0.03, 0.05]])
     moved = Moved(where, np.array([[0.002, 0.0, 0.0]] * 2), np.array([[0.0, 0.0, 0.002]] * 2))
-    return rendered(whole, left, u, moved)
+    return rendered(case, u, moved)
 
 
 def bright(image) -> np.ndarray:
@@ -100,7 +109,7 @@ def test_recorded_and_computed_arrows_have_their_colours(pictures):
 def test_a_body_is_drawn_where_its_motion_puts_it(verify):
     mesh = box((3, 3, 3), (0.06, 0.06, 0.06))
     whole = TetMesh(mesh.points, mesh.tetrahedra, np.ones(len(mesh.tetrahedra), dtype=np.int32), {}, {})
-    found = rendered(whole, whole, np.tile([0.0, 0.0, 0.001], (len(whole.points), 1)))
+    found = rendered(case_of(whole), np.tile([0.0, 0.0, 0.001], (len(whole.points), 1)))
     factor, camera, image = found.scene.exaggeration, found.cameras[CORONAL], found.images[CORONAL]
     assert factor == 5.0
     # all of it has the last colour, a yellow
@@ -125,7 +134,7 @@ def test_pictures_of_any_body_become_a_file(tmp_path, monkeypatch):
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)
             # a dollar sign begins no formula
-            rendered = begin_pictures(plain, plain, u, {1: "$x", 2: "_y"}, NO_POINTS)
+            rendered = begin_pictures(case_of(plain, names=("$x", "_y")), u, NO_POINTS)
             drawn = draw(path, rendered, "A $title", ["with $ two", "lines"])
         assert not isinstance(drawn, str)
         assert [file.name for file in tmp_path.iterdir()] == ["a.png"]
@@ -141,7 +150,7 @@ def test_where_nothing_can_be_rendered_no_old_picture_stays(tmp_path, monkeypatc
     monkeypatch.setattr(picture, "render", fails)
     path, mesh = tmp_path / "a.png", block()
     path.write_bytes(b"of another run")
-    said = draw(path, begin_pictures(mesh, mesh, np.zeros(mesh.points.shape), {}, NO_POINTS), "A title", [])
+    said = draw(path, begin_pictures(case_of(mesh), np.zeros(mesh.points.shape), NO_POINTS), "A title", [])
     assert said == "no graphics" and not path.exists()
 
 

@@ -138,7 +138,7 @@ def window(state: SavedState, exaggeration: float | None) -> Any:
     from warpbrain.report.rendering.drawing import interactive
 
     nothing = np.zeros(len(state.mesh.tetrahedra), dtype=bool)
-    return interactive(scene_of(state.mesh, state.mesh, nothing, state.u, {}, _NO_POINTS), exaggeration)
+    return interactive(scene_of(state.mesh, nothing, state.u, {}, _NO_POINTS), exaggeration)
 
 
 def write_view_page(path: Path, state: SavedState, exaggeration: float | None) -> None:

@@ -163,11 +163,10 @@ def _draw_open(axes: Any, scene: _Scene) -> str:
     arrows = f"; all {scene.arrows} arrows, seen through the tissue" if scene.arrows else ""
     axes.set_title(f"a corner cut out{arrows}", fontsize=11)
     # the anatomy, and what is taken out of it in red, seen from where there is most to see
-    left = scene.mesh.without(scene.resected)[0] if scene.resected.any() else scene.mesh
     recorded: list[PointsRecording | SurfaceRecording] = [*scene.tracked, *scene.surfaces]
     where = np.concatenate([np.zeros((0, 3)), *(recording.points for recording in recorded)])
     still = Moved(where, *np.zeros((2, *where.shape)))
-    drawn = scene_of(scene.mesh, left, scene.resected, np.zeros_like(left.points), scene.names, still)
+    drawn = scene_of(scene.mesh, scene.resected, np.zeros_like(scene.mesh.points), scene.names, still)
     camera = cameras_of(drawn)[BEFORE]
     try:
         image = render(drawn, {BEFORE: camera}, _SIZE)[BEFORE]

@@ -46,9 +46,8 @@ def write_estimate_page(folder: Path, summary: Mapping[str, Any], posterior: Pos
     whole, state = posterior.case.mesh, read_state(folder / "state.vtu")
     # where the estimate, with its nuisances, has points that were recorded
     moved = Moved.of(posterior.case.recordings, ((p.name, p.rows, p.before, p.after) for p in posterior.predictions))
-    titles = {label: tissue.name for label, tissue in posterior.case.tissues.items()}
     subtitles = ["the most probable state of the estimate", *judged.sentences]
-    begun = begin_pictures(whole, state.mesh, state.u, titles, moved)
+    begun = begin_pictures(posterior.case, state.u, moved)
     places = views.places(whole)
     agreement = None
     if any(prediction.kind != "surface" for prediction in posterior.predictions):

@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Ints
+from warpbrain.cases.case import Case
 from warpbrain.mesh import TetMesh
 from warpbrain.recordings.recording import PointsRecording, Recording
 from warpbrain.report import rendering, views
@@ -62,62 +63,50 @@ class Pictures:
         return self._rendered()
 
 
-def begin_pictures(whole: TetMesh, mesh: TetMesh, u: Floats, names: dict[int, str], moved: Moved) -> Pictures:
-    """Begin to render a deformed body, beside what else there is to do.
+def begin_pictures(case: Case, u: Floats, moved: Moved) -> Pictures:
+    """Begin to render the body of a case, beside what else there is to do.
 
-    `whole` is the anatomy before anything was resected, `mesh` what is left of it, of whose nodes u (n, 3) [m] is the
-    displacement; `names` are those of the tissues by label.
+    u (n, 3) [m] is the displacement of the nodes that are left of it if anything was resected.
 
     To be called where `ready_to_render` lasts: rendering ends with it.
     """
-    resected = taken_out(whole, mesh)
-    scene = scene_of(whole, mesh, resected, u, names, moved)
+    whole, names = case.mesh, {label: tissue.name for label, tissue in case.tissues.items()}
+    resected = np.zeros(len(whole.tetrahedra), dtype=bool)
+    if case.resection is not None:
+        resected = whole.element_sets[case.resection.elements]
+    displacement = np.zeros_like(whole.points)
+    displacement[case.remaining[1]] = u
+    scene = scene_of(whole, resected, displacement, names, moved)
     cameras = cameras_of(scene)
     rendered = beside(lambda: render(scene, cameras, _SIZE))
     return Pictures(scene, cameras, whole, resected, names, rendered)
 
 
-def taken_out(whole: TetMesh, mesh: TetMesh) -> Bools:
-    """Elements (m,) of the anatomy that are not in what is left of it."""
-    from scipy.spatial import cKDTree
-
-    if len(whole.tetrahedra) == len(mesh.tetrahedra):
-        return np.zeros(len(whole.tetrahedra), dtype=bool)
-    near = 1e-9 * float(np.ptp(whole.points, axis=0).max())
-    return np.asarray(cKDTree(mesh.centres).query(whole.centres)[0] > near)
-
-
-def scene_of(
-    whole: TetMesh, mesh: TetMesh, resected: Bools, u: Floats, names: dict[int, str], moved: Moved
-) -> rendering.Scene:
-    """What is drawn of a deformed body; see `begin_pictures`. `resected` (m,): what is not left of `whole`."""
+def scene_of(mesh: TetMesh, removed: Bools, u: Floats, names: dict[int, str], moved: Moved) -> rendering.Scene:
+    """What is drawn of a body displaced by u (n, 3) [m], of which elements (m,) were removed before it moved; `names`
+    are those of its tissues, by label."""
     from matplotlib import colormaps
     from matplotlib.colors import to_rgb
 
-    sizes = MILLIMETRES * np.linalg.norm(u, axis=1)
-    size = MILLIMETRES * float(np.ptp(whole.points, axis=0).max())
-    # nodes of what is left first, as in `mesh`; those that only what was removed has come after them
-    more = whole.points if resected.any() else whole.points[:0]
-    points, tissue = np.concatenate([mesh.points, more]), np.concatenate([mesh.tissue, whole.tissue[resected]])
-    tetrahedra = np.concatenate([mesh.tetrahedra, whole.tetrahedra[resected] + len(mesh.points)])
-    gone = np.arange(len(tetrahedra)) >= len(mesh.tetrahedra)
-    by_label = {label: np.array(to_rgb(c)) for label, c in views.tissue_colours(names, whole).items()}
-    colours = np.array([by_label[label] for label in tissue.tolist()])
-    colours[gone] = to_rgb(views.RESECTED)
-    large = float(np.percentile(sizes, 99.5))
+    left = np.unique(mesh.tetrahedra[~removed])
+    size = MILLIMETRES * float(np.ptp(mesh.points, axis=0).max())
+    by_label = {label: to_rgb(colour) for label, colour in views.tissue_colours(names, mesh).items()}
+    colours = np.array([by_label[label] for label in mesh.tissue.tolist()])
+    colours[removed] = to_rgb(views.RESECTED)
+    large = MILLIMETRES * float(np.percentile(np.linalg.norm(u[left], axis=1), 99.5))
     recorded = MILLIMETRES * np.linalg.norm(moved.recorded, axis=1)
-    places = np.array(views.places(whole, resected))[::-1]
-    ventricle = whole.node_sets.get("ventricle", np.zeros(len(whole.points), dtype=bool))
-    middle = 0.5 * (whole.points.min(axis=0) + whole.points.max(axis=0))
-    corner = whole.points[ventricle].mean(axis=0) if ventricle.any() else middle
+    places = np.array(views.places(mesh, removed))[::-1]
+    ventricle = mesh.node_sets.get("ventricle", np.zeros(len(mesh.points), dtype=bool))
+    middle = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
+    corner = mesh.points[ventricle].mean(axis=0) if ventricle.any() else middle
     # two cuts through what was resected and an axial one through the ventricles say more than three through one place
     places[2] = corner[2]
     return rendering.Scene(
-        points=MILLIMETRES * points,
-        tetrahedra=tetrahedra.astype(np.int64),
-        removed=gone,
+        points=MILLIMETRES * mesh.points,
+        tetrahedra=mesh.tetrahedra.astype(np.int64),
+        removed=removed,
         colours=np.round(255.0 * colours).astype(np.uint8),
-        u=MILLIMETRES * np.concatenate([u, np.zeros((len(points) - len(u), 3))]),
+        u=MILLIMETRES * u,
         exaggeration=round_factor(_MOVED * size, large),
         corner=MILLIMETRES * corner,
         places=MILLIMETRES * places,

@@ -40,16 +40,15 @@ def write_run_page(folder: Path, summary: Mapping[str, Any], run: Run) -> Pictur
     Returns the pictures, or why there are none.
     """
     case, solution = summary["case"], summary["solution"]
-    judged, result, whole = explained_of(summary["recordings"]["compared"]), run.result, run.case.mesh
+    judged, result = explained_of(summary["recordings"]["compared"]), run.result
     compared = ((c.name, c.rows, c.residuals_before, c.residuals_after) for c in run.observed.comparisons)
     moved = Moved.of(run.case.recordings, compared)
-    names = {label: tissue.name for label, tissue in run.case.tissues.items()}
     left_out = [line for text in case["left_out"][:1] for line in textwrap.wrap(f"Left out, {text}", _LINE)]
     subtitles = [*lines("run.txt", "subtitle", case, solution), *summary["recordings"]["in_words"], *left_out]
-    begun = begin_pictures(whole, result.mesh, result.u, names, moved)
+    begun = begin_pictures(run.case, result.u, moved)
     pressures = {name.replace("_", " "): values for name, values in result.nodal_pressures.items()}
     fields = [Field(name, f"{name} [Pa]", p, float(p.min()), float(p.max())) for name, p in pressures.items()]
-    view = body_view(result.mesh, result.u, fields, moved, views.places(whole))
+    view = body_view(result.mesh, result.u, fields, moved, views.places(run.case.mesh))
     pictures = draw(folder / "deformation.png", begun, run.case.title, subtitles)
     sentences = judged.sentences or ["Nothing was recorded of this case that the simulation could be compared with."]
     _write(
