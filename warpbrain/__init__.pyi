@@ -36,8 +36,8 @@ from warpbrain.physics.load import NodalForce as NodalForce
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.gravity import Gravity as Gravity
 from warpbrain.physics.mechanisms.resection import Resection as Resection
-from warpbrain.report.in_notebook import html as html
 from warpbrain.report.plot import grid as grid
+from warpbrain.report.plot import html as html
 from warpbrain.report.plot import plot as plot
 from warpbrain.simulation.dynamics import Simulator as Simulator
 from warpbrain.simulation.equilibrium import Equilibrium as Equilibrium

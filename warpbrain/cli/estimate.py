@@ -123,14 +123,8 @@ def _posterior(
         views.save(agreement_figure(posterior, narrow=False), out / "predicted.png", case.title, 10.0)
         views.save(residuals_figure(posterior), out / "residuals.png", case.title)
         write_summary(out / "estimate.json", described)
-        record.files += [
-            "estimate.json",
-            "predictions.csv",
-            "state.vtu",
-            "posterior.png",
-            "predicted.png",
-            "residuals.png",
-        ]
+        record.files += ["estimate.json", "predictions.csv", "state.vtu"]
+        record.files += ["posterior.png", "predicted.png", "residuals.png"]
         with ready_to_render():
             record.files += drawn(write_estimate_page(out, described, posterior), say)
         if images is not None:

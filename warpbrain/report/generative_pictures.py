@@ -58,8 +58,7 @@ def draw_studies(model: Process, group: str | None = None) -> Any:
     user added have a name only.
     """
 
-    def draw(name: str, axes: Any) -> None:
-        studies = _studies_of(model, name)
+    def draw(name: str, studies: Sequence[Study], axes: Any) -> None:
         if group is not None:
             names = [_cut(s.name if s.number is None else f"{s.number}  {s.name}", _LONG) for s in studies]
             _draw_studies(axes, studies, studies, names, _TEXT)
@@ -82,8 +81,7 @@ def draw_extrapolation(model: Process, other: Process, group: str | None = None)
         # a band may be hundreds of decades wide
         return list(np.exp(np.clip(process.curve(name, _STRETCHES, (-MOST, 0.0, MOST)), -500.0, 500.0)))
 
-    def draw(name: str, axes: Any) -> None:
-        studies = _studies_of(model, name)
+    def draw(name: str, studies: Sequence[Study], axes: Any) -> None:
         axes.axvspan(*_stretches_of(studies), color=_GROUND, linewidth=0.0, zorder=0)
         if name in other.groups:
             low, mean, high = curves(other, name)
@@ -123,8 +121,7 @@ def draw_draws(model: Process, group: str | None = None, seed: int = 0) -> Any:
         energy = np.exp(log_energy) - OFFSET
         return np.where(energy > 0.0, energy, np.nan)
 
-    def draw(name: str, energy: Any, modulus: Any) -> None:
-        studies = _studies_of(model, name)
+    def draw(name: str, studies: Sequence[Study], energy: Any, modulus: Any) -> None:
         low, high = _stretches_of(studies)
         l = _sides(low, high, _STEPS)
         bands = list(energies(model.curve(name, l, (-MOST, -HALF, 0.0, HALF, MOST))))
@@ -171,15 +168,16 @@ def _groups(
     names: Sequence[str],
     size: float = _TEXT,
 ) -> Any:
-    """A figure that `draw(group, *panels)` fills, with a panel a group for each vertical axis: those of one group side
-    by side, or a row of panels for every method and a column for every anatomy, `height` inches high."""
+    """A figure that `draw(group, its studies, *panels)` fills, with a panel a group for each vertical axis: those of
+    one group side by side, or a row of panels for every method and a column for every anatomy, `height` inches high."""
     from matplotlib.figure import Figure
 
+    studies = {name: [study for study in model.studies if study.group == name] for name in model.groups}
     if group is not None:
         figure = Figure(figsize=(_WIDTH, 3.6), layout="constrained")
         panels = list(figure.subplots(1, len(names), squeeze=False)[0])
         figure.suptitle(group, fontsize=_TEXT + 2)
-        draw(group, *panels)
+        draw(group, studies[group], *panels)
         for axes, name in zip(panels, names, strict=True):
             axes.tick_params(labelsize=_TEXT)
             axes.set_xlabel("stretch", fontsize=_TEXT + 1)
@@ -201,17 +199,13 @@ def _groups(
                 continue
             for axes in stack:
                 axes.tick_params(labelsize=_SMALL, length=2.5)
-            draw(known, *stack)
+            draw(known, studies[known], *stack)
             if row == len(METHODS) - 1:
                 stack[-1].set_xlabel("stretch", fontsize=_TEXT)
             for axes, name in zip(stack, names, strict=True):
                 if column == 0:
                     axes.set_ylabel(name, fontsize=size)
     return figure
-
-
-def _studies_of(model: Process, group: str) -> list[Study]:
-    return [study for study in model.studies if study.group == group]
 
 
 def _stretches_of(studies: Sequence[Study]) -> tuple[float, float]:

@@ -1,8 +1,13 @@
-"""Results, cases and meshes drawn in three dimensions: `warpbrain.plot`, and `.plot()` of all of them."""
+"""Results, cases and meshes shown: drawn in three dimensions (`warpbrain.plot`), and as a table for notebooks
+(`warpbrain.html`, `page/notebook.html`)."""
 
+import math
+from collections.abc import Callable
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from warpbrain.cases.case import Case
 from warpbrain.diagnosis.result import Diagnosis
@@ -10,14 +15,18 @@ from warpbrain.ensemble.results import EnsembleResult
 from warpbrain.errors import InputError
 from warpbrain.estimation.posterior import Posterior
 from warpbrain.mesh import TetMesh
+from warpbrain.report.comparison import SHOWN
 from warpbrain.report.diagnosis.files import file_of_map
-from warpbrain.report.ensemble import file_of_fields
+from warpbrain.report.ensemble import describe_ensemble, ensemble_lines, file_of_fields
 from warpbrain.report.estimate import file_of_estimate
-from warpbrain.report.files import body_file, file_of_result, sets_of
+from warpbrain.report.files import MILLIMETRES, body_file, file_of_result, sets_of
+from warpbrain.report.page import part
+from warpbrain.report.summary import SET_TITLES, describe_result, left_out, show_lines
 from warpbrain.report.views import TISSUE_COLOURS
 from warpbrain.simulation.result import Result
 from warpbrain.simulation.run import Run
 from warpbrain.simulation.specimen import SpecimenRun
+from warpbrain.worlds.specimen.result import SpecimenDiagnosis
 
 #: What the fields are called that are shown unless another is asked for, and in which colours.
 _UNITS = {
@@ -162,3 +171,30 @@ def _(what: EnsembleResult) -> tuple[Any, str]:
     if what.fields is None:
         raise InputError("what: no sample of this ensemble has an answer; the reasons are in its rows")
     return file_of_fields(what.fields), "displacement_sd"
+
+
+#: By what it is, the macro that tells it, and what this takes beside it.
+_TOLD: dict[type, tuple[str, Callable[[Any], tuple[Any, ...]]]] = {
+    Case: ("case", lambda case: (show_lines(case),)),
+    Result: ("result", lambda result: (describe_result(result), SET_TITLES)),
+    Run: ("run", lambda run: (MILLIMETRES * np.linalg.norm(run.u, axis=1).max(), left_out(run.model), SHOWN)),
+    SpecimenRun: ("specimen", lambda run: (SHOWN,)),
+    Posterior: ("posterior", lambda posterior: (math.exp,)),
+    Diagnosis: ("diagnosis", lambda diagnosis: ()),
+    SpecimenDiagnosis: ("diagnosis", lambda diagnosis: ()),
+    EnsembleResult: ("ensemble", lambda result: (ensemble_lines(describe_ensemble(result)),)),
+}
+
+
+def html(what: Any) -> str:
+    """A result or a case as HTML: a title and a table.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
+    for kind, (macro, values) in _TOLD.items():
+        if isinstance(what, kind):
+            return str(part(macro, what, *values(what), template="notebook.html"))
+    raise InputError(f"what: expected a result or a case, found {type(what).__name__}")

@@ -2,14 +2,13 @@
 
 import sys
 import time
-from types import TracebackType
-from typing import Self
+from contextlib import AbstractContextManager
 
 #: Seconds between two lines where there is no terminal: what is done sooner is not worth one.
 EVERY = 30.0
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress"]):
     """Shows how far long work has come; as a context it takes its bar away at the end, however that comes."""
 
     def __init__(self, label: str, quiet: bool = False) -> None:
@@ -18,10 +17,7 @@ class Progress:
         self._bar = not quiet and sys.stderr.isatty()
         self._said = time.monotonic()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.clear()
 
     def show(self, fraction: float, note: str = "") -> None:
