@@ -61,8 +61,8 @@ def not_laid_out(figure: object, _dpi: float = 0.0) -> None:
     assert figure is not None
 
 
-def _empty(view: Any, name: str, _axis: int, _place: float) -> dict[str, object]:
-    return {"name": name, "points": "", "triangles": "", "moves": None, "values": [""] * len(view.fields)}
+def _empty(_mesh: object, fields: Any, _u: object, name: str, _axis: int, _place: float) -> dict[str, object]:
+    return {"name": name, "points": "", "triangles": "", "moves": None, "values": [""] * len(fields)}
 
 
 def _no_cut(_points: object, _cells: object, _values: object, _axis: int, _position: float) -> Cut:

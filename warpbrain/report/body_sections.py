@@ -15,7 +15,7 @@ from warpbrain.report import views
 from warpbrain.report.files import LEFT, MILLIMETRES, TRUST, UNSEEN, SavedState
 from warpbrain.report.page import page, part
 from warpbrain.report.page.figures import TEXT, colour_bar, data, inlined, panels
-from warpbrain.report.page.scene import Arrows, Field, View, viewer
+from warpbrain.report.page.scene import Arrows, Field, describe_scene, viewer
 from warpbrain.report.picture import Moved, Pictures, arrow_colours, heading, notes_on, round_factor, scene_of
 from warpbrain.report.slices import cut
 from warpbrain.report.views import BLUE, QUIET, VERMILLION
@@ -94,9 +94,9 @@ def body_view(
     arrows = []
     if len(moved.where):
         arrows = [Arrows("recorded", VERMILLION, moved.recorded), Arrows("computed", BLUE, moved.computed)]
-    cuts = {view.name: (view.axis, place) for view, place in zip(views.VIEWS, places, strict=True)}
-    view = View(mesh, shown, moved.where, arrows, None, u, factor, cuts)
-    return viewer(view, "points", "Motion as large as it is: 1 times; before: 0 times.")
+    cuts = [(view.name, view.axis, place) for view, place in zip(views.VIEWS, places, strict=True)]
+    scene = describe_scene(mesh, shown, moved.where, arrows, None, u, factor, cuts)
+    return viewer(scene, "points", "Motion as large as it is: 1 times; before: 0 times.")
 
 
 def known_displacement(state: SavedState, whole: TetMesh, places: Sequence[float]) -> dict[str, Any] | None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapes import box
 
-from warpbrain.report.page.scene import Arrows, Field, View, describe_scene, scene_json
+from warpbrain.report.page.scene import Arrows, Field, describe_scene, scene_json
 
 
 def floats(text: str, width: int = 3) -> np.ndarray:
@@ -18,11 +18,10 @@ def scene():
     mesh = box((4, 4, 4), (0.06, 0.04, 0.02))
     linear = mesh.points @ [1.0, 2.0, 3.0]
     u = mesh.points * [0.1, 0.0, -0.1]
-    view = View(
+    return describe_scene(
         mesh, [Field("f", "f [1]", linear, 0.0, 0.1)], np.zeros((1, 3)), [Arrows("a", "#102030", np.ones((1, 3)))],
-        None, u, 5.0, {"axial": (2, 0.007), "outside": (0, 1.0)},
+        None, u, 5.0, [("axial", 2, 0.007), ("outside", 0, 1.0)],
     )  # fmt: skip
-    return describe_scene(view)
 
 
 def test_a_cut_has_the_area_of_its_plane(scene, verify):

@@ -15,7 +15,7 @@ from warpbrain.report.diagnosis.description import STATES
 from warpbrain.report.diagnosis.files import Recorded, file_of_map
 from warpbrain.report.files import MILLIMETRES
 from warpbrain.report.page.figures import NARROW, TEXT, WIDTH, colour_bar, inlined, panels, shades
-from warpbrain.report.page.scene import Arrows, Field, View
+from warpbrain.report.page.scene import Arrows, Field, describe_scene
 from warpbrain.report.slices import Cut, cut
 from warpbrain.report.views import BLACK, BLUE, GREEN, ORANGE, VERMILLION, VIEWS, in_view, round_below, scale_length
 from warpbrain.worlds.specimen.protocol import Test
@@ -143,7 +143,7 @@ def _listed(errors: dict[str, str]) -> str:
     return ", ".join(f"{STATES[state]} {error}" for state, error in errors.items())
 
 
-def view_of(anatomy: Anatomy, recorded: Recorded | None) -> View:
+def view_of(anatomy: Anatomy, recorded: Recorded | None) -> dict[str, Any]:
     """What the 3-D view shows: where something is, what the data see, what is left at recorded points."""
     points, arrows = np.zeros((0, 3)), []
     if recorded is not None:
@@ -169,7 +169,7 @@ def view_of(anatomy: Anatomy, recorded: Recorded | None) -> View:
         Field("displacement", "displacement of the base state [mm]", moved, 0.0, float(moved[on_it].max()) or 1.0, None,
               "the case with its tissue refitted, nothing else added"),
     ]  # fmt: skip
-    return View(anatomy.mesh, fields, points, arrows, anatomy.ball)
+    return describe_scene(anatomy.mesh, fields, points, arrows, anatomy.ball)
 
 
 def agreement_figure(summary: dict[str, Any], recorded: Recorded) -> dict[str, Any]:

@@ -5,8 +5,8 @@ Lengths are in mm, axes RAS; arrays are 32-bit numbers in base64.
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -46,68 +46,60 @@ class Arrows:
     shown: bool = True
 
 
-@dataclass(frozen=True, eq=False)
-class View:
-    """What is in a view: a mesh with fields, recorded points (k, 3) [m] with arrows, and perhaps more."""
-
-    mesh: TetMesh
-    fields: Sequence[Field]
-    recorded: Floats
-    arrows: Sequence[Arrows] = ()
-    #: Centre (3,) and radius [m].
-    ball: tuple[Floats, float] | None = None
-    #: Displacement (n, 3) of the nodes [m], with which the view shows the body before and after; and how many times as
-    #: far as it moves the body is shown after, at first.
-    u: Floats | None = None
-    exaggeration: float = 1.0
-    #: Planes that can be shown, by name: axis and place [m].
-    cuts: Mapping[str, tuple[int, float]] = field(default_factory=dict)
-
-
-def viewer(view: View, legend: str, note: str) -> Markup:
-    """The view as HTML: a canvas, what switches it, a bar of colours, and its script, all in the page.
+def viewer(scene: dict[str, Any], legend: str, note: str) -> Markup:
+    """The view of a scene as HTML: a canvas, what switches it, a bar of colours, and its script, all in the page.
 
     Where a browser has no WebGL it says so, and the pictures above and below remain. `legend` is what the arrows are,
     in a word or two, `note` in a sentence.
     """
-    scene = describe_scene(view)
     return part("view", scene, Markup(scene_json(scene)), legend, note)
 
 
-def describe_scene(view: View) -> dict[str, Any]:
-    """The scene of a view."""
-    mesh = view.mesh
+def describe_scene(
+    mesh: TetMesh,
+    fields: Sequence[Field],
+    recorded: Floats,
+    arrows: Sequence[Arrows],
+    ball: tuple[Floats, float] | None = None,
+    u: Floats | None = None,
+    exaggeration: float = 1.0,
+    cuts: Sequence[tuple[str, int, float]] = (),
+) -> dict[str, Any]:
+    """What is in a view: a mesh with fields, and recorded points (k, 3) [m] with arrows.
+
+    `ball` has a centre (3,) and a radius [m]. With a displacement u (n, 3) [m] the view shows the body before and
+    after, moved `exaggeration` times as far at first. `cuts` are planes that can be shown: name, axis and place [m].
+    """
     used, triangles = np.unique(mesh.boundary, return_inverse=True)
     stops = shades()(np.linspace(0.0, 1.0, 9))[:, :3]
-    ball = None
-    if view.ball is not None:
-        centre, radius = view.ball
-        ball = {"centre": [MILLIMETRES * float(value) for value in centre], "radius": MILLIMETRES * radius}
+    located = None
+    if ball is not None:
+        located = {"centre": [MILLIMETRES * float(value) for value in ball[0]], "radius": MILLIMETRES * ball[1]}
     enlarged = 1
-    if view.arrows and len(view.arrows[0].vectors):
+    if arrows and len(arrows[0].vectors):
         # how many times as long as they are arrows are drawn at first: a large one is a tenth of the body
-        large = float(np.quantile(np.linalg.norm(view.arrows[0].vectors, axis=1), 0.95))
+        large = float(np.quantile(np.linalg.norm(arrows[0].vectors, axis=1), 0.95))
         size = float(np.ptp(mesh.points, axis=0).max())
         enlarged = int(np.clip(round(0.1 * size / max(large, 1e-9)), 1, 40))
     return {
         "points": _packed(MILLIMETRES * mesh.points[used]),
         "triangles": _packed(triangles.reshape(-1, 3), np.uint32),
-        "moves": None if view.u is None else _packed(MILLIMETRES * view.u[used]),
-        "exaggeration": view.exaggeration,
-        "cuts": [_cut(view, name, axis, place) for name, (axis, place) in view.cuts.items()],
-        "fields": [_field(field, used) for field in view.fields],
-        "recorded": _packed(MILLIMETRES * view.recorded),
+        "moves": None if u is None else _packed(MILLIMETRES * u[used]),
+        "exaggeration": exaggeration,
+        "cuts": [_cut(mesh, fields, u, *cut) for cut in cuts],
+        "fields": [_field(field, used) for field in fields],
+        "recorded": _packed(MILLIMETRES * recorded),
         "arrows": [
             {
-                "name": arrows.name,
-                "colour": [int(arrows.colour[k : k + 2], 16) for k in (1, 3, 5)],
-                "vectors": _packed(MILLIMETRES * arrows.vectors),
-                "shown": arrows.shown,
+                "name": each.name,
+                "colour": [int(each.colour[k : k + 2], 16) for k in (1, 3, 5)],
+                "vectors": _packed(MILLIMETRES * each.vectors),
+                "shown": each.shown,
             }
-            for arrows in view.arrows
+            for each in arrows
         ],
         "enlarged": enlarged,
-        "ball": ball,
+        "ball": located,
         "colours": np.round(255.0 * stops).astype(int).tolist(),
     }
 
@@ -128,16 +120,17 @@ def _field(field: Field, used: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _cut(view: View, name: str, axis: int, place: float) -> dict[str, Any]:
+def _cut(
+    mesh: TetMesh, fields: Sequence[Field], u: Floats | None, name: str, axis: int, place: float
+) -> dict[str, Any]:
     """A plane through the body with what its fields and its displacement are there."""
-    mesh = view.mesh
     section = plane_section(mesh.points, mesh.tetrahedra, axis, place)
     return {
         "name": name,
         "points": _packed(MILLIMETRES * section.at_points(mesh.points)),
         "triangles": _packed(section.triangles, np.uint32),
-        "moves": None if view.u is None else _packed(MILLIMETRES * section.at_points(view.u)),
-        "values": [_packed(section.at_points(np.asarray(field.values, dtype=np.float64))) for field in view.fields],
+        "moves": None if u is None else _packed(MILLIMETRES * section.at_points(u)),
+        "values": [_packed(section.at_points(np.asarray(field.values, dtype=np.float64))) for field in fields],
     }
 
 
