@@ -132,27 +132,23 @@ def cameras_of(scene: rendering.Scene) -> dict[str, rendering.Camera]:
     everything = np.concatenate([scene.points, moved[np.unique(scene.tetrahedra[~scene.removed])]])
     tips = np.concatenate([everything, scene.where + scene.arrows * scene.recorded])
     x, y, z = np.eye(3)
-    directions = []
-    for name, towards, points in (
-        (rendering.BEFORE, [0.80, 0.85, 0.62], everything),
-        (rendering.AFTER, [0.80, 0.85, 0.62], everything),
-        (rendering.MOTION, [1.0, 0.25, 0.12], tips),
-    ):
-        # what is above is above
-        to_viewer = scene.side * towards
-        right = np.cross(z, to_viewer)
-        right /= np.linalg.norm(right)
-        directions.append((name, points, right, np.cross(to_viewer / np.linalg.norm(to_viewer), right)))
-    directions.append((rendering.AXIAL, everything, -x, y))
-    directions.append((rendering.CORONAL, everything, -x, z))
-    directions.append((rendering.SAGITTAL, everything, -y, z))
     cameras = {}
-    for name, points, right, up in directions:
-        flat, depth = points @ np.column_stack([right, up]), points @ np.cross(right, up)
-        low, high = flat.min(axis=0), flat.max(axis=0)
+    # what points to the viewer, and what is above
+    for name, towards, above, points in (
+        (rendering.BEFORE, scene.side * [0.80, 0.85, 0.62], z, everything),
+        (rendering.AFTER, scene.side * [0.80, 0.85, 0.62], z, everything),
+        (rendering.MOTION, scene.side * [1.0, 0.25, 0.12], z, tips),
+        (rendering.AXIAL, -z, y, everything),
+        (rendering.CORONAL, y, z, everything),
+        (rendering.SAGITTAL, -x, z, everything),
+    ):
+        right = np.cross(above, towards)
+        right /= np.linalg.norm(right)
+        up = np.cross(towards / np.linalg.norm(towards), right)
         axes = np.column_stack([right, up, np.cross(right, up)])
-        centre = axes @ [*(0.5 * (low + high)), 0.5 * (depth.min() + depth.max())]
-        half_width, half_height = 0.5 * (high - low)
+        low, high = (points @ axes).min(axis=0), (points @ axes).max(axis=0)
+        centre = axes @ (0.5 * (low + high))
+        half_width, half_height, _ = 0.5 * (high - low)
         # room for letters and a scale bar
         half_height = 1.14 * float(max(half_height, half_width * _SIZE[1] / _SIZE[0], 1e-3))
         cameras[name] = rendering.Camera(right, up, centre, half_height)
