@@ -121,7 +121,7 @@ def test_warnings_are_kept_and_shown(tmp_path, capsys):
         warnings.simplefilter("always")
         warnings.warn("of a\nlibrary", UserWarning, stacklevel=1)
     assert len(shown) == 1
-    record.say("printed", "too", sep="\n")
+    record.say("printed", "too")
     record.write(tmp_path, "done")
     assert capsys.readouterr().out == ""
     lines = (tmp_path / LOG).read_text().splitlines()

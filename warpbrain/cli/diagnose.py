@@ -66,7 +66,7 @@ def diagnose(options: argparse.Namespace) -> None:
     say(case.title)
     diagnosis = diagnosing.run()
     summary = describe(diagnosis, chosen, device)
-    say(*diagnosis_lines(summary), sep="\n")
+    say(*diagnosis_lines(summary))
     with results_in(out, record, options.overwrite):
         # most of what is left to do, beside files for which factors are computed
         drawing = beside(lambda: pictures_of(diagnosis, summary))

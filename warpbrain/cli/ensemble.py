@@ -39,19 +39,25 @@ def ensemble(options: argparse.Namespace) -> None:
     say = record.say
 
     start_warp_quietly()
-    case = _case(options)
+    case = find_case(options.case, options.tissue)
+    if case.specimen is not None:
+        raise InputError(f"{case.path}: [specimen]: a specimen's tests are run one by one: see warpbrain run")
+    if options.model is not None:
+        case = case.with_law(options.model)
+    if options.poisson is not None:
+        case = replace(case, poisson=options.poisson)
     samples, chosen = _samples(options, case)
     model = model_of(case)
     job = Job(model, tuple(samples), steps=options.steps, tolerance=options.tolerance, precision=options.precision)
     described = tables.describe_case(case, model)
     course = "to rest" if options.steps is None else f"{options.steps} steps of 1 ms"
     left_out, how = tables.left_out(model, "an ensemble has no others"), f"{chosen}; {course}, {options.precision}"
-    say(*lines("ensemble.txt", "opening", described, left_out, len(samples), how), sep="\n")
+    say(*lines("ensemble.txt", "opening", described, left_out, len(samples), how))
     if options.steps is None:
         # what is likely to fail, before it is computed
         load = overloaded(model, samples, None if options.dask is not None else options.device)
         if load.numbers:
-            say(*lines("ensemble.txt", "overloaded", load, len(samples), _NAMED), sep="\n")
+            say(*lines("ensemble.txt", "overloaded", load, len(samples), _NAMED))
     # the same command goes on with what is there, so its folder is that of before
     out = options.out or Path(f"warpbrain-ensemble-{safe_name(case.name)}-{options.tissue}")
     earlier = ("ensemble.json", "summary.json") if (out / "ensemble.json").exists() else ()
@@ -71,7 +77,7 @@ def ensemble(options: argparse.Namespace) -> None:
         to_rest, outcomes = options.steps is None, store.outcomes()
         result = results_of(case, model.mesh, samples, outcomes, to_rest, lambda n: progress.show(n / len(samples)))
     result_summary = report.describe_ensemble(result)
-    say("", *report.ensemble_lines(result_summary), sep="\n")
+    say("", *report.ensemble_lines(result_summary))
     summary = {
         "case": described,
         "inputs_sha256": fingerprints(case),
@@ -108,16 +114,6 @@ def _check(options: argparse.Namespace) -> None:
         options.batch = int(options.batch)
     else:
         raise InputError(f"--batch {options.batch}: expected auto or a whole number of at least 1")
-
-
-def _case(options: argparse.Namespace) -> Case:
-    """The case as the arguments change it."""
-    case = find_case(options.case, options.tissue)
-    if case.specimen is not None:
-        raise InputError(f"{case.path}: [specimen]: a specimen's tests are run one by one: see warpbrain run")
-    if options.model is not None:
-        case = case.with_law(options.model)
-    return case if options.poisson is None else replace(case, poisson=options.poisson)
 
 
 def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str]:

@@ -100,7 +100,7 @@ def _posterior(
 
     def on_stage(text: str) -> None:
         progress.clear()
-        say(*lines("estimate.txt", "stage", text), sep="\n")
+        say(*lines("estimate.txt", "stage", text))
 
     def on_step(step: GaussNewtonStep) -> None:
         say(*lines("estimate.txt", "gauss_newton_step", step))
@@ -113,9 +113,9 @@ def _posterior(
     if options.causes or (options.causes is None and len(case.mesh.points) <= _LARGEST):
         averaged, where = _what_else(posterior, options.device, on_stage)
     elif options.causes is None:
-        say("", f"what else may act is left out on more than {_LARGEST} nodes; --causes computes it", sep="\n")
+        say("", f"what else may act is left out on more than {_LARGEST} nodes; --causes computes it")
     described = describe_estimate(posterior, find_device(options.device).alias, averaged)
-    say(*estimate_lines(described), sep="\n")
+    say(*estimate_lines(described))
     with results_in(out, record, options.overwrite):
         write_predictions(out / "predictions.csv", posterior)
         write_estimated_state(out / "state.vtu", posterior, where)
@@ -172,7 +172,7 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
 
     with Progress("sweep", options.quiet) as progress:
         finished = sweep(case, model, VALUES, known, options.device, on_point)
-    say(*table.sweep_lines(finished), sep="\n")
+    say(*table.sweep_lines(finished))
     # beside an estimate, and of points that were there before
     with results_in(out, record, replace=False):
         table.write_sweep_picture(out / "sweep.png", finished, case.title, estimated)

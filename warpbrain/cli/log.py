@@ -30,6 +30,6 @@ def note_device(record: Record, case: Case, system: System, precision: str) -> N
 def drawn(pictures: Pictures | str, say: Callable[..., None]) -> list[str]:
     """Names of the files that a page and its pictures are in; says why there are no pictures, if there are none."""
     if isinstance(pictures, str):
-        say("", f"deformation.png is not drawn: {pictures}", sep="\n")
+        say("", f"deformation.png is not drawn: {pictures}")
         return ["report.html"]
     return ["deformation.png", "report.html"]

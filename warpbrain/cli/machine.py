@@ -20,7 +20,7 @@ def doctor(options: argparse.Namespace) -> None:
     start_warp_quietly()
     with Progress("self-test", options.json) as progress:
         report = health(lambda device: progress.show(0.0, device))
-    record.say(*([json.dumps(report, indent=1)] if options.json else lines("doctor.txt", "health", report)), sep="\n")
+    record.say(*([json.dumps(report, indent=1)] if options.json else lines("doctor.txt", "health", report)))
     failed = [test["device"] for test in report["self_test"] if test["problem"]]
     if failed:
         raise SolveError(f"doctor: the self-test failed on {', '.join(failed)}")

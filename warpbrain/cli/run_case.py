@@ -65,29 +65,29 @@ def run_case(options: argparse.Namespace) -> None:
     system = running.system
     system.begin_loading_kernels()
     described = tables.describe_case(case, running.model, why or running.chosen)
-    say(*lines("run.txt", "case", described, prior, tables.STAND_IN), sep="\n")
+    say(*lines("run.txt", "case", described, prior, tables.STAND_IN))
     note_device(record, case, system, options.precision)
 
     with Progress("kernels", options.quiet) as loading:
         loading.show(0.0, "the first run on a machine compiles them")
         if is_compiling():
-            views.load_libraries()
+            # what figures are made with, while there is nothing else to do
+            import matplotlib.backends.backend_agg
+            import matplotlib.figure  # noqa: F401
         loaded = system.load_kernels()
     with watching(options, say) as watched:
         done = running.run(watched)
     followed = done.followed
-    for line in lines("run.txt", "ending", followed.solution):
-        say(line)
+    say(*lines("run.txt", "ending", followed.solution))
     first_step = followed.begun - record.clock
     seconds = {"pre-processing": system.seconds, "loading kernels": loaded, **followed.seconds}
     displacements, compared = tables.describe_result(done.result), describe_comparisons(done.observed)
-    say(*lines("run.txt", "displacement", displacements, tables.displacement_rows(displacements)), sep="\n")
-    for line in lines("run.txt", "recordings", compared, recorded_rows(compared["compared"]), options.legacy_rmse):
-        say(line)
+    say(*lines("run.txt", "displacement", displacements, tables.displacement_rows(displacements)))
+    say(*lines("run.txt", "recordings", compared, recorded_rows(compared["compared"]), options.legacy_rmse))
     estimated, doubt = (None, None) if options.mesh_error is None else _mesh_error(options, system, done)
     if doubt is not None:
-        say("", *lines("run.txt", "mesh_error", doubt), sep="\n")
-    say(*lines("run.txt", "times", seconds, followed.calls), sep="\n")
+        say("", *lines("run.txt", "mesh_error", doubt))
+    say(*lines("run.txt", "times", seconds, followed.calls))
 
     summary = {
         **tables.describe_opening(case, described, prior, system, options.precision),
@@ -131,15 +131,15 @@ def _run_tests(options: argparse.Namespace, case: Case, out: Path, prior: dict[s
     system = rig.system
     in_time = any(rig.follows_time(recording) for recording in running.tests)
     described = specimen.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
-    say(*lines("run.txt", "specimen", described, prior), sep="\n")
+    say(*lines("run.txt", "specimen", described, prior))
     note_device(record, case, system, options.precision)
 
     seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}
     with Progress("tests", options.quiet) as progress:
         done = running.run(progress.show).tests
     seconds |= rig.solver.clock.seconds
-    say(*lines("run.txt", "tests", done, SHOWN), sep="\n")
-    say(*lines("run.txt", "times", seconds, rig.solver.clock.counts), sep="\n")
+    say(*lines("run.txt", "tests", done, SHOWN))
+    say(*lines("run.txt", "times", seconds, rig.solver.clock.counts))
 
     [subtitle] = lines("run.txt", "subtitle_of_tests", rig.specimen.grips, system.model)
     summary = {
@@ -216,7 +216,7 @@ def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[
         name = "motion"
     else:
         name = "to rest" if options.to_rest else "equilibrium"
-    say(*lines("run.txt", "steps", name), sep="\n")
+    say(*lines("run.txt", "steps", name))
     count = 0
     length = 0.0
 
@@ -252,7 +252,7 @@ def watching(options: argparse.Namespace, say: Callable[..., None]) -> Iterator[
 
     def row(macro: str, *values: Any) -> None:
         progress.clear()
-        say(*lines("run.txt", macro, *values), sep="\n")
+        say(*lines("run.txt", macro, *values))
 
     with Progress(name, options.quiet) as progress:
         yield Watching(on_newton, on_relaxation, on_motion, on_slow_newton, on_moment)

@@ -35,7 +35,7 @@ def warp(state: SavedState, out: Path, request: WarpRequest, record: Record, qui
     """Warp by the body of a result, say what there is to say and note the names of the files."""
     with Progress("warping", quiet) as progress:
         lines, files = write_warped(out, state, request, progress.show)
-    record.say("", *lines, sep="\n")
+    record.say("", *lines)
     record.files += files
 
 

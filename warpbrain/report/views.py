@@ -43,12 +43,6 @@ TISSUE_EDGE = "#4d4640"
 _DPI = 110.0
 
 
-def load_libraries() -> None:
-    """Load what figures are made with, while there is nothing else to do."""
-    import matplotlib.backends.backend_agg
-    import matplotlib.figure  # noqa: F401
-
-
 def panels(
     rows: int, columns: int, size: tuple[float, float], layout: Any = "constrained", **options: Any
 ) -> tuple[Any, list[Any]]:

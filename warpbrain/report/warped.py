@@ -96,12 +96,9 @@ def write_warped(
     request: WarpRequest,
     progress: Callable[[float, str], None] = lambda share, stage: None,
 ) -> tuple[list[str], list[str]]:
-    """Write all that a state and what is asked for give; returns what a user should read, and names of the files.
-
-    `InputError` if the image is not of the body.
-    """
+    """Write all that a state and what is asked for, which is of its body (`check_place`), give; returns what a user
+    should read, and names of the files."""
     source = request.grid_of
-    check_place(request, state.mesh, state.path)
     grid = Grid.around(state.mesh, _SPACING, _MARGIN) if source is None else source.grid
     progress(0.0, "displacement on the grid of the image")
     fine = _for_transforms(grid)

@@ -30,17 +30,16 @@ class Record:
         #: Names of the files that were written.
         self.files: list[str] = []
 
-    def say(self, *values: object, sep: str = " ", flush: bool = False) -> None:
-        """As `print`."""
-        self._lines.append(sep.join(map(str, values)))
-        if not self._quiet:
-            print(*values, sep=sep, flush=flush)
+    def say(self, *lines: str) -> None:
+        """Print lines, if there are any."""
+        self._lines += lines
+        if lines and not self._quiet:
+            print(*lines, sep="\n")
 
     @property
     def doing(self) -> str:
         """The last line that was said."""
-        lines = [line.strip() for text in self._lines[-3:] for line in text.splitlines() if line.strip()]
-        return lines[-1][:80] if lines else ""
+        return "\n".join(self._lines).rstrip().rpartition("\n")[2].strip()[:80]
 
     def note(self, **facts: str) -> None:
         """What the log should say and nobody needs to read: device, versions, files."""
@@ -76,7 +75,7 @@ class Record:
         lines += [f"{'file':<10}{name}" for name in self.files]
         lines += [f"{'warning':<10}{text}" for text in dict.fromkeys(self._warnings)]
         # what was printed is indented: no title of a case is taken for a line of the head
-        printed = [f"    {line}".rstrip() for text in self._lines for line in text.splitlines()]
+        printed = [f"    {line}".rstrip() for line in "\n".join(self._lines).splitlines()]
         before = "" if replace else _text_of(folder)
         write_text(folder / LOG, before + "\n".join([*lines, "", *printed]) + "\n\n")
 

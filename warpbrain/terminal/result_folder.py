@@ -153,7 +153,7 @@ def results_in(path: Path, record: Record, replace: bool) -> Iterator[None]:
         raise
     if replace:
         _remove(path, set(earlier) - set(record.files))
-    record.say("", f"written to {path}: {', '.join(record.files)}", sep="\n")
+    record.say("", f"written to {path}: {', '.join(record.files)}")
     record.write(path, "done", replace)
 
 
