@@ -18,16 +18,13 @@ def bench(options: argparse.Namespace) -> None:
     """Measure and print."""
     versions, device, today = command.start(options), find_device(options.device), date.today().isoformat()
     case = find_case(options.case, options.tissue)
-    progress = Progress("bench")
     runs, diagnosis = [], None
-    try:
+    with Progress("bench") as progress:
         for number in range(options.runs):
             begun = time.perf_counter()
             listener = Listener(lambda text, part=number / options.runs: progress.show(part, text))  # type: ignore[misc]
             diagnosis = Diagnosing(case, device=device.alias, listener=listener).run()
             runs.append({**diagnosis.seconds, "total": time.perf_counter() - begun})
-    finally:
-        progress.clear()
     assert diagnosis is not None
     measured = {
         "case": case.name,

@@ -25,18 +25,14 @@ from warpbrain.threads import beside
 from warpbrain.worlds.options import DiagnosisOptions
 from warpbrain.worlds.specimen.diagnose import DiagnosingSpecimen
 
-#: What diagnoses a case, and what is written of it beside what all cases have.
-_Way = tuple[Callable[..., Any], dict[str, Callable[[Path, Any], None]]]
-_OF_A_BODY: _Way = (
-    Diagnosing,
-    {
-        "map.vtu": files.write_map,
-        "state.vtu": files.write_diagnosed_state,
-        "points.csv": files.write_points,
-        "covariance.npz": files.write_covariance,
-    },
-)
-_OF_A_SPECIMEN: _Way = (DiagnosingSpecimen, {"curves.csv": files.write_curves})
+#: What is written of a body, and of a specimen, beside what all cases have.
+_OF_A_BODY: dict[str, Callable[[Path, Any], None]] = {
+    "map.vtu": files.write_map,
+    "state.vtu": files.write_diagnosed_state,
+    "points.csv": files.write_points,
+    "covariance.npz": files.write_covariance,
+}
+_OF_A_SPECIMEN: dict[str, Callable[[Path, Any], None]] = {"curves.csv": files.write_curves}
 
 
 def diagnose(options: argparse.Namespace) -> None:
@@ -59,7 +55,8 @@ def diagnose(options: argparse.Namespace) -> None:
     images = warp.requested(options)
     case = find_case(options.case, options.tissue)
     warp.check_place(images, case)
-    run, tables = _OF_A_BODY if case.specimen is None else _OF_A_SPECIMEN
+    run: Callable[..., Any] = Diagnosing if case.specimen is None else DiagnosingSpecimen
+    tables = _OF_A_BODY if case.specimen is None else _OF_A_SPECIMEN
     diagnosing = run(case, chosen, device, Listener(lambda text: say(f"  {text}")))
     out = choose_folder(options.out, f"warpbrain-diagnose-{safe_name(case.name)}", options.overwrite)
     note_case(record, case, device)
