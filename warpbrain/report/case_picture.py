@@ -13,6 +13,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.mesh import face_vectors
+from warpbrain.mesh.surface import EDGES
 from warpbrain.recordings.recording import PointsRecording, Recording, SurfaceRecording
 from warpbrain.report import views
 from warpbrain.report.files import MILLIMETRES
@@ -63,8 +64,8 @@ class _Scene:
         #: Sides of the box around the body [m].
         self.box = np.ptp(mesh.points, axis=0)
         extent = float(self.box.max())
-        edges = mesh.points[mesh.tetrahedra[:, [0, 0, 0, 1, 1, 2]]]
-        edge = float(np.median(np.linalg.norm(edges - mesh.points[mesh.tetrahedra[:, [1, 2, 3, 2, 3, 3]]], axis=-1)))
+        ends = mesh.points[mesh.tetrahedra[:, EDGES]]
+        edge = float(np.median(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1)))
         #: How far from a cut a node is still shown in it [m]: about half an element; of a flat body, not from one side
         #: to the other. And the same of what was recorded: farther, as it is sparser and is not on the outline.
         self.near = min(max(0.02 * extent, 0.4 * edge), 0.4 * float(self.box.min()))
@@ -115,7 +116,7 @@ def _headline(case: Case) -> str:
 def _draw_cut(axes: Any, scene: _Scene, view: View, place: float) -> None:
     mesh = scene.mesh
     section = cut(mesh.points, mesh.tetrahedra, np.zeros(len(mesh.points)), view.axis, place)
-    views.draw_tissue(axes, section, scene.colours, _SEAM)
+    views.draw_polygons(axes, section, _SEAM, facecolors=scene.colours[section.elements].tolist())
     views.draw_outline(axes, mesh, view, place)
     near = np.abs(mesh.points[:, view.axis] - place) <= scene.near
     for number, (_, members) in enumerate(scene.node_sets):

@@ -174,23 +174,17 @@ def element_colours(mesh: TetMesh, resected: Bools, names: Mapping[int, str] | N
     return np.where(resected, RESECTED, np.array([colours[label] for label in mesh.labels])[numbers])
 
 
-def draw_tissue(axes: Any, section: Cut, colours: NDArray[np.str_], rim: float) -> None:
-    """Fill a cut with the colours of its elements; a rim of the same colour hides the seams between them."""
+def draw_polygons(axes: Any, section: Cut, rim: float, **style: Any) -> Any:
+    """Fill the polygons of a cut; a rim of the same colour hides the seams between them."""
     from matplotlib.collections import PolyCollection
 
-    shown = colours[section.elements].tolist()
-    polygons = [in_view(p) for p in section.polygons]
-    axes.add_collection(PolyCollection(polygons, facecolors=shown, edgecolors=shown, linewidths=rim))
+    polygons = [in_view(polygon) for polygon in section.polygons]
+    return axes.add_collection(PolyCollection(polygons, edgecolors="face", linewidths=rim, **style))
 
 
-def draw_scalars(axes: Any, section: Cut, top: float, cmap: Any = "viridis", **options: Any) -> Any:
+def draw_scalars(axes: Any, section: Cut, top: float, rim: float = 0.4, **style: Any) -> Any:
     """Colour a cut by what it carries, from 0 to `top`; returns what a colour bar is made of."""
-    from matplotlib.collections import PolyCollection
-
-    style = {"edgecolors": "face", "linewidths": 0.4, **options}
-    drawn = PolyCollection([in_view(p) for p in section.polygons], array=section.values, cmap=cmap, **style)
-    drawn.set_clim(0.0, top)
-    return axes.add_collection(drawn)
+    return draw_polygons(axes, section, rim, array=section.values, clim=(0.0, top), **style)
 
 
 def draw_values(axes: Any, mesh: TetMesh, values: Floats, view: View, place: float, top: float) -> Any:

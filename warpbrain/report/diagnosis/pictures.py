@@ -86,7 +86,7 @@ def map_figure(anatomy: Anatomy) -> dict[str, Any]:
         for panel, view in zip(axes, VIEWS, strict=True):
             section = anatomy.draw(panel, view)
             top = max(float(anatomy.fields["score"].max()), threshold)
-            tint = views.draw_scalars(panel, section, top, shades(), linewidths=0.2, zorder=1.0)
+            tint = views.draw_scalars(panel, section, top, 0.2, cmap=shades(), zorder=1.0)
             if anatomy.ball is not None:
                 at, radius = in_view(anatomy.centre[view.plane]), MILLIMETRES * anatomy.ball[1]
                 style = {"facecolor": "none", "edgecolor": BLACK, "linestyle": "--", "linewidth": 1.3}
