@@ -1,7 +1,5 @@
 """Files that are there whole or not at all, after a power failure too: what has its name is on the disk."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import os

@@ -1,7 +1,5 @@
 """The edge of the program: lengths and axes of files become metres in RAS here, and turn back here, nowhere else."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ A package names them in its `pyproject.toml`, in tables of which `examples/packa
     turning = "turning_heads:Turning"
 """
 
-from __future__ import annotations
-
 from importlib.metadata import entry_points
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Everything that is wrong with a user's files, collected so that all of it can be said at once."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """What results have in common: they draw themselves, and a notebook shows them as a table."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import warpbrain

@@ -1,7 +1,5 @@
 """How many processors there are for this process, and host work of independent parts in as many threads."""
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Callable, Sequence

@@ -6,8 +6,6 @@ patterns in the place of mechanisms say what chance predicts. To recordings with
 compared at its time.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

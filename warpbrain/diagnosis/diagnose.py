@@ -1,7 +1,5 @@
 """What was left out of a case: sets of causes with probabilities, a verdict of least expected loss, its checks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -8,8 +8,6 @@ That is the expected log Bayes factor of a cause over its best approximation by 
 measure of what to record next: by how much it would discriminate between the two most probable causes.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -6,8 +6,6 @@ approximates the state at each time, so the evidence is overconfident; it is div
 intervals were right for sudden and growing swellings of a phantom.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Every cause with its probability, size, place and detectability."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The result of a diagnosis as plain data, and its sentences, made from the numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

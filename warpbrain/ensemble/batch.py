@@ -8,8 +8,6 @@ A pass does three things in one graph, each for a list of slots of its own:
    and the balance of forces, from which the floor above decides what each of them does next.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

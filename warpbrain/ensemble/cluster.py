@@ -6,8 +6,6 @@ it too, each of its samples is computed by itself, and those of which workers di
 workers are gone and none comes back in a stated time, what came back is kept and the rest ends with an error.
 """
 
-from __future__ import annotations
-
 import logging
 import threading
 import time

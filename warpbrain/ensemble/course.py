@@ -5,8 +5,6 @@ as `warpbrain.simulation.relaxation` takes them: each sample has a step of its o
 shorten its steps holds up none of the others.
 """
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What an ensemble says: a row for each sample, and the displacement's mean, spread and percentiles at every node."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """An ensemble from a case to its spread: what `warpbrain ensemble` and `warpbrain.ensemble` do."""
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

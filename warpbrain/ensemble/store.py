@@ -5,8 +5,6 @@ checksum of all that it says. A part that is damaged is taken away, so that its 
 `ensemble.json` is written anew where no sound part is of another ensemble.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

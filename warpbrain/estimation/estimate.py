@@ -1,7 +1,5 @@
 """Tissue from recordings, from one end to the other."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -5,8 +5,6 @@ say it will be. Noise and estimate are found in turn: about each point the noise
 estimated integrated out, see `likelihood`, and with that noise the estimate.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A case has one state, or one for each time at which something else acts (`warpbr
 states stand one after the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """How to estimate, and who is told how it gets on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

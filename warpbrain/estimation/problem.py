@@ -9,8 +9,6 @@ of what was recorded less what parameters make of it, and integrated out. The mo
 error of the mesh: they are linear about values that are found again and again until they are the most probable ones.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -5,8 +5,6 @@ the rotation by the angle `|omega|` about `omega`. It is no property of the tiss
 integrated out of what is said of it. Turns are finite: 5 degrees at 80 mm is 0.3 mm more than its first order.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

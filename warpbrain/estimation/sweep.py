@@ -4,8 +4,6 @@ Curve `k` of a tissue lies `k` standard deviations from the mean of its group; `
 two tissues all 289 pairs. The best is the one of the least root mean square distance from what was recorded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

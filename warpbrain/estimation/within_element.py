@@ -4,8 +4,6 @@ The standard deviation of a row's error is a part of that change, `mesh.unresolv
 the size with the same wall do not reduce it, so it is no part of the discretisation error.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

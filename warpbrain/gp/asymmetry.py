@@ -6,8 +6,6 @@ compression is stiffer. Here it is the mean of that over `STRAINS` of the larges
 stretches has on both sides.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 A draw is drawn at anchors; elsewhere it is what follows from its values there.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol

@@ -6,8 +6,6 @@ first needed. Hierarchical models have `"format": 2`. The first format knew no m
 other things than those of today: such a model is fitted again to its own studies when it is read, which takes seconds.
 """
 
-from __future__ import annotations
-
 import json
 import time
 import warnings

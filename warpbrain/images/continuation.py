@@ -5,8 +5,6 @@ Laplace equation, `laplacian(u) = u / length^2`, with what was computed given in
 front of a plane it is `exp(-distance / length)` of what is there, in a narrow gap it is interpolated between the walls.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from warpbrain.arrays import Bools, Floats, Singles

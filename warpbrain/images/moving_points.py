@@ -1,7 +1,5 @@
 """Files of points with their points where tissue has carried them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass

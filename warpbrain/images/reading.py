@@ -4,8 +4,6 @@ NIfTI (`.nii`, `.nii.gz`) and FreeSurfer's volumes (`.mgz`, `.mgh`) are read by 
 `.nhdr`, `.mha`, `.mhd`) by SimpleITK. A DICOM series is converted to NIfTI first (`dcm2niix`).
 """
 
-from __future__ import annotations
-
 import importlib.util
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Volumes, displacement fields and transforms as NIfTI files (`.nii.gz`), whole or not at all."""
 
-from __future__ import annotations
-
 import gzip
 from pathlib import Path
 from typing import Any

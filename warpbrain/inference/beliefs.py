@@ -1,7 +1,5 @@
 """Prior parameters from `priors.toml`, the only place where they are written."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from functools import cache

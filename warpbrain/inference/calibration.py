@@ -1,7 +1,5 @@
 """What is fitted to scored cases: how probabilities follow from evidence, and what each kind of wrong verdict costs."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

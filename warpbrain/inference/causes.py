@@ -1,7 +1,5 @@
 """What may have caused residuals: mechanisms, unknown fields, or what is no physics, alike; and sets of causes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from enum import Enum
 

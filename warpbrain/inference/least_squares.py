@@ -4,8 +4,6 @@ Rows are in standard deviations, those of the prior among them, so that half the
 `least_squares` damps the steps; a step to where there is no point at all (no equilibrium, no such law) is shortened.
 """
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable
 

@@ -9,8 +9,6 @@ is `noise.shared` of `priors.toml`, and `l` is `noise.reach` of the radius of th
 Student t. Of a few points the noise is many times larger, see `gross_errors`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

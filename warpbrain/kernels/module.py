@@ -1,7 +1,5 @@
 """Where kernels are compiled, a named Warp module for each set that is always used together, and for what precision."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 import threading

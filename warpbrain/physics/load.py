@@ -1,7 +1,5 @@
 """What acts with a factor over time, and a load: forces on the nodes of a body that do not follow it."""
 
-from __future__ import annotations
-
 import abc
 import itertools
 import math

@@ -10,8 +10,6 @@ which is `(M + h D + h^2 K) dv = h (f_ext - f_int - D v0 - h K v0)`. Further ite
 implicit equation itself, with `K v = (A v - (1 + h m_d) M v) / (h k_d + h^2)` in the damping force.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any

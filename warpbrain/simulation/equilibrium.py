@@ -10,8 +10,6 @@ what is out of balance under the full load as `r`: a path of equilibria from the
 homotopy: Keller 1978, Global homotopies and Newton methods).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

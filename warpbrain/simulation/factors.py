@@ -13,8 +13,6 @@ coarse space, on a GPU because an iteration takes microseconds: 16 ms for an equ
 kept inverse of the stiffness took 21, and a diagnosis as long (2026-11-26).
 """
 
-from __future__ import annotations
-
 import os
 from typing import Any
 

@@ -6,8 +6,6 @@ a machine does it, without the jitter of its reading. Where it moves, a side is 
 into steps that grow, since what relaxes does so ever more slowly. Ramps of what acts have corners of their own.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ The figures are those of `python bench/elements.py` (docs/solvers.md): a block o
 its height, that bends under its weight, beside P2-P1 elements of scikit-fem on the same mesh.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

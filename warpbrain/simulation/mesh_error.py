@@ -8,8 +8,6 @@ averaged ones. `M` is what is left of the error of averaged elements if it falls
 (Richardson's extrapolation, with 2^2 / (2^2 - 1)). Of a state that is of averaged elements already `L` is zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property

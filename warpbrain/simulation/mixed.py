@@ -18,8 +18,6 @@ The tangent (`warpbrain.kernels.nodal_volume`) is consistent and symmetric. What
 assembled, for with it the matrix would be about eight times as large.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

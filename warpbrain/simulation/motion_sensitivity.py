@@ -14,8 +14,6 @@ Steps of many seconds are a series of states that are all but at rest, as record
 damping vanish beside the stiffness.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

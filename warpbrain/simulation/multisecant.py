@@ -15,8 +15,6 @@ So does the chord method go with the factors of a state that is near in the plac
 forces and one solve, a fifth of one of Newton's. What it comes to is a start for Newton's method, which checks it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

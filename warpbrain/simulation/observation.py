@@ -1,7 +1,5 @@
 """Every recording of a case beside simulated states."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

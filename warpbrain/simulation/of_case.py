@@ -1,7 +1,5 @@
 """From a case, what a user has, to a model, what is assumed to act."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from warpbrain.cases.boundary import Displaced, Fixed, Forced

@@ -5,8 +5,6 @@ takes the step as its own rule says (backward Euler, or of second order); a step
 is halved.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ finds no way. A body with little damping swings about its rest before; who wants
 until that was seen (`RelaxationOptions.swing`, `warpbrain.simulation.swing`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What a simulation says: displacement, strain and stress as plain named arrays with units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -3,8 +3,6 @@
 From rest to the state that is asked for: an equilibrium, a motion, a motion to rest, slow change.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping

@@ -12,8 +12,6 @@ Backward Euler maps a pole `s` of `M u'' + D u' + K u = 0` to `z = 1 / (1 - h s)
 that of the body, without what the steps damp.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Options of a diagnosis."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The verdict of a diagnosis, of a body as of a specimen: what all results have, and its sentences."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

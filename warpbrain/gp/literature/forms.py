@@ -10,8 +10,6 @@ Papers write one form in several ways. A convention takes a paper's parameters a
 supplement's: `sum_p mu_p/alpha_p (sum_i l_i^alpha_p - 3)` for Ogden, `C1 (I1 - 3) + C2 (I2 - 3)` for Mooney-Rivlin.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -20,8 +20,6 @@ too; `compression` and `tension` are tables of parameters of a study that fitted
 `out = true` leaves the study out.
 """
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Iterable, Mapping

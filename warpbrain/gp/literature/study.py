@@ -6,8 +6,6 @@ A strain energy is seen as the neo-Hookean one of the same value, too: on the pa
 describes: constant for a neo-Hookean solid, curved for one that stiffens.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -14,8 +14,6 @@ Where clusters of a GPU have room for a system, all of this is one launch, of wh
 (`warpbrain.kernels.batched.cluster`).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

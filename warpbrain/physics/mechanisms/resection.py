@@ -1,7 +1,5 @@
 """Resection: tissue that the surgeon took out is no longer there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar

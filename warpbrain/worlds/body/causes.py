@@ -3,8 +3,6 @@
 The last are nuisances far larger than expected, which compete with mechanisms.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -14,8 +14,6 @@ no time for flow: `b + B du + N p = 0` at first. Without `du`, with `C = B K^-1 
 Knizhnerman, SIAM J. Matrix Anal. Appl. 19, 1998), each at the price of one equilibrium.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -9,8 +9,6 @@ that came at once and stays its displacement is `J(t)` times that of the end,
 those of their ends (Hopkins and Hamming 1957, J. Appl. Phys. 28, 906). It lags behind `1 / G(t)`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple

@@ -7,8 +7,6 @@ from body to body. A set that explains the recordings leaves small sizes; under 
 With one size for all sets they would hide causes, or be taken for some.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple

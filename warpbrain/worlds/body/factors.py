@@ -14,8 +14,6 @@ A pressure on a surface whose rim moves has a skew part `N` of the nodes of the 
 and of the transposed the same with `-N`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import Any

@@ -5,8 +5,6 @@ made anew where the coordinates have moved away from. What other shapes of laws 
 mesh, noise and gross errors stay as they are during a search, and are then taken from the point that it came to.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ to, until that changes nothing; as long as it does, searches are rough. Its evid
 model about the best point, summed over the scale of the noise and over gross errors as in screening.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

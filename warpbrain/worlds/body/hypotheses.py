@@ -5,8 +5,6 @@ difference between the Laplace evidence of the fit and that of the linear model 
 weighed in the linear model about its fit, where what acts already is as large as it is.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext

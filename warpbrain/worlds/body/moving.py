@@ -6,8 +6,6 @@ cause. So the model that is linear about a fit is linear in the places of its me
 where these are the most probable.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

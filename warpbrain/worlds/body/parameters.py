@@ -1,7 +1,5 @@
 """From the coefficients of a proposal to the parameters that a user knows, with units and standard deviations."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Where a mechanism acts and over which radius, as coordinates of which a fit has derivatives."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Each place of a scan stands for a cell about it. So the evidence of the best one
 its cell, and the best of these is where a fit begins.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace

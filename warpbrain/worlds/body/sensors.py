@@ -1,7 +1,5 @@
 """Points of a body and rows of sensors: spread, tracked, the columns of smooth fields over them, and their noise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any

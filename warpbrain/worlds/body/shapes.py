@@ -5,8 +5,6 @@ matter: some of what acts is beside the patch, over a larger one or over a small
 far that is more than their noise, and without these columns what is left of it is taken for a further mechanism.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -7,8 +7,6 @@ moves by more than its own size is far from linear, and a mechanism that is near
 the source that it is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 

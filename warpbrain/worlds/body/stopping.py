@@ -6,8 +6,6 @@ expected loss could be regretted once this is known. Of the set that a name or a
 Where a body moves far the linear model says little of any cause: `bend_of`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Something may act on every connected surface that nothing holds, whether a case 
 surface without a set gets one, so that a `case.toml` can refer to it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

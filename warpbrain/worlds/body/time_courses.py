@@ -12,8 +12,6 @@ with a squared exponential covariance of a variance of one. Its time is the rank
 as densely as things change. So it needs few modes, and a course is found as the coefficients of these are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -14,8 +14,6 @@ covariance `C` of the coordinates after what was recorded,
 What moves recordings and not the body (registration), and the error of the mesh, have no column.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

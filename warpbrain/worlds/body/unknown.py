@@ -8,8 +8,6 @@ few modes of a field. These are dead loads, which fits follow as they follow mec
 has without them, or with other tissue, they would explain what they do worse than a mechanism that does not act.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

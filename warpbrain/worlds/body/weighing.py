@@ -4,8 +4,6 @@ Screening gives all sets the gross errors of one model. Of the most probable one
 again, each with its own causes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache

@@ -3,8 +3,6 @@
 They never choose between causes. One that fails takes a name back, or says that something is left.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

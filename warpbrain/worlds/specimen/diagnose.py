@@ -1,7 +1,5 @@
 """What was left out of a specimen: sets of causes with probabilities, a verdict of least expected loss, its checks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

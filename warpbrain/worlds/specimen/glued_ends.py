@@ -6,8 +6,6 @@ changed. Memory is taken to have the same factor. Where the rig finds no equilib
 farthest strain that it reached is kept.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

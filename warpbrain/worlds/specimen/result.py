@@ -1,7 +1,5 @@
 """What a diagnosis of a specimen found, as typed objects that the report is written from, and its sentences."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,8 +6,6 @@ sets with more causes, or with causes that change each other, are proposed from 
 the log density of the same rows; in which order they were found decides nothing.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
