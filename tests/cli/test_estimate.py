@@ -40,6 +40,7 @@ def short_chain(monkeypatch):
     monkeypatch.setattr(EstimationOptions, "__init__", partialmethod(EstimationOptions.__init__, chain=25))
 
 
+@pytest.mark.slow(14)
 @pytest.mark.usefixtures("drawn", "short_chain")
 def test_tables_files_and_figures(folder, tmp_path):
     out = tmp_path / "out"

@@ -74,6 +74,7 @@ def test_the_sweep_of_the_paper(tmp_path):
         assert float(row[f"{group}: mu [Pa]"]) == pytest.approx(law_of_curve(model, group, k).shear_modulus, rel=1e-9)
 
 
+@pytest.mark.slow(6)
 def test_fit_adds_a_study_and_the_folder_is_a_model(tmp_path, monkeypatch):
     # the quantiles of a thousand draws say how much a study changed; that they are said needs few
     monkeypatch.setattr("warpbrain.cli.gp.moduli", partial(moduli, draws=60))

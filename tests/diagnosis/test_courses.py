@@ -36,6 +36,7 @@ def fallen() -> tuple[Case, Diagnosis]:
     return truth, diagnosed(without(truth, [fitted, unseen]))
 
 
+@pytest.mark.slow(5)
 def test_a_level_that_falls_is_one_cause(fallen: tuple[Case, Diagnosis], verify) -> None:
     _, found = fallen
     assert found.verdict == "named" and [one.kind for one in found.named] == ["gravity"]

@@ -115,6 +115,7 @@ def _followed(states: States, hypothesis: Hypothesis) -> Floats:
     return states.observations.at(u, reactions, states.centre).computed
 
 
+@pytest.mark.slow(5)
 def test_one_course_is_that_of_every_permeability(draining: Case) -> None:
     states = States(draining, "cpu")
     theta = declared(states.case, states.parameters)

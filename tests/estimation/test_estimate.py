@@ -46,6 +46,7 @@ def moduli(posterior: Posterior) -> np.ndarray:
     return np.array([law.shear_modulus for law in posterior.parameters.laws(posterior.theta)])
 
 
+@pytest.mark.slow(2)
 @pytest.mark.parametrize("load", ["pushed", "gravity"])
 @pytest.mark.parametrize("tissues", [1, 2])
 def test_without_noise_tissue_is_found_to_a_thousandth(tissues: int, load: str) -> None:
@@ -210,6 +211,7 @@ def test_the_same_twice() -> None:
     np.testing.assert_array_equal(first.importance.theta, second.importance.theta)
 
 
+@pytest.mark.slow(3)
 def test_a_law_need_not_be_known_and_what_it_is_does_not_matter() -> None:
     case = block({"brain": WHITE}, "pushed")
     seen = replace(case, recordings=(beads(truth(case), noise=1e-4),))

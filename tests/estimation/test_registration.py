@@ -89,6 +89,7 @@ def test_an_exact_rigid_motion_is_recovered(seed: int, surface: bool, verify) ->
     )
 
 
+@pytest.mark.slow(3)
 @pytest.mark.parametrize("declared", [None, Registration(0.003, 0.02)])
 def test_an_estimate_takes_the_registration_that_a_diagnosis_takes(declared, small_diagnosis, monkeypatch) -> None:
     def accuracy(case: Case) -> np.ndarray:

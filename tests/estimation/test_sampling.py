@@ -65,6 +65,7 @@ def test_weighted_draws_have_the_moments_of_what_weighs_them(proposal: Proposal)
     np.testing.assert_allclose(found.standard_deviations, DEVIATION, rtol=0.02)
 
 
+@pytest.mark.slow(2)
 def test_a_chain_has_the_moments_of_its_target(proposal: Proposal) -> None:
     chain = run_chain(Known(), proposal, MEAN, 4000, np.random.default_rng(0))
     assert chain.solves == 4000 and chain.effective.min() > 500 and 0.3 < chain.accepted < 1.0

@@ -137,6 +137,7 @@ def test_far_from_the_data_it_is_neo_hookean_and_finite(group):
     assert np.isfinite(drawn).all()
 
 
+@pytest.mark.slow(2)
 @pytest.mark.parametrize("variant", ["corrected", "as_published"])
 def test_curves_are_monotone_and_convex_far_beyond_the_data(variant):
     """Mean and the curves two standard deviations from it, of every group: energies of a stable solid."""

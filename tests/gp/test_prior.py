@@ -46,6 +46,7 @@ def test_what_has_no_coordinates_is_refused():
         coordinates("fung")
 
 
+@pytest.mark.slow(8)
 def test_samples_are_the_draws(neo_hookean):
     assert neo_hookean.names == (f"{GREY}: ln(mu0 / Pa)", f"{WHITE}: ln(mu0 / Pa)")
     samples = neo_hookean.samples(5)
@@ -92,6 +93,7 @@ def test_an_exponent_of_either_sign(ogden):
     assert isinstance(ogden.laws(fresh[0])[0], Ogden)
 
 
+@pytest.mark.slow(2)
 def test_a_ratio_that_piles_up_at_its_ends(mooney_rivlin):
     assert mooney_rivlin.names[1].endswith("C2 / (C1 + C2)")
     ratio = mooney_rivlin.theta[:, 1]

@@ -38,6 +38,7 @@ def test_written_and_read_again(kind, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == [MODEL]
 
 
+@pytest.mark.slow(2)
 def test_a_hierarchical_model_of_the_first_format_is_fitted_again(tmp_path):
     """Its effects meant other things; what it learnt from is the same."""
     table = {"kind": "hierarchical", "variant": "corrected", "kernel": "matern52", "parameters": {"paper": 0.65}}
@@ -49,6 +50,7 @@ def test_a_hierarchical_model_of_the_first_format_is_fitted_again(tmp_path):
     np.testing.assert_allclose(model.curve(GROUPS[8], at), trained().curve(GROUPS[8], at), rtol=0.05)
 
 
+@pytest.mark.slow(3)
 def test_a_study_of_three_lines_moves_its_group_and_goes_with_the_model(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(ADDED)

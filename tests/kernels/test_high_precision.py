@@ -30,6 +30,7 @@ STATES = {
 }
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS.keys())
 def test_against_60_digits(material, precision: Precision, device: str, verify: Row) -> None:
     F = np.stack(list(STATES.values())).astype(precision.numpy)

@@ -139,6 +139,7 @@ def test_mistaken_points_are_as_if_they_were_integrated_out(draws, both, verify)
     )
 
 
+@pytest.mark.slow(4)
 def test_its_probabilities_are_how_often_it_is_right():
     """Of data drawn as it believes: what it gives a probability of p is true in a part p of them."""
     random = np.random.default_rng(9)

@@ -128,6 +128,7 @@ def test_without_mistakes_it_is_the_plain_measure():
     assert spread(0.0, columns).d(delta, other) == pytest.approx(exact, rel=1e-3)
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize("points", [1, 3, 30])
 @pytest.mark.parametrize("size", [0.3e-3, 1e-3, 3e-3, 5e-3])
 def test_mistakes_never_let_more_be_seen(points, size):

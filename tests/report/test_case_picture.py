@@ -185,6 +185,7 @@ def test_more_sets_tissues_and_recordings_than_there_are_colours(picture):
     picture(case_of(many, *recordings))
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize(
     "title",
     [
@@ -230,6 +231,7 @@ def test_the_right_way_round(picture, kept, axis, row, column, side):
     assert second[1 if side == "left" else 0] < first[1 if side == "left" else 0] - 20
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize(
     ("displacement", "row", "column", "along"),
     [

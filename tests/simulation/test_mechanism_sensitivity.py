@@ -149,6 +149,7 @@ def test_alone(name: str, device: str, monkeypatch: pytest.MonkeyPatch, verify: 
     check_alone(name, "tet4", device, monkeypatch, verify)
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow(4)] if name == "drainage" else []) for name in AVERAGED]
 )
@@ -180,6 +181,7 @@ ON_A_TABLE = ("contact lifting", "falx", "asymmetry")
 MADE_OF = ("inclusion", "fibres", "residual-stress", "swelling")
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize(
     ("names", "elements"),
     [

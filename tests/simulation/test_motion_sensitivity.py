@@ -95,6 +95,7 @@ def relative(found: Floats, expected: Floats) -> float:
     return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize(
     ("newton", "h", "elements", "acting", "steps"),
     [

@@ -93,6 +93,7 @@ CLAIM = "by parameters of every law, formulation and kind of load"
 BESIDE = "differences of equilibria"
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize(
     ("tissues", "load"),
     [

@@ -89,6 +89,7 @@ def swollen(F: np.ndarray) -> float:
     return 1.08 * neo_hookean(F / np.cbrt(1.08))
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize(
     ("acting", "energy"),
     [

@@ -100,6 +100,7 @@ def without_steps(value: Callable[[int], np.ndarray], steps: int) -> np.ndarray:
     return 2.0 * value(2 * steps) - value(steps)
 
 
+@pytest.mark.slow(2)
 @pytest.mark.parametrize(
     "time", [pytest.param(time, marks=[] if time in (0.01, 0.2, 1.0) else [pytest.mark.slow(1)]) for time in TERZAGHI]
 )

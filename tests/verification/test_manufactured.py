@@ -70,6 +70,7 @@ def test_quadrature() -> None:
     assert found == pytest.approx(4.0 / 40320.0, rel=1e-13)
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize("n", [4, 8, 16])
 def test_errors_are_those_of_dolfinx(n: int, device: str, verify: Row) -> None:
     """Its quadrature rules of the same degrees have other points: five digits agree, and more on finer meshes."""

@@ -159,6 +159,7 @@ def test_order_in_time_of_tissue_that_relaxes(elements: str, verify: Row) -> Non
     verify(claim, RELAXING, np.abs(orders(*found) - 2.0).max(), 0.01, "orders")
 
 
+@pytest.mark.slow(5)
 @pytest.mark.parametrize(
     ("elements", "halvings"),
     # a second halving of averaged elements takes minutes of one core

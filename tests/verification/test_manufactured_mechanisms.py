@@ -144,6 +144,7 @@ def cases() -> Iterator[object]:
             yield pytest.param(name, elements, 2, marks=pytest.mark.slow)
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize(("name", "elements", "halvings"), cases())
 def test_orders_on_an_irregular_mesh(name: str, elements: str, halvings: int, device: str, verify: Row) -> None:
     problem, by_element = PROBLEMS[name]

@@ -69,6 +69,7 @@ def test_mooney_rivlin_is_found_again(C1: float, C2: float) -> None:
     assert found.rms < 1e-9
 
 
+@pytest.mark.slow(3)
 @given(modulus=st.floats(1.0, 6.0).map(lambda power: 10.0**power), alpha=exponents)
 def test_ogden_is_found_again(modulus: float, alpha: float) -> None:
     values = (2.0 * modulus / alpha, alpha)
@@ -116,6 +117,7 @@ def literal(name: str, l: np.ndarray, y: np.ndarray, limit: float) -> float:
     return min(least_squares(residual, start, jacobian, bounds=bounds).cost for bounds, start in boxes)
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize("limit", [5.0, FARTHEST])
 @pytest.mark.parametrize("name", METAMODELS)
 def test_no_worse_than_the_searches_of_the_paper(name: str, limit: float) -> None:

@@ -212,6 +212,7 @@ def test_forces_are_the_slope_of_the_energy_and_the_tangent_that_of_the_forces(s
     assert np.abs(system.stiffness_times(d) - change).max() <= 1e-6 * np.abs(change).max()
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize("name", ["0529", "phantom"])
 @pytest.mark.parametrize(("state", "iterations"), [("sliding", 20), ("lifting", 40)])
 def test_a_brain_slides_along_its_own_curved_surface(name, state, iterations, device):

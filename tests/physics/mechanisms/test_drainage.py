@@ -178,6 +178,7 @@ def test_a_captured_step_is_the_same_step(device):
     assert np.abs(found[1] - found[0]).max() < 1e-6 * np.abs(found[0]).max()
 
 
+@pytest.mark.slow(3)
 def test_a_step_that_is_too_long_is_halved_and_what_no_step_reaches_is_said():
     system = System(squeezed(Drainage(permeability=1e-8)), "cpu")
     with pytest.raises(InputError, match="increase"):

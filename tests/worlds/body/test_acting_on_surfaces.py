@@ -48,6 +48,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize("name", CASES)
 def test_each_of_four_mechanisms_acts_on_each_surface(name: str) -> None:
     make, words = CASES[name]

@@ -47,6 +47,7 @@ def search() -> HypothesisSearch:
     return screened(recorded(0.031), "cpu", mesh_error=False, mechanisms=sorted(BOTH))
 
 
+@pytest.mark.slow(4)
 def test_it_is_weighed_under_the_reactions_to_the_load(search: HypothesisSearch) -> None:
     load, contact, both = search.get(("gravity",)), search.get(("contact",)), search.get(BOTH)
     assert load is not None and both is not None

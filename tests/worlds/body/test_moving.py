@@ -51,6 +51,7 @@ def fitted_at(search: HypothesisSearch, centre: np.ndarray) -> WeightedSet:
     )
 
 
+@pytest.mark.slow(6)
 def test_what_was_fitted_off_its_place_is_moved_nearer_to_it(search: HypothesisSearch) -> None:
     off = fitted_at(search, CENTRE + np.array([0.006, 0.0, 0.0]))
     assert off.refit is not None

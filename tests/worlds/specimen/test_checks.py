@@ -56,6 +56,7 @@ def test_held_out_rows_are_the_conditional_of_the_model():
     )
 
 
+@pytest.mark.slow(3)
 def test_errors_are_of_all_recorded_rows():
     case = cycles(400.0, 40.0, 100.0, roles=("fit", "fit", "check"))
     found = DiagnosingSpecimen(case, DiagnosisOptions(candidates=("viscoelasticity",), draws=100), "cpu").run()

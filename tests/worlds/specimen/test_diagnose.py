@@ -50,6 +50,7 @@ def test_an_ogden_rod_resists_compression_more():
     assert found.explained is not None and [m.kind for m in found.explained.mechanisms] == ["asymmetry"]
 
 
+@pytest.mark.slow(4)
 def test_a_viscous_rod_is_told_by_its_cycles():
     rng = np.random.default_rng(2)
     tests = []
@@ -83,6 +84,7 @@ def test_a_rod_under_forces_is_read_with_the_noise_of_its_stretch():
         assert named or found.verdict == "nothing missing"
 
 
+@pytest.mark.slow(1)
 @pytest.mark.parametrize("poisson", [0.40, 0.45, 0.48])
 def test_confined_compression_tells_how_compressible_a_rod_is(poisson):
     """Made by closed forms of the coupled neo-Hookean law; 0.45 is declared."""
