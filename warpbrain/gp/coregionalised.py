@@ -132,10 +132,6 @@ class Likelihood:
     def __init__(self, data: Replicates, kernel: str = "matern32", jitter: float = 0.0) -> None:
         self.data, self.kernel, self.jitter = data, kernel, jitter
         self._distance = np.abs(data.x[:, None] - data.x[None, :])
-        # rows of one task together, so that sums over tasks are sums over blocks
-        self._order = np.argsort(data.task, kind="stable")
-        self._starts = np.searchsorted(data.task[self._order], np.arange(TASKS))
-        self._present = np.unique(data.task)
         self._scatter = np.bincount(data.task, weights=data.scatter, minlength=TASKS)
 
     def covariance(self, parameters: Parameters) -> tuple[Floats, Floats, Floats]:
@@ -193,7 +189,7 @@ class Likelihood:
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         G = 0.5 * (inverse - np.outer(a, a))
         members = (data.task[:, None] == np.arange(TASKS)).astype(np.float64)
-        by_B = self._blocks(G * k)
+        by_B = members.T @ (G * k) @ members
         by_noise = np.bincount(data.task, weights=np.diag(G) / data.count, minlength=TASKS)
         extra = np.bincount(data.task, weights=data.count - 1, minlength=TASKS) / noise - self._scatter / noise**2
         slopes = [
@@ -215,15 +211,6 @@ class Likelihood:
         at = np.arange(1 + 2 * TASKS, 1 + 3 * TASKS)
         information[at, at] += 0.5 * self._scatter / noise
         return self.value(parameters, factored), np.concatenate(slopes), information
-
-    def _blocks(self, matrix: Floats) -> Floats:
-        """Sums (12, 12) of a matrix (m, m) over pairs of tasks."""
-        sums = np.zeros((TASKS, TASKS))
-        ordered = matrix[np.ix_(self._order, self._order)]
-        at = self._starts[self._present]
-        rows = np.add.reduceat(ordered, at, axis=0)
-        sums[np.ix_(self._present, self._present)] = np.add.reduceat(rows, at, axis=1)
-        return sums
 
 
 #: Variance added to the diagonal of the covariance, as in the paper's training.
@@ -273,7 +260,6 @@ class Training:
     climbs: tuple[Climb, ...]
     starts: tuple[Start, ...]
     step: int
-    kernel: str
 
     @property
     def best(self) -> Climb:
@@ -322,7 +308,7 @@ def train(
             f"none of {len(starts)} starts has a covariance that double precision can factor (jitter {JITTER:g})"
         )
     ended.sort(key=lambda climbed: climbed.value)
-    return Training(tuple(ended), tuple(starts), step, kernel)
+    return Training(tuple(ended), tuple(starts), step)
 
 
 def start(data: Replicates, apart: int | None = None) -> Parameters:
@@ -409,7 +395,7 @@ class Coregionalised:
     parameters: Parameters
     variant: str = "as_published"
     kernel: str = "matern32"
-    jitter: float = 1e-8
+    jitter: float = JITTER
     mean_modulus: float = 0.0
     points: int = 100
     name = "coregionalised"

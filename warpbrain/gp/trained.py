@@ -136,7 +136,7 @@ def fit_model(
     else:
         data = training_points(studies)
         training = train(data, climbs=climbs, progress=progress)
-        model = Coregionalised(studies, training.best.parameters, variant, training.kernel, JITTER)
+        model = Coregionalised(studies, training.best.parameters, variant)
         record |= {
             "points": int(data.count.sum()),
             "means of replicates": data.size,
