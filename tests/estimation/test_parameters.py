@@ -8,8 +8,8 @@ from synthetic import GREY, WHITE, beads, block, truth
 
 from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.parameters import Parameters, prior_modes, prior_of
-from warpbrain.estimation.sweep import VALUES, sweep
-from warpbrain.gp.sampling import law_of_curve
+from warpbrain.estimation.sweep import sweep
+from warpbrain.gp.sampling import SWEEP, law_of_curve
 from warpbrain.gp.trained import trained
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 
@@ -55,12 +55,12 @@ def test_exponents_of_either_sign_are_modes() -> None:
 
 def test_a_sweep_is_of_the_curves_and_finds_the_nearest() -> None:
     model = trained("coregionalised", "as_published")
-    law = law_of_curve(model, "hyperelastic/brain", VALUES[11]).law()
+    law = law_of_curve(model, "hyperelastic/brain", SWEEP[11]).law()
     case = block({"brain": law}, "gravity", cells=2)
     seen = replace(case, recordings=(beads(truth(case)),))
     found = sweep(seen, model, device="cpu")
-    assert sorted(point.k[0] for point in found.points) == list(VALUES) and len(VALUES) == 17
-    assert found.best.k == (VALUES[11],) and found.best.error < 1e-9
+    assert sorted(point.k[0] for point in found.points) == list(SWEEP) and len(SWEEP) == 17
+    assert found.best.k == (SWEEP[11],) and found.best.error < 1e-9
     assert found.parameters.laws(found.best.theta) == (law,)
     # what is known already is not computed again
     known = {point.k: replace(point, error=7.0) for point in found.points[1:]}

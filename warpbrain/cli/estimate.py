@@ -23,7 +23,8 @@ from warpbrain.estimation.likelihood import Likelihood
 from warpbrain.estimation.options import EstimationOptions, Listener
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.posterior import Posterior
-from warpbrain.estimation.sweep import VALUES, SweepPoint, sweep
+from warpbrain.estimation.sweep import SweepPoint, sweep
+from warpbrain.gp.sampling import SWEEP
 from warpbrain.gp.trained import find_model
 from warpbrain.kernels.module import find_device
 from warpbrain.recordings.base import Registration
@@ -158,7 +159,7 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     if options.overwrite:
         path.unlink(missing_ok=True)
     known, damaged = table.read_sweep(path, header, len(parameters.tissues))
-    total = len(VALUES) ** len(parameters.tissues)
+    total = len(SWEEP) ** len(parameters.tissues)
     say(f"sweep of {total} equilibria" + (f", {len(known)} of which are there already" if known else ""))
     if damaged:
         say(f"  damaged   {damaged} of the lines of {path.name}: nothing of them is used")
@@ -171,7 +172,7 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
         progress.show(len(points) / total, ", ".join(f"k = {k:+.2f}" for k in point.k))
 
     with Progress("sweep", options.quiet) as progress:
-        finished = sweep(case, model, VALUES, known, options.device, on_point)
+        finished = sweep(case, model, SWEEP, known, options.device, on_point)
     say(*table.sweep_lines(finished))
     # beside an estimate, and of points that were there before
     with results_in(out, record, replace=False):

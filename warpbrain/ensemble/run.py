@@ -1,8 +1,8 @@
 """An ensemble from a case to its spread: what `warpbrain ensemble` and `warpbrain.ensemble` do."""
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -18,7 +18,7 @@ from warpbrain.ensemble.store import Store
 from warpbrain.ensemble.workers import Here, Job, Prepare, Processes, Workers, kind_of
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.gp.process import Process
-from warpbrain.gp.sampling import law_of_curve
+from warpbrain.gp.sampling import SWEEP, law_of_curve
 from warpbrain.gp.trained import find_model
 from warpbrain.physics.laws import Law
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
@@ -27,8 +27,6 @@ from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
 
-#: Standard deviations from the mean curve that the paper's sweep takes, for each tissue.
-SWEEP = tuple(np.linspace(-2.0, 2.0, 17).tolist())
 #: Samples unless others are asked for: as many as the paper's sweep of two tissues has.
 SAMPLES = 289
 
@@ -151,20 +149,17 @@ def chosen_samples(
     return chosen
 
 
-@contextmanager
 def chosen_workers(
     device: str | None, batch: int | None, processes: int, dask: str | None, prepare: Prepare
-) -> Iterator[Workers]:
+) -> AbstractContextManager[Workers]:
     """Who computes: a Dask cluster if one is named, else processes on the CPU, or this process and one device."""
     if dask is not None:
         from warpbrain.ensemble.cluster import Cluster
 
-        with Cluster(dask, processes, device, batch, prepare) as cluster:
-            yield cluster
-    elif kind_of(device) == "cpu" and processes > 1:
-        yield Processes(processes, batch, prepare)
-    else:
-        yield Here(device, batch)
+        return Cluster(dask, processes, device, batch, prepare)
+    if kind_of(device) == "cpu" and processes > 1:
+        return nullcontext(Processes(processes, batch, prepare))
+    return nullcontext(Here(device, batch))
 
 
 def compute_missing(

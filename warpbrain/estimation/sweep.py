@@ -7,8 +7,6 @@ two tissues all 289 pairs. The best is the one of the least root mean square dis
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from warpbrain.arrays import Floats
 from warpbrain.cases.case import Case
 from warpbrain.cases.drawn import require_groups
@@ -19,14 +17,11 @@ from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.estimation.posterior import compared
 from warpbrain.gp.process import Process
-from warpbrain.gp.sampling import law_of_curve
+from warpbrain.gp.sampling import SWEEP, law_of_curve
 from warpbrain.recordings.comparison import by_unit
 
 #: Steps of each tissue.
 Steps = tuple[float, ...]
-
-#: The paper's values of `k`.
-VALUES: Steps = tuple(np.linspace(-2.0, 2.0, 17).tolist())
 
 
 @dataclass(frozen=True)
@@ -64,7 +59,7 @@ class Sweep:
 def sweep(
     case: Case,
     model: Process,
-    values: Sequence[float] = VALUES,
+    values: Sequence[float] = SWEEP,
     known: Mapping[Steps, SweepPoint] | None = None,
     device: str | None = None,
     on_point: Callable[[SweepPoint], None] | None = None,

@@ -265,6 +265,8 @@ FIT_OFFSET = 1e-3
 ATTEMPTS = 200
 #: Curves whose laws are told: this many standard deviations from the mean.
 CURVES = (-2.0, 0.0, 2.0)
+#: Standard deviations from the mean curve that the paper's sweep takes, for each tissue.
+SWEEP = tuple(np.linspace(-2.0, 2.0, 17).tolist())
 
 
 @dataclass(frozen=True)
