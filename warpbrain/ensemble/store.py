@@ -90,7 +90,7 @@ class Store:
         """Whether a part is what was written; `InputError` if it is of another ensemble."""
         try:
             arrays = read_arrays(part)
-        except ArraysError:
+        except ValueError:
             return False
         if str(arrays["fingerprint"]) != self._fingerprint:
             raise InputError(f"{part}: samples of another ensemble: choose another folder, or --overwrite it")
@@ -110,8 +110,8 @@ class Store:
             "u": np.array([outcome.u for outcome in good]).reshape(-1, self._nodes, 3),
             "reactions": np.array([outcome.support for outcome in good]).reshape(-1, len(self._held), 3),
         }
-        with whole_file(self._parts / f"part-{self._next:06d}.npz") as scratch:
-            write_arrays(scratch, arrays)
+        with whole_file(self._parts / f"part-{self._next:06d}.npz") as scratch, scratch.open("wb") as stream:
+            np.savez(stream, **(arrays | {_NAME: np.array(_digest(arrays))}))
         self._next += 1
         self._numbers |= {outcome.number for outcome in outcomes}
 
@@ -120,7 +120,7 @@ class Store:
         for file in self._files():
             try:
                 arrays = read_arrays(file)
-            except ArraysError as error:
+            except ValueError as error:
                 # since the folder was opened
                 raise InputError(f"{file}: {error}; the same command computes its samples again") from None
             good = iter(range(len(arrays["u"])))
@@ -140,28 +140,17 @@ _NUMBERS = ("number", "steps", "cg_iterations", "time", "residual", "min_J")
 _NAME = "sha256"
 
 
-class ArraysError(Exception):
-    """A file is not what was written; says why."""
-
-
-def write_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write arrays as `.npz` with their checksum."""
-    with path.open("wb") as stream:
-        members: dict[str, Any] = {**arrays, _NAME: np.array(_digest(arrays))}
-        np.savez(stream, **members)
-
-
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Read what `write_arrays` wrote; `ArraysError` if anything of it has changed, or it is no such file."""
+    """Arrays of a file with their checksum; `ValueError` if anything of it has changed, or it is no such file."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             arrays = dict(stored)
         checksum = str(arrays.pop(_NAME))
     # what NumPy and zipfile raise for bytes that are nonsense is their secret
     except Exception as error:
-        raise ArraysError(f"cannot be read: {' '.join(str(error).split())[:200]}") from None
+        raise ValueError(f"cannot be read: {' '.join(str(error).split())[:200]}") from None
     if checksum != _digest(arrays):
-        raise ArraysError("its checksum is another one")
+        raise ValueError("its checksum is another one")
     return arrays
 
 
