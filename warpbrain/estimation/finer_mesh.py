@@ -78,16 +78,6 @@ class Discretisation:
             if not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"discretisation: {name} = {value}: expected a positive number")
 
-    @property
-    def means(self) -> Floats:
-        """Of `b` and the coefficients of `B`, shape (37,)."""
-        return np.array([self.mean, *[0.0] * (len(NAMES) - 1)])
-
-    @property
-    def deviations(self) -> Floats:
-        """Of `b` and the coefficients of `B`, shape (37,)."""
-        return np.array([self.deviation, *[self.shape] * (len(NAMES) - 1)])
-
 
 @dataclass(frozen=True, eq=False)
 class Difference:
@@ -138,8 +128,7 @@ class DiscretisationError:
 
     def at(self, theta: Floats, values: Floats) -> tuple[Floats, Floats]:
         """What is to be added to displacement and reactions (s n, 3)."""
-        u, reactions = self._change_at(theta)
-        M = self._matrices(values)
+        M, (u, reactions) = self._matrices(values), self._change_at(theta)
         return np.einsum("nij,nj->ni", M, u), np.einsum("nij,nj->ni", M, reactions)
 
     def by_theta(self, values: Floats) -> tuple[Floats, Floats]:

@@ -130,7 +130,7 @@ class Estimate:
     def predicted(self, theta: Floats) -> State:
         """The state of other parameters, to first order about the estimate."""
         at, step = self.point.state, theta - self.theta
-        u, R = (np.tensordot(step, each, axes=1) for each in (self.linearised.du, self.linearised.dR))
+        u, R = (np.tensordot(step, each, axes=1) for each in self.linearised.derivatives)
         return State(theta, at.u + u, at.reactions + R, 0)
 
     def require_explained(self) -> None:
@@ -226,9 +226,9 @@ class GaussNewton:
             if z.any():
                 theta = x0 + scale * z
                 problem.parameters.require_possible(theta)
-                here, derivatives = best
+                here, about = best
                 # where derivatives say the state will be
-                predicted = here.state.u + np.tensordot(theta - here.state.theta, derivatives.du, axes=1)
+                predicted = here.state.u + np.tensordot(theta - here.state.theta, about.derivatives[0], axes=1)
                 state = problem.forward.solve_from(theta, (predicted, here.state.u))
                 newton += state.newton_iterations
                 there = problem.at(state, start.nuisances, start.noise, start.model)

@@ -121,9 +121,7 @@ class Sensors:
 
     def answers_within_in_time(self, edges: Int32s, surplus: Floats) -> Floats:
         """The same (n, p) of the surplus (p, s, E, 3) [m] of s states, from which rows are counted, too."""
-        matrix = rows_by_surplus(self.by_displacement, edges)
-        flat = surplus.reshape(*surplus.shape[:2], -1)
-        return self._in_time(len(flat), flat.shape[1], lambda number: np.asarray(matrix @ flat[:, number].T))
+        return self._in_time(rows_by_surplus(self.by_displacement, edges), surplus)
 
     def with_change(self, change: Floats) -> Sensors:
         """The same rows with a change (n,) of what was computed [m] or [N], which is taken off the residuals."""
@@ -131,21 +129,16 @@ class Sensors:
 
     def answers_in_time(self, du: Floats, dR: Floats) -> Floats:
         """The same (n, p) of changes (p, s N, 3) of s states, one after the other, from which rows are counted, too."""
-        count, size = len(du), self.by_displacement.shape[1]
-        u, R = du.reshape(count, -1, size), dR.reshape(count, -1, size)
+        return self._in_time(self.by_displacement, du) + self._in_time(self.by_reactions, dR)
 
-        def response(number: int) -> Floats:
-            return np.asarray(self.by_displacement @ u[:, number].T + self.by_reactions @ R[:, number].T)
-
-        return self._in_time(count, u.shape[1], response)
-
-    def _in_time(self, count: int, states: int, response: Callable[[int], Floats]) -> Floats:
-        """Responses (n, p) to p changes, by those (n, p) to the changes of each state alone, by its number."""
-        total = np.zeros((self.by_displacement.shape[0], count))
-        for number in range(states):
+    def _in_time(self, matrix: Any, changes: Floats) -> Floats:
+        """Responses (n, p) to changes (p, s ...) of s states, by the matrix (n, m) of each state alone."""
+        by_state = changes.reshape(len(changes), -1, matrix.shape[1])
+        total = np.zeros((len(self), len(changes)))
+        for number in range(by_state.shape[1]):
             share = (self.after == number) * 1.0 - (self.before == number)
             if share.any():
-                total += share[:, None] * response(number)
+                total += share[:, None] * (matrix @ by_state[:, number].T)
         return total
 
 

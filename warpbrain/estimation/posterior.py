@@ -224,7 +224,7 @@ def identifiability(estimate: Estimate) -> Identifiability:
     unit = posterior.prior.standard_deviations
     # a factor on all moduli moves nothing if displacements do it all, and everything under a weight or a force
     scale = posterior.parameters.is_modulus.astype(np.float64)
-    moved = np.linalg.norm(np.tensordot(scale, estimate.linearised.du, axes=1))
+    moved = np.linalg.norm(np.tensordot(scale, estimate.linearised.derivatives[0], axes=1))
     known = float(scale @ posterior.information @ scale) / float(scale @ posterior.prior.precision @ scale)
 
     def combinations(rows: Floats) -> tuple[str, ...]:

@@ -48,14 +48,13 @@ class Nuisances:
     @cached_property
     def prior(self) -> Gaussian:
         """Before anything was observed."""
-        means, deviations = [np.zeros(0)], [np.zeros(0)]
+        means, deviations = np.zeros(len(self.names)), np.zeros(len(self.names))
         if self.error is not None and self.discretisation is not None:
-            means.append(self.discretisation.means)
-            deviations.append(self.discretisation.deviations)
+            means[0], deviations[0] = self.discretisation.mean, self.discretisation.deviation
+            deviations[1 : len(DISCRETISATION_NAMES)] = self.discretisation.shape
         if self.registration is not None:
-            means.append(np.zeros(6))
-            deviations.append(self.registration.deviations)
-        return Gaussian(np.concatenate(means), np.diag(np.concatenate(deviations) ** 2))
+            deviations[-6:] = self.registration.deviations
+        return Gaussian(means, np.diag(deviations**2))
 
     def standardised(self, values: Floats) -> Floats:
         """Values (q,) as coordinates `xi` (q,)."""
@@ -114,13 +113,7 @@ class Linearised:
 
     columns: Floats  # (n, p), change of what is recorded by `theta`
     information: Floats  # (p, p), of the data alone
-    du: Floats  # (p, N, 3), of the displacement [m] by `theta`
-    dR: Floats  # (p, N, 3), of the reactions [N]
-
-    @property
-    def derivatives(self) -> tuple[Floats, Floats]:
-        """Those of the state."""
-        return self.du, self.dR
+    derivatives: tuple[Floats, Floats]  # (p, N, 3), of displacement [m] and reactions [N] by `theta`
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,10 +160,10 @@ class Problem:
 
     def linearise(self, point: Point, derivatives: tuple[Floats, Floats] | None = None) -> Linearised:
         """Derivatives at a point, from those of its state, or `SolveError` if that is unstable."""
-        du, dR = self.forward.differentiate(point.state) if derivatives is None else derivatives
-        columns = self.nuisances.tissue_columns(point.rows, point.nuisances, du, dR)
+        known = self.forward.differentiate(point.state) if derivatives is None else derivatives
+        columns = self.nuisances.tissue_columns(point.rows, point.nuisances, *known)
         J = point.model.standardised(columns)
-        return Linearised(columns, J.T @ J, du, dR)
+        return Linearised(columns, J.T @ J, known)
 
     def likely_noise(self, state: State, nuisances: Floats, derivatives: tuple[Floats, Floats]) -> Noise:
         """The most probable noise about a state with its derivatives, everything that is estimated integrated out."""

@@ -244,13 +244,12 @@ def importance_sampling(
 ) -> Importance:
     """Weigh `count` draws of a proposal by a posterior; `on_draw` is called with the number of each."""
     theta = proposal.draw(rng, count)
-    unstable, failed = target.unstable, target.failed
     logs = np.empty(count)
     for number, point in enumerate(theta):
         logs[number] = target.log_density(point)
         on_draw(number + 1)
     smoothed = pareto_smoothed(logs - proposal.log_density(theta))
-    return Importance(theta, logs, smoothed, target.unstable - unstable, target.failed - failed)
+    return Importance(theta, logs, smoothed, target.unstable, target.failed)
 
 
 @dataclass(frozen=True, eq=False)

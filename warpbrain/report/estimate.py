@@ -318,7 +318,7 @@ def write_estimated_state(path: Path, posterior: Posterior, where: ScoreMap | No
 
 def file_of_estimate(posterior: Posterior) -> Any:
     """What `write_estimated_state` writes, as a `meshio.Mesh`."""
-    du, covariance = posterior.best.linearised.du, posterior.covariance
+    du, covariance = posterior.best.linearised.derivatives[0], posterior.covariance
     variance = np.einsum("pnk,pq,qnk->nk", du, covariance, du)
     deviation = MILLIMETRES * np.sqrt(np.maximum(variance, 0.0))
     arrays = {"displacement": MILLIMETRES * posterior.best.point.state.u, "displacement_sd": deviation}
