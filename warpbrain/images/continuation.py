@@ -60,14 +60,9 @@ def _solved(values: Singles, known: Bools, voxel: Floats, length: float, iterati
 
 def _neighbours(values: Singles, factors: Singles) -> Singles:
     """Sum of the six voxels around each, weighted by a factor for each axis; there is zero beyond the grid."""
-    total = np.zeros_like(values)
-    for axis, factor in enumerate(factors):
-        ahead, behind = [slice(None)] * 3, [slice(None)] * 3
-        ahead[axis], behind[axis] = slice(1, None), slice(None, -1)
-        scaled = factor * values
-        total[tuple(behind)] += scaled[tuple(ahead)]
-        total[tuple(ahead)] += scaled[tuple(behind)]
-    return total
+    x, y, z = factors
+    v, s = np.pad(values, 1), slice(1, -1)
+    return x * v[2:, s, s] + x * v[:-2, s, s] + y * v[s, 2:, s] + y * v[s, :-2, s] + z * v[s, s, 2:] + z * v[s, s, :-2]
 
 
 def _coarser(values: Singles, known: Bools) -> tuple[Singles, Bools]:
