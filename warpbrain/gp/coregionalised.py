@@ -446,12 +446,8 @@ class Coregionalised:
     def _predict(self, groups: Sequence[str], at: Floats, other: Floats) -> tuple[Floats, Floats]:
         """Mean of the shared curve at (groups * n,) and covariance with other stretches, given the studies."""
         tasks = np.array([GROUPS.index(group) for group in groups], dtype=np.int64)
-
-        def places(stretches: Floats) -> _At:
-            return np.repeat(tasks, len(stretches)), np.tile(stretches, len(tasks))
-
-        here = places(at)
-        return self._predict_at(here, here if other is at else places(other))
+        here, there = ((np.repeat(tasks, len(l)), np.tile(l, len(tasks))) for l in (at, other))
+        return self._predict_at(here, here if other is at else there)
 
     def _predict_at(self, here: _At, there: _At) -> tuple[Floats, Floats]:
         """The same at any pairs of task and stretch."""

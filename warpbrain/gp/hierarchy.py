@@ -22,8 +22,8 @@ through all that is shared: overall, method and paper.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -422,7 +422,6 @@ class Hierarchical:
     variant: str = "corrected"
     sample: tuple[Hierarchy, ...] = ()
     name = "hierarchical"
-    _moduli: dict[tuple[Any, ...], tuple[Floats, Floats]] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def fitted(
@@ -443,18 +442,7 @@ class Hierarchical:
 
         All groups are measured by one new paper, as in one subject.
         """
-        key = tuple(groups), np.asarray(stretches, dtype=np.float64).tobytes()
-        if key not in self._moduli:
-            # several curves of a group are asked for, and laws fitted to each; the last groups are kept
-            if len(self._moduli) >= len(GROUPS):
-                self._moduli.clear()
-            moments = self.moments(self.places(groups, stretches))
-            means = np.array([mean for mean, _ in moments])
-            # of a mixture of distributions of equal weight
-            away = means - means.mean(axis=0)
-            within = np.mean([covariance for _, covariance in moments], axis=0)
-            self._moduli[key] = means.mean(axis=0).reshape(len(groups), -1), within + away.T @ away / len(moments)
-        return self._moduli[key]
+        return _modulus(self, tuple(groups), tuple(np.asarray(stretches, dtype=np.float64).tolist()))
 
     def moduli_of(self, studies: Sequence[Study], stretches: Sequence[Floats]) -> list[tuple[Floats, Floats]]:
         """Mean and covariance, under each hierarchy, of log secant moduli of studies that it has not seen.
@@ -493,8 +481,7 @@ class Hierarchical:
         which = min(int(ndtr(normal[0]) * len(self.conditionals)), len(self.conditionals) - 1)
 
         def moments(groups: tuple[str, ...], at: Floats, other: Floats) -> tuple[Floats, Floats]:
-            seen, here = self._seen.places, self.places(groups, at)
-            there = here if other is at else self.places(groups, other)
+            seen, here, there = self._seen.places, self.places(groups, at), self.places(groups, other)
             to = Structure.of(seen, here)
             to_others = to if other is at else Structure.of(seen, there)
             return self.conditionals[which].moments(to, to_others, Structure.of(here, there))
@@ -513,3 +500,14 @@ class Hierarchical:
     def conditionals(self) -> tuple[Conditional, ...]:
         """What is known of moduli under each hierarchy of the sample."""
         return tuple(Conditional(hierarchy, self._seen) for hierarchy in self.sample or (self.hierarchy,))
+
+
+# several curves of a group are asked for, and laws fitted to each
+@lru_cache(maxsize=len(GROUPS))
+def _modulus(model: Hierarchical, groups: tuple[str, ...], stretches: tuple[float, ...]) -> tuple[Floats, Floats]:
+    moments = model.moments(model.places(groups, stretches))
+    means = np.array([mean for mean, _ in moments])
+    # of a mixture of distributions of equal weight
+    away = means - means.mean(axis=0)
+    within = np.mean([covariance for _, covariance in moments], axis=0)
+    return means.mean(axis=0).reshape(len(groups), -1), within + away.T @ away / len(moments)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -151,7 +151,6 @@ class Fit:
     points: int
     converged: bool  # the search ended where the cost is stationary in all directions that the bounds leave open
     message: str  # why it ended
-    evaluations: int  # of the energies, in all boxes together
     at_bound: tuple[str, ...] = ()  # names of the parameters that lie at a bound
 
     @property
@@ -194,9 +193,7 @@ def fit(
     if not (np.isfinite(offset) and offset > 0.0):
         raise InputError(f"offset = {offset:g} Pa: expected a positive number")
     with np.errstate(over="ignore", invalid="ignore"):
-        fits = [_search(model, box, l, y, offset) for box in model.boxes(limit)]
-    best = min(fits, key=attrgetter("cost"))
-    return replace(best, evaluations=sum(fitted.evaluations for fitted in fits))
+        return min((_search(model, box, l, y, offset) for box in model.boxes(limit)), key=attrgetter("cost"))
 
 
 def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> Fit:
@@ -215,7 +212,7 @@ def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> 
 
     start = np.log(np.abs(box.start))
     if not np.isfinite(np.sum(residual(start) ** 2)):
-        return Fit(model, box.start, np.inf, len(y), False, "the residuals are too large for a sum of squares", 1)
+        return Fit(model, box.start, np.inf, len(y), False, "the residuals are too large for a sum of squares")
     bounds = np.log(nearest), np.log(np.where(bounded, farthest, _LARGEST))
     # the variant for which a bound can be reached in a step, so that parameters lie at it and not near it
     tolerances = {"ftol": _TOLERANCE, "xtol": _TOLERANCE, "gtol": None, "max_nfev": _EVALUATIONS}
@@ -233,7 +230,6 @@ def _search(model: MetaModel, box: Box, l: Floats, y: Floats, offset: float) -> 
         len(y),
         bool(result.success) and stationary,
         result.message if stationary or not result.success else "ended where the cost still falls",
-        int(result.nfev),
         tuple(name for name, at in zip(model.parameter_names, held, strict=True) if at),
     )
 

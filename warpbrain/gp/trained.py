@@ -162,13 +162,12 @@ def write_model(folder: Path, model: Process, record: dict[str, Any], added: Pat
         )
         table |= {"kernel": model.hierarchy.kernel, "parameters": best, "training": record}
         table |= {"format": FORMAT, "sample": sample}
-    elif isinstance(model, Coregionalised):
+    else:
+        assert isinstance(model, Coregionalised)
         numbers = model.parameters
         parameters = {"length scale": numbers.length_scale, "jitter": model.jitter}
         parameters |= {name: getattr(numbers, name).tolist() for name in ("w", "kappa", "noise")}
         table |= {"kernel": model.kernel, "parameters": parameters, "training": record}
-    else:
-        raise TypeError(f"{type(model).__name__} is not a model that can be written")
     # the studies first: a model without them would be another one
     if added is not None:
         write_text(folder / STUDIES, added.read_text(encoding="utf-8"))

@@ -9,7 +9,7 @@ from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 
 
 def fitted(name: str, *values: float) -> Fit:
-    return Fit(METAMODELS[name], values, 0.0, 101, True, "", 1)
+    return Fit(METAMODELS[name], values, 0.0, 101, True, "")
 
 
 @pytest.mark.parametrize(
