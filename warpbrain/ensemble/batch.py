@@ -17,7 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Int32s
 from warpbrain.ensemble.sample import Sample
 from warpbrain.errors import InputError
 from warpbrain.kernels.batched.cluster import fitting_parts
@@ -111,8 +111,6 @@ def parts_of_clusters(system: System) -> Parts | None:
     return system.once("clusters", [system.constrained], lambda: fitting_parts(pattern_of(system), real, system.device))
 
 
-Ints = NDArray[np.int32]
-
 #: Iterations of a linear solve.
 _MAX_CG = 2000
 
@@ -128,7 +126,7 @@ class States:
     min_J: Floats
     unbalanced: Floats  # norm of what is out of balance on the free components [N]
     internal: Floats  # norm of the internal forces [N]
-    cg_iterations: Ints
+    cg_iterations: Int32s
     cg_residual: Floats  # of the linear solve that led to the state
     cg_goal: Floats
 
