@@ -230,10 +230,9 @@ def ensemble(
     case = as_case(case, tissue)
     if case.specimen is not None:
         raise InputError(f"case: {case.path} has a [specimen]: its tests are run one by one: see warpbrain.run")
-    if processes < 1:
-        raise InputError(f"processes = {processes}: expected a whole number of at least 1")
-    if batch is not None and batch < 1:
-        raise InputError(f"batch = {batch}: expected a whole number of at least 1")
+    for name, count in (("processes", processes), ("batch", batch)):
+        if count is not None and count < 1:
+            raise InputError(f"{name} = {count}: expected a whole number of at least 1")
     if dask is not None:
         require_kind(dask, str, "dask", 'the address of a scheduler, or "local:N"')
     numbered = chosen_samples(case, samples, seed, process) if isinstance(samples, int | str) else list(samples)

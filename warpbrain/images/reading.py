@@ -37,10 +37,10 @@ class Image:
     notes: tuple[str, ...] = ()  # what the user should know about how the file was read
 
 
-def require(module: str, distribution: str, what: str) -> None:
+def require(package: str, what: str) -> None:
     """Stop with a plain sentence if a package that only images need is missing."""
-    if importlib.util.find_spec(module) is None:
-        raise InputError(f"{what} needs {distribution}, not installed here: pip install 'warpbrain[images]'")
+    if importlib.util.find_spec(package) is None:
+        raise InputError(f"{what} needs {package}, not installed here: pip install 'warpbrain[images]'")
 
 
 def read_image(path: Path) -> Image:
@@ -77,7 +77,7 @@ def labels_of(image: Image) -> Int32s:
 
 
 def _with_itk(path: Path) -> Image:
-    require("SimpleITK", "SimpleITK", f"{path}: a {path.suffix} volume")
+    require("SimpleITK", f"{path}: a {path.suffix} volume")
     import SimpleITK as sitk
 
     try:
@@ -106,7 +106,7 @@ def _with_itk(path: Path) -> Image:
 
 
 def _with_nibabel(path: Path) -> Image:
-    require("nibabel", "nibabel", f"{path}: a volume")
+    require("nibabel", f"{path}: a volume")
     import nibabel
 
     try:

@@ -65,7 +65,7 @@ class WarpRequest:
 
 def read_request(image: Path | None, labels: Path | None, points: Sequence[Path]) -> WarpRequest:
     """Read what is to be warped. `InputError`, naming the file, what was found and what was expected."""
-    require("nibabel", "nibabel", "writing of images")
+    require("nibabel", "writing of images")
     request = WarpRequest(
         None if image is None else read_image(image),
         None if labels is None else read_image(labels),
