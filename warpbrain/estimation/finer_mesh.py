@@ -116,7 +116,7 @@ class DiscretisationError:
     du: Floats  # (p, s n, 3), its derivatives by `theta`
     dR: Floats
     dsurplus: Floats  # (p, s, E, 3), derivatives by `theta` of its surplus (s, E, 3)
-    positions: Floats  # (s n, 3), of nodes, from the mean of all in units of their root mean square radius
+    basis: Floats  # (s n, 4), 1 and the position of each node from the mean, in units of the root mean square radius
     part: float  # `k`: the part of the displacement on elements of half the size that is `d`, its projection
 
     def amount(self, b: float) -> tuple[float, float]:
@@ -146,7 +146,7 @@ class DiscretisationError:
         slope = self.amount(float(values[0]))[1]
 
         def columns(change: Floats) -> Floats:
-            unit = np.einsum("nk,nj,il->kijnl", self._basis, change, np.eye(3))
+            unit = np.einsum("nk,nj,il->kijnl", self.basis, change, np.eye(3))
             return np.concatenate([slope * change[None], unit.reshape(-1, *change.shape)])
 
         u, reactions = self._change_at(theta)
@@ -160,12 +160,7 @@ class DiscretisationError:
     def _matrices(self, values: Floats) -> Floats:
         """`a I + B` at each node, shape (s n, 3, 3)."""
         amount = self.amount(float(values[0]))[0]
-        return amount * np.eye(3) + np.einsum("nk,kij->nij", self._basis, values[1:].reshape(-1, 3, 3))
-
-    @property
-    def _basis(self) -> Floats:
-        """1, x, y and z at each node, shape (s n, 4)."""
-        return np.concatenate([np.ones((len(self.positions), 1)), self.positions], axis=1)
+        return amount * np.eye(3) + np.einsum("nk,kij->nij", self.basis, values[1:].reshape(-1, 3, 3))
 
 
 class FinerMesh:
@@ -270,6 +265,6 @@ def discretisation_error(
     part = float(np.vdot(u, there)) / max(float(np.vdot(there, there)), 1e-300)
     points = forward.case.remaining[0].points
     away = points - points.mean(axis=0)
-    positions = np.tile(away / root_mean_square(away), (count, 1))
+    basis = np.tile(np.column_stack([np.ones(len(away)), away / root_mean_square(away)]), (count, 1))
     change = Difference(u, reactions, surplus, theta)
-    return DiscretisationError(change, du - derivatives[0], dR - derivatives[1], dsurplus, positions, part)
+    return DiscretisationError(change, du - derivatives[0], dR - derivatives[1], dsurplus, basis, part)

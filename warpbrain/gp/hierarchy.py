@@ -193,9 +193,9 @@ class Hierarchy:
         The even part is that of curves which are zero at rest, `k(x, y) - k(x, 0) k(0, y) / k(0, 0)`: what a modulus is
         at rest the effects of moduli say, and curves what it becomes with strain.
         """
+        x, y = structure.x, structure.y
         near, mirrored, rest_x, rest_y = (
-            KERNELS[self.kernel](distance, self.length_scale)
-            for distance in (structure.near, structure.mirrored, structure.from_rest_x, structure.from_rest_y)
+            KERNELS[self.kernel](np.abs(away), self.length_scale) for away in (x[:, None] - y, x[:, None] + y, x, y)
         )
         d_rest = np.outer(rest_x[1], rest_y[0]) + np.outer(rest_x[0], rest_y[1])
         return (
@@ -211,18 +211,15 @@ class Structure:
     """What of the covariance between two sets of places does not depend on the hierarchy.
 
     `constant`, `even` and `odd` are matrices (n, m) of each effect for unit variance; those of curves and asymmetries
-    are still to be multiplied by the even and the odd part of the kernel. `near` and `mirrored` (n, m) are distances
-    between the strains, and between those of one and the mirrored ones of the other; `from_rest_x` (n,) and
-    `from_rest_y` (m,) sizes of the strains; `a` (n, 2) and `b` (m, 2) see `mean_asymmetry_of`.
+    are still to be multiplied by the even and the odd part of the kernel over the bounded strains `x` (n,) and `y`
+    (m,); `a` (n, 2) and `b` (m, 2) see `mean_asymmetry_of`.
     """
 
     constant: dict[str, Floats]
     even: dict[str, Floats]
     odd: dict[str, Floats]
-    near: Floats
-    mirrored: Floats
-    from_rest_x: Floats
-    from_rest_y: Floats
+    x: Floats
+    y: Floats
     a: Floats
     b: Floats
 
@@ -237,16 +234,14 @@ class Structure:
         constant |= {"paper": same["paper"], "study, abnormal": study * abnormal}
         for index, method in enumerate(METHODS):
             constant[f"study, {method}"] = study * (1.0 - abnormal) * (method_a == index)[:, None]
-        x, y = bounded_strain(a.stretch)[:, None], bounded_strain(b.stretch)[None, :]
+        x, y = bounded_strain(a.stretch), bounded_strain(b.stretch)
         curved = np.outer(a.curved, b.curved).astype(float)
         both = np.outer(a.asymmetric, b.asymmetric).astype(float)
-        sides = both * np.sign(x) * np.sign(y)
+        sides = both * np.outer(np.sign(x), np.sign(y))
         constant |= {f"asymmetry at rest, {level}": same[level] * sides for level in ("paper", "study")}
         even = {"curve": curved} | {f"curve, {level}": matrix * curved for level, matrix in same.items()}
         odd = {f"asymmetry, {level}": same[level] * both for level in ("paper", "study")}
-        sizes = np.abs(x[:, 0]), np.abs(y[0])
-        means = mean_asymmetry_of(a), mean_asymmetry_of(b)
-        return cls(constant, even, odd, np.abs(x - y), np.abs(x + y), *sizes, *means)
+        return cls(constant, even, odd, x, y, mean_asymmetry_of(a), mean_asymmetry_of(b))
 
 
 def mean_asymmetry_of(at: Places) -> Floats:
