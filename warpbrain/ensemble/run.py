@@ -18,10 +18,9 @@ from warpbrain.ensemble.store import Store
 from warpbrain.ensemble.workers import Here, Job, Prepare, Processes, Workers, kind_of
 from warpbrain.errors import InputError, SolveError, require_kind
 from warpbrain.gp.process import Process
-from warpbrain.gp.sampling import SWEEP, law_of_curve
+from warpbrain.gp.sampling import SWEEP, law_of_curve, unstable
 from warpbrain.gp.trained import find_model
 from warpbrain.physics.laws import Law
-from warpbrain.physics.laws.stability import UnstableLawError, require_stable
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.model import Material, Model
 from warpbrain.simulation.of_case import model_of
@@ -42,22 +41,17 @@ def swept_samples(case: Case, process: Process) -> list[Sample]:
     require_groups(case, labels, process)
     if len(labels) > 2:
         raise InputError(f"{case.path}: the paper's sweep is over one or two tissues; this case has {len(labels)}")
-    laws = {
-        (label, k): law_of_curve(process, case.tissues[label].prior, k, case.tissues[label].model).law()
-        for label in labels
-        for k in SWEEP
-    }
+    fits, reasons = {}, {}
+    for label, k in product(labels, SWEEP):
+        tissue = case.tissues[label]
+        fits[label, k] = fitted = law_of_curve(process, tissue.prior, k, tissue.model)
+        reasons[label, k] = unstable(fitted, case.poisson, tissue.formulation)
     samples = []
     for number, steps in enumerate(product(SWEEP, repeat=len(labels))):
         deviations = dict(zip(labels, steps, strict=True))
-        chosen = {label: laws[label, k] for label, k in deviations.items()}
-        reason = ""
-        try:
-            for label, law in chosen.items():
-                require_stable(law, case.poisson, case.tissues[label].formulation)
-        except UnstableLawError as error:
-            reason = f"tissue {label}: {error}"
-        samples.append(Sample(number, None if reason else _materials(case, chosen), reason, deviations))
+        reason = next((f"tissue {at[0]}: {reasons[at]}" for at in deviations.items() if reasons[at]), "")
+        laws = {} if reason else {at[0]: fits[at].law() for at in deviations.items()}
+        samples.append(Sample(number, None if reason else _materials(case, laws), reason, deviations))
     return samples
 
 

@@ -50,7 +50,6 @@ class Convention:
 class Form:
     """A form of strain energy."""
 
-    name: str
     energy: Callable[..., Floats]  # `Psi(l)` [Pa]: stretches of any shape, then the parameters by name
     shear_modulus: Callable[..., float]  # `mu0` [Pa] of the parameters: `d2Psi/dl2 = 3 mu0` at `l = 1`
     #: By name; where a study names none, the one whose keys it gives, and the first if several have them.
@@ -94,8 +93,7 @@ def _form(
     """The energy that follows makes a form of its name."""
 
     def add(energy: Callable[..., Floats]) -> Callable[..., Floats]:
-        name = energy.__name__.replace("_", "-")
-        FORMS[name] = Form(name, energy, shear_modulus, conventions, of_first_invariant)
+        FORMS[energy.__name__.replace("_", "-")] = Form(energy, shear_modulus, conventions, of_first_invariant)
         return energy
 
     return add
