@@ -113,9 +113,7 @@ class Course(abc.ABC):
         held = self.batch.held
         times, which = np.unique(self.time[list(slots)], return_inverse=True)
         at = [self.model.external_forces(time)[held] for time in times.tolist()]
-        external = np.reshape(at, (len(times), len(held), 3))
-        # of all that have ended at the same time it is one
-        external = external if len(external) == 1 else external[which]
+        external = np.reshape(at, (len(times), len(held), 3))[which]
         return self.model.reactions(self.batch.held_forces(slots), external, held)
 
     def why(self, slot: int, states: States) -> str:

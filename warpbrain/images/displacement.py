@@ -164,8 +164,7 @@ def resampled(
         at = grid.indices(after.positions(places) + back.vectors.reshape(-1, 3)[part])
         inside, at = grid.has(at), np.clip(at, 0, last)
         if nearest:
-            index = np.floor(at + 0.5).astype(np.int64)
-            sampled = source[tuple(np.minimum(index, last).T)]
+            sampled = source[tuple(np.floor(at + 0.5).astype(np.int64).T)]
         else:
             sampled = scipy.ndimage.map_coordinates(source, at.T, order=1, mode="nearest")
             if known is not None:
