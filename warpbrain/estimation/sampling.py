@@ -46,19 +46,22 @@ class Target:
 
     def linearised(self, theta: Floats) -> float:
         """The log density where the state is what derivatives at the nearest estimate make of it."""
-        if not self._possible(theta):
-            return -np.inf
         mode = self._nearest(theta)
+        try:
+            self.problem.parameters.require_possible(theta)
+        except InputError:
+            return -np.inf
         return self._log_density(mode.predicted(theta), mode.point)
 
     def log_density(self, theta: Floats) -> float:
         """By an equilibrium; minus infinity where laws are unstable or there is none."""
-        if not self._possible(theta):
-            self.unstable += 1
-            return -np.inf
         mode = self._nearest(theta)
         try:
+            self.problem.parameters.require_possible(theta)
             state = self.problem.forward.solve_from(theta, (mode.predicted(theta).u, mode.point.state.u), ROUGH)
+        except InputError:
+            self.unstable += 1
+            return -np.inf
         except SolveError:
             self.failed += 1
             return -np.inf
@@ -71,13 +74,6 @@ class Target:
     def _log_density(self, state: State, start: Point) -> float:
         point = self.problem.at_best(self.problem.at(state, start.nuisances, start.noise))
         return float(self.prior.log_density(state.theta)) - point.misfit
-
-    def _possible(self, theta: Floats) -> bool:
-        try:
-            self.problem.parameters.require_possible(theta)
-        except InputError:
-            return False
-        return True
 
 
 @dataclass(frozen=True, eq=False)
