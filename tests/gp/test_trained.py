@@ -93,6 +93,7 @@ def test_a_model_that_does_not_exist():
         ("coregionalised", {"w": [1.0]}, "w: expected 12 finite numbers"),
         ("coregionalised", {"noise": [0.0] * 12}, "parameters: noise: expected positive numbers"),
         ("coregionalised", {"jitter": None}, "jitter = None: expected a positive number"),
+        ("coregionalised", {"length scale": -1.0}, "^[^:]*: parameters: length scale = -1.0: expected a positive"),
     ],
 )
 def test_a_file_that_is_wrong(kind, change, expected, tmp_path):

@@ -101,9 +101,10 @@ def read_model(folder: Path) -> Process:
             for each in (numbers, *sample)
         )
         return Hierarchical(studies, best, variant, tuple(others))
+    length_scale = _positive(path, numbers, "length scale")
     arrays = {name: _numbers(path, numbers, name) for name in ("w", "kappa", "noise")}
     try:
-        parameters = Parameters(_positive(path, numbers, "length scale"), **arrays)
+        parameters = Parameters(length_scale, **arrays)
     except InputError as error:
         raise InputError(f"{path}: parameters: {error}") from None
     return Coregionalised(studies, parameters, variant, kernel, _positive(path, numbers, "jitter"))
