@@ -108,7 +108,8 @@ def test_a_file_that_is_wrong(kind, change, expected, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"), [("{", "not JSON"), ("[]", "found list, expected a table"), (None, "read")]
+    ("text", "expected"),
+    [("{", "not JSON"), ("[" * 100_000, "not JSON"), ("[]", "found list, expected a table"), (None, "read")],
 )
 def test_a_file_that_is_not_one(text, expected, tmp_path):
     if text is not None:

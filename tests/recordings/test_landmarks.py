@@ -36,6 +36,7 @@ def test_other_tags_that_are_read(tmp_path, old, new):
         ('second";', 'second"', "no semicolon after the points"),
         ("1 2 3 1 2 4", "1 2 3 1 2", "row 7: found 9 fields"),
         ("1 2 3 1 2 4", "1 2 x 1 2 4", "row 7: found '1 2 x 1 2 4', expected 6 numbers"),
+        ("1 2 3 1 2 4", "1 2 1_0 1 2 4", "row 7: found '1 2 1_0 1 2 4', expected 6 numbers"),
         ("1 2 3 1 2 4", "1 2 nan 1 2 4", "expected finite numbers"),
         ('"one"', '"one', "row 7: found a quotation mark"),
         ('second";', 'second";\nmore', "row 9: found 'more' after the semicolon"),

@@ -75,7 +75,7 @@ def read_model(folder: Path) -> Process:
         table = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:  # numbers of thousands of digits, thousands of brackets
         raise InputError(f"{path}: not JSON ({error})") from None
     if not isinstance(table, dict):
         raise InputError(f"{path}: found {type(table).__name__}, expected a table")

@@ -76,7 +76,7 @@ class Table:
         values = np.full(len(self), np.nan)
         for index, row in enumerate(self.cells):
             cell = row[column]
-            value = _number(cell)
+            value = number_in(cell)
             if value is not None and abs(value) <= LARGEST:
                 values[index] = value
             elif not cell:
@@ -85,7 +85,7 @@ class Table:
                 what = f"a number of at most {LARGEST:g}" if math.isfinite(value) else "a finite number"
                 self.problem(index, name, f"found {shown(cell)}, expected {what}")
             else:
-                comma = _number(cell.replace(",", ".")) is not None
+                comma = number_in(cell.replace(",", ".")) is not None
                 cure = "write decimals with a point" if comma else ""
                 self.problem(index, name, f"found {shown(cell)}, expected a number", cure)
         return values
@@ -173,7 +173,7 @@ def read_table(path: Path, problems: Problems, known: Sequence[str]) -> Table:
 
 
 def _check_header(path: Path, number: int, header: list[str], known: Sequence[str], problems: Problems) -> None:
-    if all(_number(name) is not None for name in header):
+    if all(number_in(name) is not None for name in header):
         cure = "the line with the names must not start with #"
         problems.refuse(path, f"row {number}", f"found numbers, expected a header such as {','.join(known[:6])}", cure)
     for name in known:
@@ -191,7 +191,8 @@ def read_csv(path: Path, problems: Problems, known: Sequence[str]) -> Table:
     return read_table(path, problems, known)
 
 
-def _number(cell: str) -> float | None:
+def number_in(cell: str) -> float | None:
+    """The number of a cell, None if it is none."""
     # Python reads 1_000 as a thousand; in a file it is more likely a name
     if "_" in cell:
         return None
@@ -203,8 +204,5 @@ def _number(cell: str) -> float | None:
 
 def position_of(words: Sequence[str]) -> list[float] | None:
     """Coordinates, None if they are no finite numbers."""
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        return None
-    return values if all(abs(value) <= LARGEST for value in values) else None
+    values = [value for word in words if (value := number_in(word)) is not None]
+    return values if len(values) == len(words) and all(abs(value) <= LARGEST for value in values) else None

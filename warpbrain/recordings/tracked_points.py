@@ -13,7 +13,7 @@ from warpbrain.plugins import added_by_packages
 from warpbrain.problems import Problems, Unreadable
 from warpbrain.recordings.base import DISPLACEMENT, POSITION, TrackedPoints
 from warpbrain.recordings.markups import is_markup, paired, read_markup
-from warpbrain.recordings.tables import LARGEST, read_table
+from warpbrain.recordings.tables import LARGEST, number_in, read_table
 from warpbrain.recordings.text import collected, lines_of, read_text, require_readable, shown, without_comment
 
 #: Reads a file of the ending that it is registered for (entry points of the group `warpbrain.recordings`, named like
@@ -177,9 +177,8 @@ def _record_of(path: Path, row: int, record: str, problems: Problems) -> tuple[l
     if len(words) not in (6, 7, 10):
         expected = "6 coordinates and no more, or a label, or weight, structure, patient and label"
         problems.refuse(path, place, f"found {len(words)} fields, expected {expected}")
-    try:
-        values = [float(word) for word in words[:6]]
-    except ValueError:
+    values = [value for word in words[:6] if (value := number_in(word)) is not None]
+    if len(values) < 6:
         problems.refuse(path, place, f"found {shown(' '.join(words[:6]))}, expected 6 numbers")
     if not all(abs(value) <= LARGEST for value in values):
         problems.refuse(path, place, f"found {shown(' '.join(words[:6]))}, expected finite numbers")
