@@ -5,7 +5,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -49,10 +49,15 @@ def take_turns(ramped: Sequence[Ramped]) -> bool:
     return bool(sizes.sum(axis=1).max() <= max(1.0, float(sizes.max())) * (1.0 + _ROUNDING))
 
 
+#: What a mechanism adds or changes.
+Changed = Literal["loads", "stiffness", "volumes"]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Load(Ramped, abc.ABC):
     """A dead load: forces that do not follow the deformation."""
 
+    changes: ClassVar[Changed] = "loads"
     #: Whether `nodal_forces` knows what to do with midside nodes.
     quadratic: ClassVar[bool] = False
 

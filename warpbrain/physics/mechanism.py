@@ -28,7 +28,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Literal, Protocol, Self, runtime_checkable
+from typing import Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from warpbrain.arrays import Bools, Floats, Int32s, Ints
 from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
 from warpbrain.physics.laws import Law
+from warpbrain.physics.load import Changed as Changed
 from warpbrain.physics.load import Ramped
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation, Tests
@@ -182,10 +183,6 @@ class Facts:
             assert isinstance(mechanism, Removing)
             mesh, _ = mechanism.remaining(mesh)
         return mesh
-
-
-#: What a mechanism adds or changes.
-Changed = Literal["loads", "stiffness", "volumes"]
 
 
 @dataclass(frozen=True, kw_only=True)

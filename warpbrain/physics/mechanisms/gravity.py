@@ -31,7 +31,7 @@ from warpbrain.errors import InputError
 from warpbrain.mesh import QuadraticMesh, TetMesh, integrals_above, integrals_of_shapes, integrals_on_plane, tangents
 from warpbrain.mesh.quality import SAME_PLACE, extent
 from warpbrain.physics.load import Along, BodyForce
-from warpbrain.physics.mechanism import Changed, Expectation, Facts, Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Expectation, Facts, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import unit_vector
@@ -99,7 +99,6 @@ class Gravity(BodyForce, Mechanism):
     quadratic: ClassVar[bool] = True
     confused_with: ClassVar[tuple[str, ...]] = ("pressure", "swelling")
     enters: ClassVar[Enters] = Enters("weight", "f_gravity")
-    changes: ClassVar[Changed] = "loads"
     together: ClassVar[Mapping[str, str]] = {
         "cavity": "What has been taken out weighs nothing.",
         "resection": "Levels are counted from the lowest point of the whole anatomy.",

@@ -20,7 +20,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.mesh import QuadraticMesh, TetMesh, patch_around, surface_forces
 from warpbrain.physics.load import Load, NodalForce
-from warpbrain.physics.mechanism import Changed, Expectation, Mechanism, ParameterError, parameter
+from warpbrain.physics.mechanism import Expectation, Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, Situation
 from warpbrain.physics.regions import elements_with, unit_vector
@@ -70,7 +70,6 @@ class Traction(Load, Mechanism):
     kind: ClassVar[str] = "traction"
     quadratic: ClassVar[bool] = True
     enters: ClassVar[Enters] = Enters("load", "f_traction")
-    changes: ClassVar[Changed] = "loads"
     together: ClassVar[Mapping[str, str]] = {
         "resection": "It acts on what the surface of what is left has within the radius.",
         "swelling": "The force is that on the imaged surface: it does not grow with it.",

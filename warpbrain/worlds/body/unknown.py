@@ -20,7 +20,7 @@ from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import QuadraticMesh, TetMesh, node_areas, node_vectors, nodes_of
 from warpbrain.mesh.surface import edges_of
 from warpbrain.physics.load import Load
-from warpbrain.physics.mechanism import Changed, Mechanism
+from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import Proposal, modes_between
 from warpbrain.physics.words import number
@@ -67,7 +67,6 @@ class UnknownLoad(Load, Mechanism):
     sentence: ClassVar[str] = "Something without a name acts."
     example: ClassVar[str] = ""
     enters: ClassVar[Enters] = Enters("load", "f_unknown")
-    changes: ClassVar[Changed] = "loads"
     several: ClassVar[bool] = True
 
 
