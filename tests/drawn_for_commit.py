@@ -44,7 +44,7 @@ def drawn_for_this_commit(of: int, count: int) -> list[int]:
 
 
 def files_for_this_commit(seconds: Mapping[str, float]) -> set[str]:
-    """Of each eight files of tests that take more than a minute, and of each four others as long as each other, one."""
+    """Of each eight files that take more than a minute one, and of each four others that take about as long."""
     slowest_first = sorted(seconds, key=lambda name: (-seconds[name], name))
     long = sum(taken > _LONG for taken in seconds.values())
     groups = [slowest_first[start : min(start + _OF_LONG, long)] for start in range(0, long, _OF_LONG)]

@@ -500,6 +500,7 @@ class Hierarchical:
 # several curves of a group are asked for, and laws fitted to each
 @lru_cache(maxsize=len(GROUPS))
 def _modulus(model: Hierarchical, groups: tuple[str, ...], stretches: tuple[float, ...]) -> tuple[Floats, Floats]:
+    """Mean (g, k) and covariance (g k, g k) of the moduli of groups at stretches (k,); see `Hierarchical`."""
     moments = model.moments(model.places(groups, stretches))
     means = np.array([mean for mean, _ in moments])
     # of a mixture of distributions of equal weight

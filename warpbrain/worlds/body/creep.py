@@ -1,13 +1,14 @@
-"""Bodies that creep: how much of a response in the end there is at the time when something was recorded.
+"""Creep of bodies under constant loads: the fraction of a linear response that is reached when a row is recorded.
 
-Tissue whose stress relaxes has, of strain that is held, `G(t) = 1 + left(t)` times the stress of the end. Under a load
-that came at once and stays its displacement is `J(t)` times that of the end,
+With the relaxation modulus `G(t)` and the creep compliance `J(t)`, both relative to those in equilibrium,
 
     int_0^t G(t - s) dJ(s) = 1,    J(0) = 1 / G(0),
 
 (Ferry 1980, Viscoelastic Properties of Polymers, 3rd ed., section 3.B), solved by steps whose moduli are the means of
-those of their ends (Hopkins and Hamming 1957, J. Appl. Phys. 28, 906). It lags behind `1 / G(t)`.
+those of their ends (Hopkins and Hamming 1957, J. Appl. Phys. 28, 906). `J` lags behind `1 / G`.
 """
+
+from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,52 +19,59 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.physics.mechanism import Changed
 
-#: What has a response: that of a mechanism, or something of which the response is known at each time.
-Changes = Changed | Literal["known"]
+#: What is perturbed: `Mechanism.changes`, or something whose response at each time is known already.
+Perturbation = Changed | Literal["known"]
 #: Ends of the steps, relative to the time.
 _STEPS = np.unique(np.concatenate([np.geomspace(1e-3, 1.0, 25), np.linspace(0.0, 1.0, 41)]))
 
 
-def crept(left: Callable[[Floats], Floats], time: float) -> float:
-    """Displacement at a time [s] under a load that stays, relative to that in the end.
+def creep_function(relaxing_modulus: Callable[[Floats], Floats], time: float) -> float:
+    """Displacement at a time [s] under a constant load, relative to that after an infinite time.
 
-    `left`: from the time since strain came (...) [s] to the stress that has not relaxed, relative to that in the end.
+    `relaxing_modulus`: from times since a strain was imposed (...) [s] to the part of the relaxation modulus that
+    decays (...), relative to the equilibrium modulus.
     """
     from scipy.linalg import solve_triangular
 
     ends = time * _STEPS
-    G = 1.0 + left(np.abs(ends[:, None] - ends))
+    G = 1.0 + relaxing_modulus(np.abs(ends[:, None] - ends))
     first = 1.0 / G[0, 0]
     of_steps = 0.5 * (G[1:, :-1] + G[1:, 1:])
     return first + float(solve_triangular(of_steps, 1.0 - G[1:, 0] * first, lower=True).sum())
 
 
-class Reached(NamedTuple):
-    """How many times the response in the linear model about the end of a course rows (k,) have at their time."""
+class CreepFactors(NamedTuple):
+    """Factors (k,) by which the linear response at the end of a course gives that of rows at their own times."""
 
     by_loads: Floats
     by_stiffness: Floats
 
-    def by(self, changes: Changes) -> Floats:
-        """By what changes."""
-        parts = {"loads": self.by_loads, "stiffness": self.by_stiffness}
-        return parts.get(changes, np.ones(len(self.by_loads)))
+    @classmethod
+    def none(cls, count: int) -> CreepFactors:
+        """Of rows of a body that does not creep: 1."""
+        return cls(np.ones(count), np.ones(count))
+
+    def of(self, perturbation: Perturbation) -> Floats:
+        """On the response to a perturbation."""
+        return {"loads": self.by_loads, "stiffness": self.by_stiffness}.get(perturbation, np.ones(len(self.by_loads)))
 
 
 @dataclass(frozen=True, eq=False)
 class Creep:
-    """Parts (t,) of responses that there are at each time, where a body creeps to a state under loads that stay.
+    """Creep factors at each of t times of a body under constant loads.
 
-    The stiffness of the linear model is that without what relaxes. So a further load has, at each time, as large a part
-    of its response as the displacement is of that to which the body would come at last; another stiffness, whose forces
-    are those of the state, as the displacement is of that of the state. Loads and their reactions balance at any time.
+    The tangent stiffness of the linear model is the equilibrium one. A further load therefore has, at each time, the
+    fraction of its response that the displacement is of that after an infinite time. A change of stiffness has forces
+    in proportion to the strain of the state about which it is linear, and the fraction that the displacement is of that
+    of this state. Reactions balance loads at any time.
     """
 
-    by_loads: Floats  # of displacements
-    by_stiffness: Floats
-    of_reactions: Floats  # by another stiffness
+    by_loads: Floats  # (t,), of displacements
+    by_stiffness: Floats  # (t,), of displacements
+    of_reactions: Floats  # (t,), of reactions to a change of stiffness
 
-    def at(self, numbers: Ints, is_displacement: Bools) -> Reached:
-        """Of rows at times of these numbers (n,), -1 of the state itself."""
+    def factors(self, numbers: Ints, is_displacement: Bools) -> CreepFactors:
+        """Of rows (n,) at times of these numbers, -1 for the last one."""
         by_loads = np.where(is_displacement, self.by_loads[numbers], 1.0)
-        return Reached(by_loads, np.where(is_displacement, self.by_stiffness[numbers], self.of_reactions[numbers]))
+        by_stiffness = np.where(is_displacement, self.by_stiffness[numbers], self.of_reactions[numbers])
+        return CreepFactors(by_loads, by_stiffness)

@@ -19,7 +19,7 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions
 from warpbrain.simulation.model import substituted
 from warpbrain.simulation.system import System
 from warpbrain.worlds.body.consolidation import Course, bound_term, consolidation
-from warpbrain.worlds.body.creep import Changes, crept
+from warpbrain.worlds.body.creep import Perturbation, creep_function
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.sensors import Sensors, row_products
 from warpbrain.worlds.body.states import SolvedState, States
@@ -224,11 +224,11 @@ class Effects:
         varying, effect = proposal.over_time, by_moment[0]
         if varying is None and self.at.is_at_one_time:
             return effect
-        changes = _changes(proposal, effect)
+        perturbation = _perturbation(proposal, effect)
 
         def total(of: Callable[[Effect, Moment], Floats]) -> Floats:
             effects = iter(by_moment)
-            return self.at.summed(lambda moment: of(next(effects), moment), changes)
+            return self.at.summed(lambda moment: of(next(effects), moment), perturbation)
 
         def columns(e: Effect, moment: Moment) -> Floats:
             return e.columns if varying is None else _expanded(e.columns, varying, moment.times)
@@ -397,8 +397,8 @@ class Effects:
         return change
 
 
-def _changes(proposal: Proposal, effect: Effect) -> Changes:
-    """What a proposal changes; `effect`: of one time."""
+def _perturbation(proposal: Proposal, effect: Effect) -> Perturbation:
+    """Which quantity a proposal perturbs; `effect`: that at one time."""
     # a course of its own, or a state that was solved for at each time
     if proposal.history is not None or proposal.pace is not None or effect.is_solved:
         return "known"
@@ -455,18 +455,20 @@ def _faces(kind: Hashable) -> frozenset[type]:
 
 
 def faded(proposal: Proposal, c: Floats, sensors: Sensors) -> Floats:
-    """Part (n,) of the instantaneous effect of a fading proposal that there is when a number was recorded.
+    """Fraction (n,) of its instantaneous effect that a fading proposal with coefficients (k,) has left at each row.
 
-    Of forces the part that has not relaxed; of displacements, under loads that stay, that to which they have not crept.
+    Of forces that of the stress which has not relaxed; of displacements, under constant loads, the creep still to come.
     """
     assert proposal.history is not None
-    left = partial(proposal.history, c)
+    relaxing_modulus = partial(proposal.history, c)
     times, rows = np.unique(sensors.times, return_inverse=True)
-    # softer tissue, as columns ask for, has no course of its own
-    creeps = float(left(np.zeros(1))[0]) > 0.0
-    relaxed = np.where(np.isfinite(times), left(np.where(np.isfinite(times), times, 0.0)), 0.0)
-    behind = [1.0 - crept(left, time) if np.isfinite(time) else 0.0 for time in times.tolist()] if creeps else relaxed
-    return np.where(sensors.is_displacement, np.asarray(behind)[rows], relaxed[rows])
+    finite, stress = np.isfinite(times), np.zeros(len(times))
+    stress[finite] = relaxing_modulus(times[finite])
+    displacement = stress.copy()
+    # a negative modulus, as differences about none take, has the same to first order and may have no creep function
+    if float(relaxing_modulus(np.zeros(1))[0]) > 0.0:
+        displacement[finite] = [1.0 - creep_function(relaxing_modulus, time) for time in times[finite].tolist()]
+    return np.where(sensors.is_displacement, displacement[rows], stress[rows])
 
 
 def _effect_of_course(proposal: Proposal, course: Course) -> Effect:

@@ -39,7 +39,7 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.multisecant import toward_equilibrium
 from warpbrain.simulation.system import System
 from warpbrain.threads import fill_columns, in_threads
-from warpbrain.worlds.body.creep import Changes, Creep, Reached
+from warpbrain.worlds.body.creep import Creep, CreepFactors, Perturbation
 from warpbrain.worlds.body.factors import Factors
 from warpbrain.worlds.body.sensors import Sensors
 
@@ -182,7 +182,7 @@ class Moment:
     rows: Ints  # (k,)
     times: Floats  # (k,), of these rows [s]
     sign: float  # -1 if they are counted from it
-    reached: Reached
+    creep: CreepFactors
 
 
 class Linearisation:
@@ -241,12 +241,12 @@ class Linearisation:
         """By the time of the state; one where all rows are of one state, counted from rest."""
         sensors = self.sensors
         # not kept: a model that knows itself would keep its factors
-        every, whole = np.arange(len(sensors)), Reached(*np.ones((2, len(sensors))))
-        return self._moments or (Moment(-1, math.inf, self, every, sensors.times, 1.0, whole),)
+        every, factors = np.arange(len(sensors)), CreepFactors.none(len(sensors))
+        return self._moments or (Moment(-1, math.inf, self, every, sensors.times, 1.0, factors),)
 
     @property
     def is_at_one_time(self) -> bool:
-        """Whether all rows are of one state, which did not creep to where it is."""
+        """Whether all rows are of one state, without creep."""
         return not self._moments
 
     @cached_property
@@ -254,8 +254,8 @@ class Linearisation:
         """Where there are several states, or it was followed over time; else none."""
         sensors, moments = self.sensors, []
         if self._creep is not None and not self._states:
-            reached, every = self._creep.at(sensors.after, sensors.is_displacement), np.arange(len(sensors))
-            return (Moment(-1, math.inf, self._with(_creep=None), every, sensors.times, 1.0, reached),)
+            factors, every = self._creep_factors(sensors.after), np.arange(len(sensors))
+            return (Moment(-1, math.inf, self._with(_creep=None), every, sensors.times, 1.0, factors),)
         for number, (time, about, share) in enumerate(self._states):
             last = number == len(self._states) - 1
             for sign, of_rows in ((1.0, sensors.after), (-1.0, sensors.before)):
@@ -263,24 +263,27 @@ class Linearisation:
                 if len(rows):
                     model = about.with_sensors(replace(sensors.of_rows(rows, time), share=share))
                     times = np.full(len(rows), time)
-                    lengths, single = sensors.is_displacement[rows], model._with(_states=(), _creep=None)
-                    if self._creep is None:
-                        reached = Reached(*np.ones((2, len(rows))))
-                    else:
-                        reached = self._creep.at(of_rows[rows], lengths)
-                    moments.append(Moment(number, time, single, rows, times, sign, reached))
+                    single = model._with(_states=(), _creep=None)
+                    factors = CreepFactors(*(each[rows] for each in self._creep_factors(of_rows)))
+                    moments.append(Moment(number, time, single, rows, times, sign, factors))
         return tuple(moments)
 
-    def summed(self, answer: Callable[[Moment], Floats], changes: Changes) -> Floats:
-        """What something changes of each row (n, ...): at its time, less at that from which it is counted.
+    def _creep_factors(self, numbers: Ints) -> CreepFactors:
+        """Of all rows at times of these numbers (n,)."""
+        if self._creep is None:
+            return CreepFactors.none(len(numbers))
+        return self._creep.factors(numbers, self.sensors.is_displacement)
 
-        `answer`: from the state of one time to what it changes of the rows of that. `changes`: what it is.
+    def summed(self, answer: Callable[[Moment], Floats], perturbation: Perturbation) -> Floats:
+        """Response of each row (n, ...) to a perturbation: at its time, less at that from which it is counted.
+
+        `answer`: from the state of one time to the response of the rows of that.
         """
         answers = [(moment, answer(moment)) for moment in self.moments]
         total = np.zeros((len(self.sensors), *answers[0][1].shape[1:]))
         for moment, of_rows in answers:
-            reached = moment.sign * moment.reached.by(changes)
-            total[moment.rows] += reached.reshape(-1, *[1] * (of_rows.ndim - 1)) * of_rows
+            factors = moment.sign * moment.creep.of(perturbation)
+            total[moment.rows] += factors.reshape(-1, *[1] * (of_rows.ndim - 1)) * of_rows
         return total
 
     def with_sensors(self, sensors: Sensors) -> Linearisation:

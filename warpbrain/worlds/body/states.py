@@ -240,12 +240,11 @@ class States:
             return _on_the_way(end, hypothesis, flowing)
         self.solves += 1
         # relaxing stress or a fluid of the case's own: no other memory of a term changes a state in time
-        in_time = not in_the_end
-        in_time &= any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
+        in_time = any(term.forgets_in is not None or term.coupling is not None for term in system.terms)
         options = EquilibriumOptions(tolerance=TOLERANCE, max_total_newton=iterations)
         taken: tuple[Floats, ...] = ()
         creep: Creep | None = None
-        if in_time and np.isfinite(self.times).all():
+        if in_time and not in_the_end and np.isfinite(self.times).all():
             starts, factors = course or (() if start is None else (start,)), self._factors_of(system)
             moments = follow_slowly(system, steps_to(self.times), options, near=starts, factors=factors)
             by_time = {moment.time: moment.state for moment in moments}
