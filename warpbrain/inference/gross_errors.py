@@ -34,8 +34,9 @@ from warpbrain.threads import in_threads
 
 #: Passes over the points at most.
 _SWEEPS = 10
-#: The sum over scales ends where a term is below this part of the largest.
-_NEGLIGIBLE = 1e-3
+#: The sum over scales ends where a term is below this part of the largest, and before it where without changes of gross
+#: errors, which can only make it larger, it would be below this power of that.
+_NEGLIGIBLE, _UNCHANGED = 1e-3, 4.0
 #: Rows for which there is room when some are added.
 _ROOM = 30
 
@@ -48,6 +49,16 @@ class GrossErrors:
     log_density: float
     inflation: Floats  # (g,), the most probable one of each point, 1 of a sound one
     weighted: Floats  # (n,), the inverse of the covariance with these, times the rows
+    square: float  # the part of the rows' square, in the metric of that inverse, that is of the noise
+
+    def expected(self, ratio: float, rows: int, columns: int) -> float:
+        """Least log density expected where the noise is larger by a factor, and all else the same.
+
+        With `A` the square and `m` degrees of freedom of the noise it changes by `(1 - 1 / f^2) A / 2 - m ln f`, as
+        long as columns explain as much; `m` is between the numbers of rows and of these less that of columns.
+        """
+        freedom = rows if ratio < 1.0 else max(rows - columns, 0)
+        return self.log_density + 0.5 * (1.0 - ratio**-2) * self.square - freedom * math.log(ratio)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,13 +152,18 @@ class PointRows:
             search.change(worst, int(best[worst]))
         sums = np.logaddexp.reduce(logs, axis=1)
         log_density = search.log_density + float(log_prior[search.kinds].sum() + sums.sum())
-        return GrossErrors(log_density, prior.inflations[search.kinds], search.weighted)
+        explained = float(np.sum((search.weighted @ self.model.columns) ** 2))
+        if further is not None:
+            explained += length**2 * float(np.sum((search.weighted @ further.columns) ** 2))
+        square = float(search.weighted @ self.residual) - explained
+        return GrossErrors(log_density, prior.inflations[search.kinds], search.weighted, square)
 
 
 class FurtherColumns:
     """Columns `G` (n, k) beside those of a model of rows; `weighted` (n, k): `S_0^-1 G`."""
 
     def __init__(self, rows: PointRows, columns: Floats, weighted: Floats) -> None:
+        self.columns = columns
         values, vectors = np.linalg.eigh(columns.T @ weighted)
         #: `l` (k,) and `D^T` (k, n).
         self.values, self.dual = np.maximum(values, 0.0), vectors.T @ weighted.T
@@ -207,8 +223,9 @@ class _Search:
     """The inflation of each point, and the inverse of the covariance with them, as updates of that with none.
 
     With the rows R of all gross errors, `P = P_0 - P_0[:, R] (Delta_R^-1 + P_0[R, R])^-1 P_0[R, :]` (Woodbury) is
-    `P_0 - Z^T Z`, to which points are added as by Cholesky's method. `P_0` is the inverse of the covariance of the
-    noise less `Y^T Y`, to which further columns belong, too.
+    `P_0 - Z^T Z`, to which points are added as by Cholesky's method; of a point whose inflation becomes smaller the
+    square is added. `P_0` is the inverse of the covariance of the noise less `Y^T Y`, to which further columns belong,
+    too.
     """
 
     def __init__(self, rows: PointRows, prior: Outliers, further: FurtherColumns | None, length: float) -> None:
@@ -218,11 +235,12 @@ class _Search:
         self._variances = prior.inflations**2
         # rows of `Y`, and of `Z` after these: one product with all of them, and room for more
         self._low_rank, self._count = rows.model.low_rank, len(rows.model.low_rank)
+        # -1 for rows whose squares are added
+        self._signs = np.ones(self._count)
         self.weighted, self.log_density = rows.weighted, rows.log_density
         self._precisions = rows.precisions
         if further is not None:
             self._add_columns(further, length)
-        self._sound = self.weighted, self.log_density, self._precisions, self._count
 
     def _add_columns(self, further: FurtherColumns, length: float) -> None:
         lengthened = 1.0 + length**2 * further.values
@@ -233,7 +251,7 @@ class _Search:
         pairs = zip(self._precisions, further.products, strict=True)
         self._precisions = [P - (weights @ products).reshape(P.shape) for P, products in pairs]
 
-    def _append(self, added: Floats) -> None:
+    def _append(self, added: Floats, sign: float = 1.0) -> None:
         """Add rows (k, n) to the low rank; what others may read is copied before it is written to."""
         end = self._count + len(added)
         if end > len(self._low_rank) or self._low_rank is self._rows.model.low_rank:
@@ -241,24 +259,24 @@ class _Search:
             larger[: self._count] = self._low_rank[: self._count]
             self._low_rank = larger
         self._low_rank[self._count : end] = added
+        self._signs = np.concatenate([self._signs, np.full(len(added), sign)])
         self._count = end
 
     def change(self, number: int, kind: int) -> None:
         """Give a point another inflation."""
         before, self.kinds[number] = int(self.kinds[number]), kind
-        if kind > before:
-            self._inflate([number], before)
-        else:
-            self.begin_with(self.kinds)
+        self._inflate([number], before)
 
     def begin_with(self, kinds: Ints) -> None:
-        """Give all points their inflations at once."""
+        """Give all points their inflations at once, where all were sound."""
         self.kinds = kinds.copy()
-        self.weighted, self.log_density, self._precisions, self._count = self._sound
         self._inflate(np.flatnonzero(kinds).tolist())
 
     def _inflate(self, numbers: Sequence[int], before: int = 0) -> None:
-        """Add the rows of points, of a lesser inflation before, to `Z`, and what follows to inverse and log density."""
+        """Add the rows of points, which had one inflation before, to `Z`, and what follows to inverse and log density.
+
+        All of their inflations become larger, or all smaller.
+        """
         # NumPy's own take ten times as long for a point
         from scipy.linalg.lapack import dpotrf, dtrtri
 
@@ -267,28 +285,29 @@ class _Search:
         noise, model = self._rows.noise, self._rows.model
         R = np.concatenate([noise.points[number] for number in numbers])
         low_rank = self._low_rank[: self._count]
-        columns = model.noise_precision(R) - low_rank[:, R].T @ low_rank
+        columns = model.noise_precision(R) - (low_rank[:, R] * self._signs[:, None]).T @ low_rank
         inner, at, log_determinant = columns[:, R], 0, 0.0
+        sign = 1.0 if self.kinds[numbers[0]] > before else -1.0
         for number in numbers:
             part = slice(at, at := at + len(noise.points[number]))
             increase = float(self._variances[self.kinds[number]] - self._variances[before]) * model.scale**2
             inverse, log_of_noise = noise.inverse[number]
             inner[part, part] += inverse / increase
-            log_determinant += log_of_noise + len(inverse) * math.log(increase)
-        factor, failed = dpotrf(inner, lower=1)
+            log_determinant += log_of_noise + len(inverse) * math.log(sign * increase)
+        factor, failed = dpotrf(sign * inner, lower=1)
         if failed:
             raise np.linalg.LinAlgError("the covariance without points is not positive definite")
         whiten = dtrtri(factor, lower=1)[0]
         added, residual = whiten @ columns, whiten @ self.weighted[R]
-        self._append(added)
-        self.weighted = self.weighted - residual @ added
+        self._append(added, sign)
+        self.weighted = self.weighted - sign * residual @ added
         less = []
         for group, precision in zip(noise.groups, self._precisions, strict=True):
             of_points = added[:, group.rows]
-            less.append(precision - np.einsum("kig,kjg->ijg", of_points, of_points))
+            less.append(precision - sign * np.einsum("kig,kjg->ijg", of_points, of_points))
         self._precisions = less
         log_determinant += 2.0 * float(np.log(factor.diagonal()).sum())
-        self.log_density += 0.5 * float(residual @ residual) - 0.5 * log_determinant
+        self.log_density += 0.5 * sign * float(residual @ residual) - 0.5 * log_determinant
 
     def log_ratios(self) -> Floats:
         """Log density (g, k) with every inflation of each point, less that with its current one."""
@@ -394,18 +413,23 @@ class RowsAtScales:
         `scale`: a factor on the noise near the most probable one, where the sum begins.
         `inflation` (g,): of gross errors under a hypothesis that is nearly the same.
         """
-        values = self._values
+        values, log_prior = self._values, self._log_prior
         first = int(np.argmin(np.abs(np.log(values / scale))))
-        inflations: dict[int, Floats] = {}
+        at: dict[int, GrossErrors] = {}
+        rows, columns = self._further.shape[0], self._model.columns.shape[1] + self._further.shape[1]
 
         def log_density(number: int) -> float:
-            at_scale = self.with_gross_errors(float(values[number]), length, inflations.get(first, inflation))
-            inflations[number] = at_scale.inflation
-            return at_scale.log_density + float(self._log_prior[number])
+            start = at[first].inflation if first in at else inflation
+            at[number] = self.with_gross_errors(float(values[number]), length, start)
+            return at[number].log_density + float(log_prior[number])
 
-        logs = outward(log_density, first, len(values), _NEGLIGIBLE)
+        def expected(number: int, known: int) -> float:
+            least = at[known].expected(float(values[number] / values[known]), rows, columns)
+            return least + float(log_prior[number])
+
+        logs = outward(log_density, first, len(values), _NEGLIGIBLE, expected)
         best = int(np.argmax(logs))
-        return Summed(float(np.logaddexp.reduce(logs)), float(values[best]), inflations[best])
+        return Summed(float(np.logaddexp.reduce(logs)), float(values[best]), at[best].inflation)
 
     def with_gross_errors(self, scale: float, length: float = 1.0, start: Floats | None = None) -> GrossErrors:
         """Density at one scale of the noise, with the further columns multiplied by `length`."""
@@ -417,15 +441,27 @@ class RowsAtScales:
         return rows.with_gross_errors(outliers(), start, further, length)
 
 
-def outward(log_evidence: Callable[[int], float], first: int, count: int, negligible: float) -> Floats:
-    """Log evidence (count,) by number, as far from the first one as it is not below a part of the largest."""
+def outward(
+    log_evidence: Callable[[int], float],
+    first: int,
+    count: int,
+    negligible: float,
+    expected: Callable[[int, int], float] | None = None,
+) -> Floats:
+    """Log evidence (count,) by number, as far from the first one as it is not below a part of the largest.
+
+    `expected`: the least log evidence that is expected of a number, by that and its neighbour whose own is known.
+    """
     logs = np.full(count, -np.inf)
     logs[first] = log_evidence(first)
+    least = np.log(negligible)
     for step in (-1, 1):
         number = first + step
         while 0 <= number < count:
+            if expected is not None and expected(number, number - step) < logs.max() + _UNCHANGED * least:
+                break
             logs[number] = log_evidence(number)
-            if logs[number] < logs.max() + np.log(negligible):
+            if logs[number] < logs.max() + least:
                 break
             number += step
     return logs

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from warpbrain.arrays import Floats
+from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import beliefs
 from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, marginal_of, outward
 from warpbrain.threads import in_threads
@@ -76,15 +77,14 @@ class _OverSizes:
         self._mesh = np.r_[nuisances.part(UNKNOWN_MESH)] if self._moving else np.zeros(0, dtype=np.int64)
         self._relative = np.zeros((len(residual), 0))
         self._inflation: Floats | None = None
+        self._summed: dict[Sizes, Summed] = {}
+        self._rows, self._others = cache(self._rows_without), cache(self._without_mesh)
         if self._moving:
-            others = np.delete(columns, self._mesh, axis=1)
-            model = base.noises[0].of_noise(others)
+            model = self._others(0, self._first.field)
             as_given = RowsAtScales(model, residual, base.points, columns[:, self._mesh]).with_gross_errors(scale)
             self._inflation = as_given.inflation
-            moved = _displacement(base, residual - others @ (others.T @ as_given.weighted))
+            moved = _displacement(base, residual - model.columns @ (model.columns.T @ as_given.weighted))
             self._relative = moved[:, None] * nuisances.relative
-        self._summed: dict[Sizes, Summed] = {}
-        self._rows = cache(self._rows_without)
 
     def summed(self) -> tuple[Floats, SetMarginal]:
         """See `evidence_of`."""
@@ -135,11 +135,17 @@ class _OverSizes:
 
     def _rows_without(self, axis: str, sizes: Sizes) -> RowsAtScales:
         """Rows where the size of the stiffness field, or of the mesh's error, varies; the others are as in `sizes`."""
-        part, varying = (
-            (self._field, self._columns[:, self._field]) if axis == "field" else (self._mesh, self._relative)
-        )
-        model = self._base.noises[sizes.unresolved].of_noise(np.delete(self._columns_at(sizes), part, axis=1))
+        if axis == "field":
+            others = np.delete(self._columns_at(sizes), self._field, axis=1)
+            model, varying = self._base.noises[sizes.unresolved].of_noise(others), self._columns[:, self._field]
+        else:
+            model, varying = self._others(sizes.unresolved, sizes.field), self._relative
         return RowsAtScales(model, self._residual, self._base.points, varying)
+
+    def _without_mesh(self, unresolved: int, field: int) -> GaussianModel:
+        """Of the rows, without columns of the mesh's error."""
+        columns = self._base.nuisances.with_field(self._columns, self._factor(self._first._replace(field=field)))
+        return self._base.noises[unresolved].of_noise(np.delete(columns, self._mesh, axis=1))
 
     def _factor(self, sizes: Sizes) -> float:
         """Size of the stiffness field relative to that of the columns as given."""
