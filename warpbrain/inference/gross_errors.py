@@ -9,10 +9,9 @@ inflations of the other points, another inflation, which changes it by `D_i`, ha
 with `v = (S^-1 r)_i` and `P_ii = (S^-1)_ii`. Points that are gross errors under one hypothesis may be explained
 by another, so no point is discarded before hypotheses are compared.
 
-Hypotheses that differ in some columns `G` alone, or in their length f, share all else: with
-`G^T S_0^-1 G = V diag(l) V^T` and `D = S_0^-1 G V`
+Hypotheses that differ in some columns `G` alone, or in their length f, share all else:
 
-    S^-1 = S_0^-1 - D diag(f^2 / (1 + f^2 l)) D^T
+    S^-1 = S_0^-1 - S_0^-1 G (I / f^2 + G^T S_0^-1 G)^-1 G^T S_0^-1
 
 The marginal likelihood of a hypothesis is that density, summed over the scale of the noise, too.
 """
@@ -162,17 +161,19 @@ class PointRows:
 class FurtherColumns:
     """Columns `G` (n, k) beside those of a model of rows; `weighted` (n, k): `S_0^-1 G`."""
 
-    def __init__(self, rows: PointRows, columns: Floats, weighted: Floats) -> None:
-        self.columns = columns
-        values, vectors = np.linalg.eigh(columns.T @ weighted)
-        #: `l` (k,) and `D^T` (k, n).
-        self.values, self.dual = np.maximum(values, 0.0), vectors.T @ weighted.T
-        #: Of each group of points with the rows (d, g), products of each two rows of `D`: (k, d^2 g).
-        self.products = []
-        for group in rows.noise.groups:
-            of_points = self.dual[:, group.rows]
-            pairs = of_points[:, :, None] * of_points[:, None]
-            self.products.append(pairs.reshape(len(self.dual), group.rows.size * len(group.rows)))
+    def __init__(self, columns: Floats, weighted: Floats) -> None:
+        self.columns, self.weighted, self.products = columns, weighted, columns.T @ weighted
+
+    def factor(self, length: float) -> tuple[Floats, float]:
+        """`F` (k, n), with which `S^-1 = S_0^-1 - F^T F` beside columns `f G`, and `ln |S| - ln |S_0|`; `f`: length."""
+        from scipy.linalg import solve_triangular
+
+        count = self.columns.shape[1]
+        if count == 0 or length == 0.0:
+            return np.zeros((0, len(self.columns))), 0.0
+        lower = np.linalg.cholesky(self.products + np.eye(count) / length**2)
+        determinant = 2.0 * (float(np.log(lower.diagonal()).sum()) + count * math.log(length))
+        return np.asarray(solve_triangular(lower, self.weighted.T, lower=True, check_finite=False)), determinant
 
 
 def with_gross_errors(model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> GrossErrors:
@@ -196,7 +197,7 @@ def log_densities_of(
     def log_density(number: int) -> float:
         (mean, columns), at = tried[number], first[number]
         less = rows.less(mean, weighted[:, at])
-        further = FurtherColumns(less, columns, weighted[:, at + 1 : first[number + 1]])
+        further = FurtherColumns(columns, weighted[:, at + 1 : first[number + 1]])
         return less.with_gross_errors(prior, further=further).log_density
 
     return np.array(in_threads(log_density, range(len(tried))))
@@ -243,13 +244,23 @@ class _Search:
             self._add_columns(further, length)
 
     def _add_columns(self, further: FurtherColumns, length: float) -> None:
-        lengthened = 1.0 + length**2 * further.values
-        weights, projected = length**2 / lengthened, further.dual @ self._rows.residual
-        self._append(further.dual * np.sqrt(weights)[:, None])
-        self.weighted = self.weighted - (weights * projected) @ further.dual
-        self.log_density += 0.5 * float(weights @ projected**2) - 0.5 * float(np.log(lengthened).sum())
-        pairs = zip(self._precisions, further.products, strict=True)
-        self._precisions = [P - (weights @ products).reshape(P.shape) for P, products in pairs]
+        added, log_determinant = further.factor(length)
+        self._add(added, added @ self._rows.residual, log_determinant)
+
+    def _add(self, added: Floats, projected: Floats, log_determinant: float, sign: float = 1.0) -> None:
+        """Take `F^T F` of rows `F` (k, n) off the inverse, or add it; weighted rows and log density follow.
+
+        `projected` (k,): `F r`.
+        `log_determinant`: by how much that of the covariance is larger.
+        """
+        self._append(added, sign)
+        self.weighted = self.weighted - sign * projected @ added
+        self.log_density += 0.5 * sign * float(projected @ projected) - 0.5 * log_determinant
+        less = []
+        for group, precision in zip(self._rows.noise.groups, self._precisions, strict=True):
+            of_points = added[:, group.rows]
+            less.append(precision - sign * np.einsum("kig,kjg->ijg", of_points, of_points))
+        self._precisions = less
 
     def _append(self, added: Floats, sign: float = 1.0) -> None:
         """Add rows (k, n) to the low rank; what others may read is copied before it is written to."""
@@ -298,16 +309,8 @@ class _Search:
         if failed:
             raise np.linalg.LinAlgError("the covariance without points is not positive definite")
         whiten = dtrtri(factor, lower=1)[0]
-        added, residual = whiten @ columns, whiten @ self.weighted[R]
-        self._append(added, sign)
-        self.weighted = self.weighted - sign * residual @ added
-        less = []
-        for group, precision in zip(noise.groups, self._precisions, strict=True):
-            of_points = added[:, group.rows]
-            less.append(precision - sign * np.einsum("kig,kjg->ijg", of_points, of_points))
-        self._precisions = less
         log_determinant += 2.0 * float(np.log(factor.diagonal()).sum())
-        self.log_density += 0.5 * sign * float(residual @ residual) - 0.5 * log_determinant
+        self._add(whiten @ columns, whiten @ self.weighted[R], log_determinant, sign)
 
     def log_ratios(self) -> Floats:
         """Log density (g, k) with every inflation of each point, less that with its current one."""
@@ -436,7 +439,7 @@ class RowsAtScales:
         if scale not in self._at:
             weighted = self._weighted(scale)
             rows = PointRows(self._model.with_scale(scale), self._residual, self._noise, weighted[:, 0])
-            self._at[scale] = rows, FurtherColumns(rows, self._further, weighted[:, 1:])
+            self._at[scale] = rows, FurtherColumns(self._further, weighted[:, 1:])
         rows, further = self._at[scale]
         return rows.with_gross_errors(outliers(), start, further, length)
 
