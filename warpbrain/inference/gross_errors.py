@@ -11,7 +11,7 @@ by another, so no point is discarded before hypotheses are compared.
 
 Hypotheses that differ in some columns `G` alone, or in their length f, share all else:
 
-    S^-1 = S_0^-1 - S_0^-1 G (I / f^2 + G^T S_0^-1 G)^-1 G^T S_0^-1
+    S^-1 = S_0^-1 - f^2 S_0^-1 G (I + f^2 G^T S_0^-1 G)^-1 G^T S_0^-1
 
 The marginal likelihood of a hypothesis is that density, summed over the scale of the noise, too.
 """
@@ -33,9 +33,10 @@ from warpbrain.threads import in_threads
 
 #: Passes over the points at most.
 _SWEEPS = 10
-#: The sum over scales ends where a term is below this part of the largest, and before it where without changes of gross
-#: errors, which can only make it larger, it would be below this power of that.
-_NEGLIGIBLE, _UNCHANGED = 1e-3, 4.0
+#: The sum over scales ends where a term is below this part of the largest.
+_NEGLIGIBLE = 1e-3
+#: Log density [nats] that other gross errors may add at a neighbouring scale: much more than makes a term negligible.
+_BY_OTHER_GROSS_ERRORS = -3.0 * math.log(_NEGLIGIBLE)
 #: Rows for which there is room when some are added.
 _ROOM = 30
 
@@ -48,16 +49,6 @@ class GrossErrors:
     log_density: float
     inflation: Floats  # (g,), the most probable one of each point, 1 of a sound one
     weighted: Floats  # (n,), the inverse of the covariance with these, times the rows
-    square: float  # the part of the rows' square, in the metric of that inverse, that is of the noise
-
-    def expected(self, ratio: float, rows: int, columns: int) -> float:
-        """Least log density expected where the noise is larger by a factor, and all else the same.
-
-        With `A` the square and `m` degrees of freedom of the noise it changes by `(1 - 1 / f^2) A / 2 - m ln f`, as
-        long as columns explain as much; `m` is between the numbers of rows and of these less that of columns.
-        """
-        freedom = rows if ratio < 1.0 else max(rows - columns, 0)
-        return self.log_density + 0.5 * (1.0 - ratio**-2) * self.square - freedom * math.log(ratio)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,29 +142,22 @@ class PointRows:
             search.change(worst, int(best[worst]))
         sums = np.logaddexp.reduce(logs, axis=1)
         log_density = search.log_density + float(log_prior[search.kinds].sum() + sums.sum())
-        explained = float(np.sum((search.weighted @ self.model.columns) ** 2))
-        if further is not None:
-            explained += length**2 * float(np.sum((search.weighted @ further.columns) ** 2))
-        square = float(search.weighted @ self.residual) - explained
-        return GrossErrors(log_density, prior.inflations[search.kinds], search.weighted, square)
+        return GrossErrors(log_density, prior.inflations[search.kinds], search.weighted)
 
 
 class FurtherColumns:
     """Columns `G` (n, k) beside those of a model of rows; `weighted` (n, k): `S_0^-1 G`."""
 
     def __init__(self, columns: Floats, weighted: Floats) -> None:
-        self.columns, self.weighted, self.products = columns, weighted, columns.T @ weighted
+        self._weighted, self._products = weighted, columns.T @ weighted
 
     def factor(self, length: float) -> tuple[Floats, float]:
-        """`F` (k, n), with which `S^-1 = S_0^-1 - F^T F` beside columns `f G`, and `ln |S| - ln |S_0|`; `f`: length."""
+        """`F` (k, n), with `S^-1 = S_0^-1 - F^T F` for columns `f G` of length `f`, and `ln |S| - ln |S_0|`."""
         from scipy.linalg import solve_triangular
 
-        count = self.columns.shape[1]
-        if count == 0 or length == 0.0:
-            return np.zeros((0, len(self.columns))), 0.0
-        lower = np.linalg.cholesky(self.products + np.eye(count) / length**2)
-        determinant = 2.0 * (float(np.log(lower.diagonal()).sum()) + count * math.log(length))
-        return np.asarray(solve_triangular(lower, self.weighted.T, lower=True, check_finite=False)), determinant
+        lower = np.linalg.cholesky(np.eye(len(self._products)) + length**2 * self._products)
+        factor = solve_triangular(lower, length * self._weighted.T, lower=True, check_finite=False)
+        return np.asarray(factor), 2.0 * float(np.log(lower.diagonal()).sum())
 
 
 def with_gross_errors(model: GaussianModel, residual: Floats, points: Sequence[Ints], prior: Outliers) -> GrossErrors:
@@ -241,17 +225,16 @@ class _Search:
         self.weighted, self.log_density = rows.weighted, rows.log_density
         self._precisions = rows.precisions
         if further is not None:
-            self._add_columns(further, length)
-
-    def _add_columns(self, further: FurtherColumns, length: float) -> None:
-        added, log_determinant = further.factor(length)
-        self._add(added, added @ self._rows.residual, log_determinant)
+            added, log_determinant = further.factor(length)
+            self._add(added, added @ rows.residual, log_determinant)
 
     def _add(self, added: Floats, projected: Floats, log_determinant: float, sign: float = 1.0) -> None:
-        """Take `F^T F` of rows `F` (k, n) off the inverse, or add it; weighted rows and log density follow.
+        """Update `S^-1 r`, the log density and each `P_ii` for the inverse `P - F^T F`, or `P + F^T F` by its sign.
 
-        `projected` (k,): `F r`.
-        `log_determinant`: by how much that of the covariance is larger.
+        `added` (k, n): `F`.
+        `projected` (k,): the product of `F` with the rows as far as they are not explained yet.
+        `log_determinant`: change of that of the covariance.
+        `sign`: 1 where the covariance becomes larger, -1 where it becomes smaller.
         """
         self._append(added, sign)
         self.weighted = self.weighted - sign * projected @ added
@@ -419,18 +402,17 @@ class RowsAtScales:
         values, log_prior = self._values, self._log_prior
         first = int(np.argmin(np.abs(np.log(values / scale))))
         at: dict[int, GrossErrors] = {}
-        rows, columns = self._further.shape[0], self._model.columns.shape[1] + self._further.shape[1]
 
         def log_density(number: int) -> float:
             start = at[first].inflation if first in at else inflation
             at[number] = self.with_gross_errors(float(values[number]), length, start)
             return at[number].log_density + float(log_prior[number])
 
-        def expected(number: int, known: int) -> float:
-            least = at[known].expected(float(values[number] / values[known]), rows, columns)
-            return least + float(log_prior[number])
+        def at_most(number: int, neighbour: int) -> float:
+            change = self._change_of_density(at[neighbour], length, float(values[number] / values[neighbour]))
+            return at[neighbour].log_density + change + _BY_OTHER_GROSS_ERRORS + float(log_prior[number])
 
-        logs = outward(log_density, first, len(values), _NEGLIGIBLE, expected)
+        logs = outward(log_density, first, len(values), _NEGLIGIBLE, at_most)
         best = int(np.argmax(logs))
         return Summed(float(np.logaddexp.reduce(logs)), float(values[best]), at[best].inflation)
 
@@ -443,17 +425,31 @@ class RowsAtScales:
         rows, further = self._at[scale]
         return rows.with_gross_errors(outliers(), start, further, length)
 
+    def _change_of_density(self, known: GrossErrors, length: float, ratio: float) -> float:
+        """Change [nats] of the log density where the noise is `ratio` times as large, with the same gross errors.
+
+        It is `(1 - 1 / ratio^2) A / 2 - m ln(ratio)`, as long as columns explain as much. `A`: square of what is left
+        of the rows, in standard deviations of the noise. `m`: degrees of freedom of the noise, between the number of
+        rows and that less the number of columns; that of which the change is the larger.
+        """
+        v = known.weighted
+        explained = np.sum((v @ self._model.columns) ** 2) + length**2 * np.sum((v @ self._further) ** 2)
+        square = float(v @ self._residual - explained)
+        columns = self._model.columns.shape[1] + self._further.shape[1]
+        freedom = len(v) if ratio < 1.0 else max(len(v) - columns, 0)
+        return 0.5 * (1.0 - ratio**-2) * square - freedom * math.log(ratio)
+
 
 def outward(
     log_evidence: Callable[[int], float],
     first: int,
     count: int,
     negligible: float,
-    expected: Callable[[int, int], float] | None = None,
+    at_most: Callable[[int, int], float] | None = None,
 ) -> Floats:
     """Log evidence (count,) by number, as far from the first one as it is not below a part of the largest.
 
-    `expected`: the least log evidence that is expected of a number, by that and its neighbour whose own is known.
+    `at_most`: a bound on the log evidence of a number, by that number and a neighbour whose log evidence is known.
     """
     logs = np.full(count, -np.inf)
     logs[first] = log_evidence(first)
@@ -461,7 +457,7 @@ def outward(
     for step in (-1, 1):
         number = first + step
         while 0 <= number < count:
-            if expected is not None and expected(number, number - step) < logs.max() + _UNCHANGED * least:
+            if at_most is not None and at_most(number, number - step) < logs.max() + least:
                 break
             logs[number] = log_evidence(number)
             if logs[number] < logs.max() + least:

@@ -126,7 +126,7 @@ class _OverSizes:
             near = (self._scale, None if sizes.unresolved else self._inflation)
             near = near if known is None else (known.scale, known.inflation)
             if axis == "field":
-                rows, length = self._rows(axis, sizes._replace(field=self._first.field)), self._factor(sizes)
+                rows, length = self._rows(axis, sizes._replace(field=self._first.field)), self._factor(sizes.field)
             else:
                 rows = self._rows("mesh", sizes._replace(mesh=self._first.mesh))
                 length = float(self._fractions[sizes.mesh])
@@ -143,18 +143,18 @@ class _OverSizes:
         return RowsAtScales(model, self._residual, self._base.points, varying)
 
     def _without_mesh(self, unresolved: int, field: int) -> GaussianModel:
-        """Of the rows, without columns of the mesh's error."""
-        columns = self._base.nuisances.with_field(self._columns, self._factor(self._first._replace(field=field)))
+        """Model of the rows without columns of the mesh's error, with noise and stiffness field of these sizes."""
+        columns = self._base.nuisances.with_field(self._columns, self._factor(field))
         return self._base.noises[unresolved].of_noise(np.delete(columns, self._mesh, axis=1))
 
-    def _factor(self, sizes: Sizes) -> float:
+    def _factor(self, field: int) -> float:
         """Size of the stiffness field relative to that of the columns as given."""
         of_all = self._base.nuisances.field_sizes.relative
-        return float(of_all[sizes.field] / of_all[self._first.field])
+        return float(of_all[field] / of_all[self._first.field])
 
     def _columns_at(self, sizes: Sizes) -> Floats:
         nuisances = self._base.nuisances
-        columns = nuisances.with_field(self._columns, self._factor(sizes))
+        columns = nuisances.with_field(self._columns, self._factor(sizes.field))
         if self._moving:
             columns[:, self._mesh] = self._fractions[sizes.mesh] * self._relative
         return columns
