@@ -208,25 +208,27 @@ class Confirming:
         return held_out.with_patterns(model, others.residual, self.modes, freedom, tries, self._random)
 
     def improvement(
-        self, nothing: WeightedSet, weighted_set: WeightedSet
+        self, others: WeightedSet, weighted_set: WeightedSet
     ) -> tuple[tuple[float, float], tuple[float, float, float]]:
         """Held-out errors with random patterns in the place of the mechanisms of a set, and what these improve.
 
-        Quantiles of 5 and 95 % of the former [m]; the part of the error without any cause that is removed, and its 95 %
-        interval.
+        `others`: the set without mechanisms. Quantiles of 5 and 95 % of the former [m]; the part of its error that is
+        removed, and its 95 % interval.
         """
         held_out = self.held_out_for(weighted_set)
-        patterns = self._patterns(nothing, held_out, width_of(weighted_set.effects), weighted_set.mechanisms)
+        acting = zip(weighted_set.acting, weighted_set.effects, strict=True)
+        freedom = width_of([effect for name, effect in acting if name not in others.names])
+        patterns = self._patterns(others, held_out, freedom, weighted_set.mechanisms)
         low, high = np.quantile([held_out.error(pattern) for pattern in patterns], [0.05, 0.95]).tolist()
-        without, explained = self.predict(nothing, held_out), self.predict(weighted_set, held_out)
+        without, explained = self.predict(others, held_out), self.predict(weighted_set, held_out)
         lengths = held_out.sensors.is_displacement
         return (low, high), explained.improvement(without, lengths, self._random)
 
-    def ceiling(self, nothing: WeightedSet, held_out: HeldOut) -> float:
-        """Least held-out error [m] with an unknown field of any size."""
+    def ceiling(self, others: WeightedSet, held_out: HeldOut) -> float:
+        """Least held-out error [m] with an unknown field of any size beside other causes."""
         base, sizes = self.search.base, beliefs("unknown.sizes")
         column_sets = [size * base.typical_noise * f.columns for f in base.unknown.values() for size in sizes]
-        predictions = predict_with(nothing.marginal.model, nothing.residual, held_out.blocks, column_sets)
+        predictions = predict_with(others.marginal.model, others.residual, held_out.blocks, column_sets)
         return held_out.error(max(predictions, key=lambda prediction: prediction.log_density))
 
 

@@ -117,7 +117,8 @@ class Diagnosing:
                 if _decided(search) == by_posterior:
                     break
             best, named = checked.best, checked.decision.named
-            weighted_sets = {REFITTED: nothing} | ({EXPLAINED: best} if named else {})
+            refitted = search.fitted_without_physics(best) if named else nothing
+            weighted_sets = {REFITTED: refitted} | ({EXPLAINED: best} if named else {})
             source = search.fitted_source if checked.decision.verdict == UNKNOWN else None
             blocks = confirming.held_out_for(source or best)
             predictions = {name: confirming.predict(candidate, blocks) for name, candidate in weighted_sets.items()}
@@ -212,24 +213,24 @@ class Diagnosing:
         held_out: dict[str, Prediction],
         confirmations: tuple[Confirmation, ...],
     ) -> Fit:
-        nothing, base = weighted_sets[REFITTED], confirming.search.base
-        best = weighted_sets.get(EXPLAINED, nothing)
+        refitted, base = weighted_sets[REFITTED], confirming.search.base
+        best = weighted_sets.get(EXPLAINED, refitted)
         sensors = base.at.sensors
         declared = distance(base.declared.sensors, base.declared.sensors.residual)
         errors = {
             name: (distance(sensors, candidate.best_residual), distance(sensors, held_out[name].errors))
             for name, candidate in weighted_sets.items()
         }
-        patterns, improvement = (None, None) if best is nothing else confirming.improvement(nothing, best)
+        patterns, improvement = (None, None) if best is refitted else confirming.improvement(refitted, best)
         refits = [candidate.refit for candidate in weighted_sets.values() if candidate.refit is not None]
         return Fit(
             (declared, declared),
             errors[REFITTED],
             errors.get(EXPLAINED),
             improvement,
-            None if best is nothing else max(confirmation.placebo_p for confirmation in confirmations),
+            None if best is refitted else max(confirmation.placebo_p for confirmation in confirmations),
             patterns,
-            confirming.ceiling(nothing, blocks),
+            confirming.ceiling(refitted, blocks),
             check_errors(self.case, base, refits),
         )
 

@@ -70,7 +70,7 @@ class Diagnosis(Verdict):
     search : HypothesisSearch
         Of the sets of causes, with its base.
     weighted_sets : dict of str to WeightedSet
-        ``"refitted"`` without any cause, ``"explained"`` with all that is named.
+        ``"refitted"`` without physics that is missing, ``"explained"`` with all that is named.
     held_out : dict of str to Prediction
         Their predictions of held-out points.
     confusion : Confusion

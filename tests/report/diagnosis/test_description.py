@@ -13,11 +13,12 @@ from warpbrain.diagnosis.checking import distance
 from warpbrain.inference import Kind
 from warpbrain.inference.decide import VERDICTS
 from warpbrain.report.diagnosis.description import describe
+from warpbrain.report.diagnosis.text import shown_of
 from warpbrain.report.files import write_summary
 
 KEYS = {
     *("verdict", "sentence", "p_value", "mechanism", "probability", "parameters", "where", "when", "ranking", "group"),
-    *("mechanisms", "unknown", "hypotheses", "by_posterior", "doubts", "p_left"),
+    *("mechanisms", "unknown", "hypotheses", "log_evidence_of_nothing", "by_posterior", "doubts", "p_left"),
     *("next_measurement", "smallest_detectable", "confusion", "fit", "map", "assumptions", "remarks", "case"),
     *("inputs_sha256", "options", "seconds", "equilibria", "device", "versions"),
 }
@@ -41,6 +42,16 @@ def test_keys_are_complete(small_diagnosis, verdict, tmp_path):
     assert all(set(one) == RANKED for one in read["ranking"])
     assert [one["mechanism"] for one in read["mechanisms"]] == (["gravity"] if verdict.startswith("named") else [])
     assert (read["mechanism"] == "gravity") == verdict.startswith("named")
+
+
+def test_evidence_is_against_nothing_where_that_is_too_improbable_to_be_listed(small_diagnosis):
+    told = describe(verdict_of(small_diagnosis, "named"), OPTIONS, "cpu")
+    [nothing] = [one["log_evidence"] for one in told["hypotheses"] if not one["causes"]]
+    listed = [one for one in told["hypotheses"] if one["causes"]]
+    for hypotheses in (told["hypotheses"], listed):
+        sets = shown_of(told | {"hypotheses": hypotheses})["sets"]
+        expected = [f"{one['log_evidence'] - nothing:+.1f}" for one in hypotheses[: len(sets)]]
+        assert [row[2] for row in sets] == expected
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)

@@ -194,3 +194,12 @@ def test_what_acts_linearly_alone_is_not_fitted_again_from_a_set_with_a_mechanis
     for names in (("registration",), ("gravity", "registration")):
         other._fit(frozenset(names))
         assert other.get(names).refit is not None
+
+
+def test_a_mechanism_is_compared_with_what_is_no_physics_without_it(search):
+    other = copy.copy(search)
+    other._sets = dict(search._sets)
+    other._fit(frozenset(("gravity", "registration")))
+    beside = other.fitted_without_physics(other.get(("gravity", "registration")))
+    assert beside.names == {"registration"} and beside.refit is not None
+    assert other.fitted_without_physics(other.get(("gravity",))) is other.nothing

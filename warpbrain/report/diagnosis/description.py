@@ -102,6 +102,7 @@ def _of_body(diagnosis: Diagnosis) -> dict[str, Any]:
             asdict(combination) | {"kinds": [kind.value for kind in combination.kinds]}
             for combination in diagnosis.combinations
         ],
+        "log_evidence_of_nothing": diagnosis.search.nothing.hypothesis.log_evidence,
         "by_posterior": picked(diagnosis.by_posterior, "verdict", "causes"),
         "where": place and place | {"region": best.region if best is not None else ""}
         | {"local_p": where.local_p, "global_p": where.global_p},

@@ -25,8 +25,8 @@ def shown_of(summary: Summary) -> dict[str, Any]:
     """What templates of printed lines and of the page show: rows of tables, sentences, and the unit of errors."""
     suffix, factor, unit = unit_of(summary)
     held, sets = summary["fit"][f"heldout_rmse_{suffix}"], summary.get("combinations", summary.get("hypotheses"))
-    # log evidence against nothing, as that of a specimen is already
-    nothing = 0.0 if "combinations" in summary else next((s["log_evidence"] for s in sets if not s["causes"]), 0.0)
+    # that of a specimen is against nothing already
+    nothing = summary.get("log_evidence_of_nothing", 0.0)
     smallest = []
     for kind, effect in summary["smallest_detectable"].items():
         named = effect.get("named_from")

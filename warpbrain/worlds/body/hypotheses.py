@@ -21,7 +21,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.estimation.observations import Observations
 from warpbrain.estimation.options import Listener
 from warpbrain.estimation.parameters import Gaussian
-from warpbrain.inference import GaussianModel, posterior
+from warpbrain.inference import GaussianModel, Kind, posterior
 from warpbrain.inference.calibration import calibration
 from warpbrain.inference.subsets import likely_places
 from warpbrain.threads import in_threads, one_thread_of_blas
@@ -215,6 +215,14 @@ class HypothesisSearch:
         if fitted is not None:
             self._sets[fitted.names] = fitted
         return fitted
+
+    def fitted_without_physics(self, weighted: WeightedSet) -> WeightedSet:
+        """The causes of a weighted set that are no physics, fitted; nothing if there is none, or they cannot be."""
+        names = frozenset(weighted.hypothesis.of_kind(Kind.NOT_PHYSICS))
+        if names in self._sets and self._sets[names].refit is None:
+            self._fit(names)
+        fitted = self._sets.get(names, self.nothing)
+        return self.nothing if fitted.refit is None else fitted
 
     @property
     def fitted_source(self) -> WeightedSet | None:
