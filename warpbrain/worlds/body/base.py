@@ -78,10 +78,8 @@ class Base:
         """Nuisances as columns over other sensors, in the same coordinates, and what makes effects over them."""
         at = self.at.with_sensors(sensors)
         effects = self.effects.over(at)
-        theta, nuisances = self.state.hypothesis.theta, self.nuisances
-        return nuisances_at(
-            at, self.states, theta, self.prior, effects, self.mesh_errors, nuisances.anchors, nuisances.fraction
-        ), effects
+        theta, like = self.state.hypothesis.theta, self.nuisances
+        return nuisances_at(at, self.states, theta, self.prior, effects, self.mesh_errors, like), effects
 
     def at_points(self, points: Floats) -> tuple[Nuisances, Effects]:
         """The same of the displacement of other points (k, 3) [m]."""

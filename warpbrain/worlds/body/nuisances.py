@@ -23,6 +23,7 @@ from warpbrain.physics.laws.ogden import NEO_HOOKEAN, Ogden
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.proposal import Proposal
+from warpbrain.worlds.body.boundaries import boundary_columns, visible_modes
 from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
@@ -37,6 +38,8 @@ _ALWAYS = ("tissue.volume", "tissue.exponent")
 FIELD = "stiffness field"
 #: The family of what is not known of the case's loads.
 LOADS = "known loads"
+#: The family of what is not known of where loads and what is held end.
+BOUNDARIES = "boundaries"
 #: The family of what is not known of the mesh's error, and that of mechanisms' shares of it, which only fits have.
 UNKNOWN_MESH, MESH_SHARE = "mesh, unknown", "mesh, of mechanisms"
 #: The family of what is not known of the shape of mechanisms in one place, which only fits have; the number of
@@ -58,6 +61,7 @@ class Nuisances:
     fraction: float  # that part, relative to the displacement
     displacement: Floats  # (n,), of the state at each row [m]; zero of forces
     relative: Floats  # (n, k), columns of that part if it were as large as a displacement of 1 m
+    boundary_modes: Floats  # (b, k), of `boundary_columns`, that are kept
     field_sizes: FieldSizes  # of which the typical one is that of the stiffness field's family
 
     @property
@@ -128,8 +132,7 @@ def nuisances_at(
     prior: Gaussian,
     effects: Effects,
     mesh_errors: MeshErrors | None,
-    anchors: Floats | None = None,
-    fraction: float | None = None,
+    like: Nuisances | None = None,
 ) -> Nuisances:
     """The nuisances of a state.
 
@@ -137,20 +140,22 @@ def nuisances_at(
     `prior`: of `theta`.
     `effects`: at that state.
     `mesh_errors`: the state on a finer mesh less the state; None: the mesh is taken for exact.
-    `anchors` (a, 3): those of other sensors, so that columns mean the same.
-    `fraction`: unknown part of the mesh's error, relative to the displacement; the largest that is believed by default.
+    `like`: of other sensors, so that coordinates mean the same; else the unknown part of the mesh's error is the
+    largest that is believed.
     """
-    if fraction is None:
-        fraction = float(beliefs("mesh.unknown").max())
-    sensors = at.sensors
-    if anchors is None:
+    sensors, boundaries = at.sensors, boundary_columns(at)
+    if like is None:
         places = sensors.positions[sensors.is_displacement]
         anchors = places[spread_points(places, belief("mesh.alike") * sensors.radius, 60)]
+        fraction, modes = float(beliefs("mesh.unknown").max()), visible_modes(boundaries)
+    else:
+        anchors, fraction, modes = like.anchors, like.fraction, like.boundary_modes
     families = {
         "tissue": tissue_columns(at, states, theta, prior) + mesh_by_tissue(sensors, mesh_errors),
         FIELD: field_columns(at, states),
         LAW: law_columns(effects, states),
         LOADS: load_columns(at),
+        BOUNDARIES: boundaries @ modes,
         "registration": sensors.rigid * registration_of(states.case).deviations,
         SHAPES: np.zeros((len(sensors), SHAPED_EFFECTS * SHAPE_MODES)),
     }
@@ -161,7 +166,7 @@ def nuisances_at(
         families[MESH_SHARE] = np.zeros((len(sensors), 1))
     displacement, relative = _displacement(at), _alike(sensors, anchors)
     families[UNKNOWN_MESH] = fraction * displacement[:, None] * relative
-    return Nuisances(families, anchors, fraction, displacement, relative, states.field_sizes)
+    return Nuisances(families, anchors, fraction, displacement, relative, modes, states.field_sizes)
 
 
 def tissue_columns(at: Linearisation, states: States, theta: Floats, prior: Gaussian) -> Floats:

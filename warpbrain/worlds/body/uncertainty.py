@@ -22,10 +22,11 @@ from warpbrain.arrays import Floats
 from warpbrain.estimation.parameters import Parameters
 from warpbrain.inference.causes import Kind
 from warpbrain.worlds.body.base import Base
+from warpbrain.worlds.body.boundaries import boundary_columns
 from warpbrain.worlds.body.effects import Effect, width_of
 from warpbrain.worlds.body.fit_columns import Layout, columns_about, shape_columns_about
 from warpbrain.worlds.body.hypotheses import HypothesisSearch
-from warpbrain.worlds.body.nuisances import LOADS, load_columns
+from warpbrain.worlds.body.nuisances import BOUNDARIES, LOADS, load_columns
 from warpbrain.worlds.body.sensors import tracked_points
 from warpbrain.worlds.body.weighted_set import WeightedSet
 
@@ -143,6 +144,7 @@ def displacement_columns(weighted_set: WeightedSet, base: Base) -> Floats:
     # those that no recording sees have no coordinate
     if part.stop - part.start == loads.shape[1]:
         columns[:, part] = loads
+    columns[:, base.nuisances.part(BOUNDARIES)] = boundary_columns(over) @ base.nuisances.boundary_modes
     # a switch is there: its size is not in question
     moving = [number for number, effect in enumerate(effects) if not effect.proposed.is_there_or_not]
     over_nodes = list(effects)
