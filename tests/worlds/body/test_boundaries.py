@@ -15,7 +15,7 @@ from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolv
 from warpbrain.simulation.model import Model
 from warpbrain.simulation.of_case import model_of
 from warpbrain.simulation.system import System
-from warpbrain.worlds.body.boundaries import border_nodes, boundary_columns, visible_modes
+from warpbrain.worlds.body.boundaries import border_of, boundary_columns, visible_modes
 from warpbrain.worlds.body.linearisation import Linearisation
 from warpbrain.worlds.body.sensors import tracked_points
 
@@ -51,38 +51,52 @@ def solved(model: Model, forces: Floats | None = None) -> tuple[System, Floats, 
 
 @pytest.fixture(scope="module")
 def at(model: Model) -> Linearisation:
+    return linear(model)
+
+
+def linear(model: Model) -> Linearisation:
+    """About the state, as points within the body see it."""
     system, u, reactions = solved(model)
     points = SIDE * np.random.default_rng(0).uniform(0.1, 0.9, (20, 3))
     return Linearisation(system, u, reactions, tracked_points(model.mesh, points, points.mean(axis=0)))
 
 
-def change_of(at: Linearisation, model: Model, held: Bools, forces: Floats | None = None) -> Floats:
-    """What the sensors see where other nodes (N,) are held, or more acts on nodes (N, 3)."""
-    other = replace(model, constrained=np.repeat(held[:, None], 3, axis=1))
+def moved_by(model: Model, held: Bools, motion: tuple[float, ...]) -> Model:
+    """The same with these nodes (N,) moved [m], and no other held."""
+    constrained = np.repeat(held[:, None], 3, axis=1)
+    return replace(model, constrained=constrained, prescribed=constrained * np.array(motion))
+
+
+def change_of(at: Linearisation, other: Model, forces: Floats | None = None) -> Floats:
+    """What the sensors see where other nodes are held, or more acts on nodes (N, 3)."""
     return np.asarray(at.sensors.by_displacement @ (solved(other, forces)[1] - at.u).ravel())
 
 
 def test_the_border_of_what_is_held_lies_within_a_face(case: Case) -> None:
     mesh, x = case.mesh, case.mesh.points[:, 0]
     foot = mesh.node_sets["foot"]
-    ends, beside = border_nodes(mesh, mesh.node_sets["half"])
+    ends, beside, means = border_of(mesh, mesh.node_sets["half"])
     np.testing.assert_array_equal(ends, np.flatnonzero(foot & (np.abs(x - 0.5 * SIDE) < 1e-9)))
     assert foot[beside].all()
     np.testing.assert_allclose(x[beside], SIDE * (0.5 + 1.0 / CELLS[0]))
+    np.testing.assert_allclose(means @ x, 0.5 * SIDE)
 
 
 def test_what_is_held_up_to_the_edges_of_a_body_ends_there(case: Case) -> None:
-    assert [len(nodes) for nodes in border_nodes(case.mesh, case.mesh.node_sets["foot"])] == [0, 0]
+    ends, beside, _ = border_of(case.mesh, case.mesh.node_sets["foot"])
+    assert not len(ends) and not len(beside)
 
 
-def test_nodes_are_let_go_and_held_as_in_an_equilibrium(at: Linearisation, model: Model) -> None:
+@pytest.mark.parametrize("moved", [(0.0, 0.0, 0.0), (2e-7, 0.0, -1e-7)])
+def test_nodes_are_let_go_and_held_as_in_an_equilibrium(moved: tuple[float, ...], model: Model) -> None:
     held = model.constrained.all(axis=1)
-    ends, beside = border_nodes(model.mesh, held)
+    at = linear(moved_by(model, held, moved))
+    ends, beside, _ = border_of(model.mesh, held)
     found = boundary_columns(at) / belief("mesh.held_edge")
     for number in (0, len(ends) // 2, len(ends), len(ends) + len(beside) // 2):
         other, node = held.copy(), [*ends, *beside][number]
         other[node] = ~other[node]
-        expected = change_of(at, model, other)
+        expected = change_of(at, moved_by(model, other, moved))
         np.testing.assert_allclose(found[:, number], expected, atol=2e-3 * np.abs(expected).max())
 
 
@@ -92,7 +106,7 @@ def test_a_force_is_shared_unevenly_and_as_large_as_before(at: Linearisation, mo
     forces = np.zeros((len(at.u), 3))
     forces[top] = -np.array(FORCE) / len(top) ** 2
     forces[top[3]] += np.array(FORCE) / len(top)
-    expected = change_of(at, model, model.constrained.all(axis=1), forces)
+    expected = change_of(at, model, forces)
     np.testing.assert_allclose(found[:, 3], expected, atol=2e-3 * np.abs(expected).max())
     np.testing.assert_allclose(found.sum(axis=1), 0.0, atol=1e-9 * np.abs(found).max())
 

@@ -8,7 +8,7 @@ The nodes of a set share a force evenly by definition. A body has no nodes: of a
 has a part in proportion to the area around it, which is half as large again or half as large.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,11 +20,18 @@ from warpbrain.physics.load import NodalForce
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
 
 
-def border_nodes(mesh: TetMesh, held: Bools) -> tuple[Ints, Ints]:
-    """Nodes on both sides of the line on the surface of a mesh where what is held ends: held ones, and free ones.
+class Border(NamedTuple):
+    """The line on the surface of a body where what is held ends, but for where that is an edge of the body."""
 
-    `held` (n,). Without those of a border that lies on an edge of the body.
-    """
+    ends: Ints  # held nodes on it
+    beside: Ints  # (b,), free nodes of the triangles that it runs through
+    means: Any  # SciPy CSR (b, N): takes the mean of the held nodes of these triangles
+
+
+def border_of(mesh: TetMesh, held: Bools) -> Border:
+    """Of nodes (N,) of a mesh that are held."""
+    from scipy.sparse import csr_matrix
+
     faces, members = mesh.boundary, held[mesh.boundary]
     areas = face_vectors(mesh.points, faces)
     inside: Bools = np.all(members, axis=1)
@@ -36,18 +43,22 @@ def border_nodes(mesh: TetMesh, held: Bools) -> tuple[Ints, Ints]:
     flat = np.einsum("ki,kci->kc", areas, normals[faces]) >= np.cos(belief("mesh.body_edge")) * sizes
     ends = members & flat & ~inside[:, None]
     across = ends.any(axis=1)
-    return np.unique(faces[ends]), np.unique(faces[across][~members[across]])
+    triangle, free = np.nonzero(~members & across[:, None])
+    beside, number = np.unique(faces[triangle, free], return_inverse=True)
+    weights = ends[triangle] / np.bincount(number, ends[triangle].sum(axis=1))[number, None]
+    rows, columns = np.repeat(number, 3), faces[triangle].ravel()
+    means = csr_matrix((weights.ravel(), (rows, columns)), (len(beside), len(held)))
+    return Border(np.unique(faces[ends]).astype(np.int64), beside.astype(np.int64), means)
 
 
 def boundary_columns(at: Linearisation) -> Floats:
     """One standard deviation of each: (n, k), k = 0 where nothing is held and no force shared by nodes."""
     model = at.system.model
     held: Bools = np.all(model.constrained, axis=1)
-    ends, beside = border_nodes(model.mesh, held)
-    beside = beside[~model.constrained[beside].any(axis=1)]
+    border = border_of(model.mesh, held)
 
     def edges(moment: Moment) -> Floats:
-        return np.hstack([_let_go(moment.at, ends), _held(moment.at, beside)])
+        return np.hstack([_let_go(moment.at, border.ends), _held(moment.at, border)])
 
     return np.hstack([belief("mesh.held_edge") * at.summed(edges, "stiffness"), at.summed(_shares, "loads")])
 
@@ -71,15 +82,16 @@ def _let_go(at: Linearisation, nodes: Ints) -> Floats:
     return np.asarray(direct.toarray() + at.answers_of_columns(forces))
 
 
-def _held(at: Linearisation, nodes: Ints) -> Floats:
-    """Response (n, k) where each of some free nodes (k,) is held where it was."""
+def _held(at: Linearisation, border: Border) -> Floats:
+    """Response (n, b) where each of the free nodes beside a border moves as what is held there."""
     from scipy.sparse import csc_matrix
 
-    number = np.cumsum(at.free) - 1
+    nodes, number = border.beside, np.cumsum(at.free) - 1
     rows, count = number[_components(nodes)], 3 * len(nodes)
     unit = csc_matrix((np.ones(count), (rows, np.arange(count))), (int(at.free.sum()), count))
     compliance = at.factors.solve(unit, left=unit.T)
-    return at.answers_of_columns(_each(nodes, -_solved(compliance, at.u[nodes]), len(at.u)))
+    forces = -_solved(compliance, at.u[nodes] - border.means @ at.u)
+    return at.answers_of_columns(_each(nodes, forces, len(at.u)))
 
 
 def _components(nodes: Ints) -> Ints:
