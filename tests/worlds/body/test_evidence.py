@@ -30,9 +30,8 @@ def base() -> Base:
         FIELD: 2.0 * random.normal(size=(120, 12)),
         UNKNOWN_MESH: 0.006 * 80.0 * relative,
     }
-    nuisances = Nuisances(
-        families, places[::4], 0.006, np.full(120, 80.0), relative, FieldSizes(FIELD_SIZES, LOG_PRIOR)
-    )
+    moved, sizes = np.full(120, 80.0), FieldSizes(FIELD_SIZES, LOG_PRIOR)
+    nuisances = Nuisances(families, places[::4], 0.006, moved, relative, np.zeros((0, 0)), sizes)
     model = GaussianModel(np.eye(120), nuisances.columns)
     points = tuple(np.arange(3 * k, 3 * k + 3) for k in range(40))
     sensors = SimpleNamespace(
