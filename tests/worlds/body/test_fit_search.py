@@ -107,8 +107,12 @@ def test_a_renewal_of_shapes_that_undoes_the_one_before_is_taken_by_half(base, s
     monkeypatch.setattr("warpbrain.worlds.body.fit_search.shape_columns_about", lambda *_: others.pop(0))
     for taken, expected in ((1.0, 2.0 * first), (0.5, 1.5 * first), (0.25, 1.625 * first)):
         search._about = search._nearby, ()
+        before = search.expected_gain()
         search.update_shapes()
         assert search.taken == taken
+        # a difference that is taken by half gains a fourth of what all of it gains
+        gained = max(search.expected_gain() - before, 0.0)
+        np.testing.assert_allclose(search.left_of_shapes, gained * (1.0 / taken**2 - 1.0))
         np.testing.assert_allclose(search._U[:, shapes], expected)
     search.update_shapes()
     # what is left of it is taken in part again, without another linearisation

@@ -36,7 +36,7 @@ def test_a_search_that_stays_where_it_is_ends(sign: float) -> None:
     """As at a stable limit, beyond which the linear model sees much to gain: two more rounds, however rounded."""
     rounds: list[float] = []
     search: Any = SimpleNamespace(
-        minimise=lambda _: None, taken=1.0, expected_gain=lambda: 90.0 - 1e-8 * sign * len(rounds)
+        minimise=lambda _: None, left_of_shapes=0.0, expected_gain=lambda: 90.0 - 1e-8 * sign * len(rounds)
     )
 
     def update(_: Any) -> Fit:
@@ -56,7 +56,7 @@ def test_laws_that_stay_the_same_are_not_taken_in_part(monkeypatch: pytest.Monke
         _layout=SimpleNamespace(shapes=slice(0, 1)), _U=np.zeros((6, 1)), columns=np.zeros((6, 1)), _shapes=None,
         _shape_change=np.zeros((6, 1)), taken=1.0, residual=np.zeros(6), z=np.zeros(1), effects=(), mesh_errors=None,
         _base=SimpleNamespace(states=None, model=SimpleNamespace(whitened=lambda change: change)),
-        _renew=lambda _: None,
+        _renew=lambda _: None, expected_gain=lambda: 0.0,
     )  # fmt: skip
     for made in (laws, laws * (1.0 + rounding), laws):
         search._about = (None, ())

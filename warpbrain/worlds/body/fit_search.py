@@ -105,6 +105,8 @@ class FitSearch:
         # of such a difference that is taken
         self._shapes: Floats | None = None
         self._shape_change, self.taken = np.zeros((len(self._U), 1)), 1.0
+        #: What the linear model expects of the rest of such a difference [nats].
+        self.left_of_shapes = 0.0
         # columns and noise at which linear coordinates were put at their best last, and what that needs of these
         self._projection: tuple[Floats, GaussianModel, Floats, tuple[Floats, bool]] | None = None
         # where the error of the mesh was computed last
@@ -361,11 +363,13 @@ class FitSearch:
                 self._shape_change = change
         if self._shapes is None or np.array_equal(self._shapes, before):
             return
-        columns = before + self.taken * (self._shapes - before)
+        columns, gain = before + self.taken * (self._shapes - before), self.expected_gain()
         residual = self.residual + (before - columns) @ self.z[part]
         self._U, self.columns = self._U.copy(), self.columns.copy()
         self._U[:, part] = self.columns[:, part] = columns
         self._renew(residual)
+        # gains grow with the square of a change
+        self.left_of_shapes = max(self.expected_gain() - gain, 0.0) * (1.0 / self.taken**2 - 1.0)
 
     def _gauss_newton_step(self) -> tuple[Floats, float]:
         """The step and what it gains in the linear model.

@@ -124,8 +124,7 @@ class Fitter:
             search.minimise(ENOUGH if number == _ROUNDS - 1 else enough)
             fit = self._update(search)
             expected = search.expected_gain()
-            # of all that is left of a renewal that is taken in part
-            gain = expected / search.taken**2
+            gain = expected + search.left_of_shapes
             if enough == ENOUGH and gain < ENOUGH:
                 best = fit
                 break
