@@ -12,13 +12,12 @@ from warpbrain.inference.gaussian import GaussianModel
 from warpbrain.inference.gross_errors import (
     PointNoise,
     PointRows,
-    RowsAtScales,
     _Search,
     columns_of_inflation,
     log_densities_of,
     with_gross_errors,
 )
-from warpbrain.inference.noise import Outliers, outliers, scales
+from warpbrain.inference.noise import Outliers, outliers
 
 PRIOR = Outliers(0.03, 15.0)
 #: Two kinds of gross errors.
@@ -169,20 +168,3 @@ def test_a_point_with_less_inflation_again_is_as_if_it_had_had_no_more() -> None
     assert back.log_density == pytest.approx(at_once.log_density, abs=1e-9)
     assert back.weighted == pytest.approx(at_once.weighted, abs=1e-9)
     assert back.log_ratios() == pytest.approx(at_once.log_ratios(), abs=1e-7)
-
-
-@pytest.mark.parametrize("wrong", [0.7, 1.0, 2.1])
-@pytest.mark.parametrize("begun", [0.65, 3.2])
-def test_scales_that_are_left_out_are_next_to_nothing_of_the_sum(wrong: float, begun: float) -> None:
-    """Of 150 points with a noise that is larger or smaller than declared, five of which are gross errors."""
-    random = np.random.default_rng(12)
-    columns, count = random.normal(size=(450, 30)), 150
-    residual = wrong * random.normal(size=450) + columns @ random.normal(size=30)
-    residual[:15] *= 20.0
-    points = [np.arange(3 * k, 3 * k + 3) for k in range(count)]
-    rows = RowsAtScales(GaussianModel(np.eye(450), columns[:, :20]), residual, points, columns[:, 20:])
-    values, log_prior = scales()
-    logs = [rows.with_gross_errors(value).log_density for value in values.tolist()] + log_prior
-    summed = rows.summed(scale=begun)
-    assert summed.log_evidence == pytest.approx(logsumexp(logs), abs=2e-3)
-    assert summed.scale == values[np.argmax(logs)]

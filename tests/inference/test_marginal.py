@@ -1,10 +1,13 @@
 """Evidence with gross errors and an unknown scale, against the sum over scales written out."""
 
 import numpy as np
+import pytest
 from drawn_rows import draws
+from scipy.special import logsumexp
 
 from warpbrain.inference.gaussian import GaussianModel
-from warpbrain.inference.gross_errors import Marginal, RowsAtScales, marginal_of, with_gross_errors
+from warpbrain.inference.gross_errors import with_gross_errors
+from warpbrain.inference.marginal import Marginal, RowsAtScales, marginal_of
 from warpbrain.inference.noise import outliers, scales
 
 N = 30
@@ -50,3 +53,20 @@ def test_coordinates_are_of_the_columns_of_the_hypothesis():
     found = marginal(model, residual)
     same = GaussianModel(found.noise.noise_factor, model.columns)
     np.testing.assert_allclose(found.coordinates(residual), same.coefficients(residual)[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("wrong", [0.7, 1.0, 2.1])
+@pytest.mark.parametrize("begun", [0.65, 3.2])
+def test_scales_that_are_left_out_are_next_to_nothing_of_the_sum(wrong: float, begun: float) -> None:
+    """Of 150 points with a noise that is larger or smaller than declared, five of which are gross errors."""
+    random = np.random.default_rng(12)
+    columns, count = random.normal(size=(450, 30)), 150
+    residual = wrong * random.normal(size=450) + columns @ random.normal(size=30)
+    residual[:15] *= 20.0
+    points = [np.arange(3 * k, 3 * k + 3) for k in range(count)]
+    rows = RowsAtScales(GaussianModel(np.eye(450), columns[:, :20]), residual, points, columns[:, 20:])
+    values, log_prior = scales()
+    logs = [rows.with_gross_errors(value).log_density for value in values.tolist()] + log_prior
+    summed = rows.summed(scale=begun)
+    assert summed.log_evidence == pytest.approx(logsumexp(logs), abs=2e-3)
+    assert summed.scale == values[np.argmax(logs)]

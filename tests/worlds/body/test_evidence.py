@@ -8,7 +8,7 @@ import pytest
 
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import beliefs
-from warpbrain.inference.gross_errors import RowsAtScales
+from warpbrain.inference.marginal import RowsAtScales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.evidence import Sizes, evidence_of, sizes_of
 from warpbrain.worlds.body.nuisances import FIELD, UNKNOWN_MESH, Nuisances

@@ -16,7 +16,7 @@ import numpy as np
 from warpbrain.arrays import Floats
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.beliefs import beliefs
-from warpbrain.inference.gross_errors import Marginal, RowsAtScales, Summed, marginal_of, outward
+from warpbrain.inference.marginal import Marginal, RowsAtScales, Summed, marginal_of, outward
 from warpbrain.threads import in_threads
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.nuisances import FIELD, UNKNOWN_MESH
