@@ -7,14 +7,6 @@ changes the reactions of the held ones by `K_cf K_ff^-1 g_f - g_c`. Of the senso
 
 is needed, one right-hand side a sensor; after that each cause costs a product with `A`. Sparse factors of 5,000 nodes
 take a fifth of a second, and 100 right-hand sides half of that.
-
-Each patch of a held surface that is released costs a dense solution of its size. The free components are eliminated
-once: with `h` the nodes of the surface and `f` what is free,
-
-    S = K_hh - K_hf K_ff^-1 K_fh
-
-is its stiffness. A patch moves by `-S^-1 R` along the wall, `R` its reactions; nodes that can lift off also leave the
-wall where they are under tension, by an active set (Wriggers, Computational Contact Mechanics, 2nd ed., section 5.3.1).
 """
 
 from __future__ import annotations
@@ -32,8 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpbrain.arrays import Bools, Floats, Ints
-from warpbrain.errors import SolveError
-from warpbrain.mesh import TetMesh, tangents, vertex_normals
+from warpbrain.mesh import TetMesh, vertex_normals
 from warpbrain.mesh.quality import extent
 from warpbrain.physics.mechanism import Mechanism
 from warpbrain.simulation.multisecant import toward_equilibrium
@@ -41,12 +32,9 @@ from warpbrain.simulation.system import System
 from warpbrain.threads import fill_columns, in_threads
 from warpbrain.worlds.body.creep import Creep, CreepFactors, Perturbation
 from warpbrain.worlds.body.factors import Factors
+from warpbrain.worlds.body.held_surface import HeldSurface
 from warpbrain.worlds.body.sensors import Sensors
 
-#: Changes of the active set at most.
-_CHANGES = 20
-#: Displacement, relative to the size of the body, above which too little holds it for a linear solution.
-_FARTHEST = 0.2
 #: Growth by which the derivative of the forces of growing tissue is taken.
 _GROWTH = 1e-4
 #: Columns that one thread computes at a time at most: of dense forces, of which products with fewer spend most of their
@@ -54,109 +42,6 @@ _GROWTH = 1e-4
 _TOGETHER, _TOGETHER_SPARSE, _PARTS = 256, 128, 16
 #: Part of sparse forces that is not zero above which a dense product is faster.
 _DENSE = 0.1
-
-
-class HeldSurface:
-    """A set of held nodes at a state.
-
-    `at`: about that. `members` (N,): nodes, all of whose components are held. `normals` (N, 3): outward. `size`: of the
-    body [m].
-    """
-
-    def __init__(self, at: Linearisation, members: Bools, normals: Floats, size: float) -> None:
-        stiffness, free = at.stiffness, at.free
-        self.members = np.flatnonzero(members)
-        self._farthest = _FARTHEST * size
-        count = len(self.members)
-        components = np.repeat(members, 3)
-        coupling = stiffness[free][:, components].tocsc()
-        condensed = np.asarray(stiffness[components][:, components].todense())
-        condensed -= at.factors.solve(coupling, left=stiffness[components][:, free])
-        # beside a pressure that follows its surface it is not symmetric, and Cholesky's method reads one half of it,
-        # which is another one in other axes
-        condensed = 0.5 * (condensed + condensed.T)
-        self._coupling = coupling
-        # two tangents and the normal
-        tangent_vectors = tangents(normals[self.members])
-        self._frames = np.concatenate([tangent_vectors, normals[self.members][:, None]], axis=1)
-        rotated = np.einsum("aki,aibj,blj->akbl", self._frames, condensed.reshape(count, 3, count, 3), self._frames)
-        self._S = rotated.reshape(3 * count, 3 * count)
-        self._R = np.einsum("aki,ai->ak", self._frames, at.reactions[self.members])
-        self._released: dict[tuple[bytes, bool], Floats] = {}
-
-    def with_further(self, reactions: Floats) -> HeldSurface:
-        """The same with further reactions (N, 3) [N]."""
-        other = copy.copy(self)
-        other._R = self._R + np.einsum("aki,ai->ak", self._frames, reactions[self.members])
-        other._released = {}
-        return other
-
-    def answers(self, at: Linearisation) -> Floats:
-        """What the sensors of the same state record where each component of `moved` is 1 m: (n, 3 m)."""
-        sensors, free = at.sensors, at.free
-        components = (3 * self.members[:, None] + np.arange(3)).ravel()
-        held = sensors.by_reactions[:, ~free] @ at.stiffness[~free][:, components]
-        direct = np.asarray((sensors.by_displacement[:, components] + held).todense())
-        rows, which = at._rows
-        direct -= (self._coupling.T @ rows.T[free]).T[which]
-        along = np.einsum("naj,akj->nak", direct.reshape(len(direct), -1, 3), self._frames)
-        return np.asarray(along).reshape(direct.shape)
-
-    def moved(self, patch: Bools, lifts: bool) -> Floats:
-        """Displacement (3 m,) [m] of its nodes, along two tangents and the normal of each, where a patch lets go.
-
-        `patch` (N,). `SolveError` if too little holds the body without the patch.
-        """
-        members = patch[self.members]
-        key = members.tobytes(), lifts
-        if key not in self._released:
-            self._released[key] = self._release(members, lifts)
-        return self._released[key]
-
-    def _release(self, members: Bools, lifts: bool) -> Floats:
-        """Displacement (3 m,) of the nodes where some (m,) let go, their motion along the wall eliminated first."""
-        from scipy.linalg import cho_factor, cho_solve
-
-        count = int(members.sum())
-        nodes = 3 * np.flatnonzero(members)
-        along, normal = np.sort(np.concatenate([nodes, nodes + 1])), nodes + 2
-        coupling, R = self._S[np.ix_(normal, along)], self._R.ravel()
-        displacement = np.zeros(len(R))
-        try:
-            factor = cho_factor(self._S[np.ix_(along, along)], check_finite=False)
-            sliding = -cho_solve(factor, R[along], check_finite=False)
-            displacement[along] = sliding
-            if lifts:
-                by_normal = cho_solve(factor, coupling.T, check_finite=False)
-                stiffness = self._S[np.ix_(normal, normal)] - coupling @ by_normal
-                lifted = self._lifted(stiffness, R[normal] + coupling @ sliding, R[normal] > 0.0)
-                displacement[normal], displacement[along] = lifted, sliding - by_normal @ lifted
-        except np.linalg.LinAlgError:
-            displacement[normal] = np.inf
-        if not np.linalg.norm(displacement.reshape(-1, 3), axis=1).max() < self._farthest:
-            raise SolveError(f"letting go of {count} nodes: no equilibrium is near")
-        return displacement
-
-    @staticmethod
-    def _lifted(S: Floats, R: Floats, off: Bools) -> Floats:
-        """Displacement (k,) along the normals of nodes that leave the wall where they are under tension.
-
-        `S` (k, k): stiffness of their motion along the normals, that along the wall eliminated. `R` (k,): reactions
-        along the normals. `off` (k,): those that are off at first.
-        """
-        from scipy.linalg import cho_factor, cho_solve
-
-        for _ in range(_CHANGES):
-            lifted = np.zeros(len(R))
-            if off.any():
-                factor = cho_factor(S[np.ix_(off, off)], check_finite=False)
-                lifted[off] = -cho_solve(factor, R[off], check_finite=False)
-            under_tension = R + S @ lifted > 0.0
-            changed = np.where(off, lifted < 0.0, under_tension)
-            if np.array_equal(changed, off):
-                break
-            off = changed
-        return lifted
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -335,10 +220,13 @@ class Linearisation:
         """A held surface, and the responses (n, 3 m) of the sensors to it, made once."""
         key = held.tobytes()
         if key not in self._surfaces:
-            self._surfaces[key] = HeldSurface(self, held, vertex_normals(self.system.model.mesh), self.extent)
+            normals = vertex_normals(self.system.model.mesh)
+            self._surfaces[key] = HeldSurface(
+                self.stiffness, self.free, self.factors, self.reactions, held, normals, self.extent
+            )
         if key not in self._surface_responses:
             # Fortran order: of each patch a few columns are used
-            self._surface_responses[key] = np.asfortranarray(self._surfaces[key].answers(self))
+            self._surface_responses[key] = np.asfortranarray(self._surfaces[key].answers(self.sensors, *self._rows))
         return self._surfaces[key], self._surface_responses[key]
 
     def answers(self, forces: Floats) -> Floats:

@@ -1,7 +1,5 @@
 """What lifts off a wall, against the conditions that a contact has to obey, on a matrix of chance."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
@@ -9,7 +7,7 @@ from scipy.stats import special_ortho_group
 
 from warpbrain.errors import SolveError
 from warpbrain.worlds.body.factors import Factors
-from warpbrain.worlds.body.linearisation import HeldSurface
+from warpbrain.worlds.body.held_surface import HeldSurface
 
 
 @pytest.fixture
@@ -27,9 +25,7 @@ def problem():
 
 def surface_of(K, normals, held, reactions, size=100.0) -> HeldSurface:
     free = ~np.repeat(held, 3)
-    factors = Factors(csr_matrix(K[free][:, free]))
-    at = SimpleNamespace(stiffness=csr_matrix(K), free=free, factors=factors, reactions=reactions)
-    return HeldSurface(at, held, normals, size)
+    return HeldSurface(csr_matrix(K), free, Factors(csr_matrix(K[free][:, free])), reactions, held, normals, size)
 
 
 def test_what_lifts_off_is_not_pulled_and_what_stays_is_not_drawn_in(problem):
