@@ -17,7 +17,7 @@ from warpbrain.mesh import TetMesh, write_mesh
 from warpbrain.physics.laws import MooneyRivlin, NeoHookean, Ogden
 from warpbrain.recordings.base import Registration
 from warpbrain.simulation.of_case import model_of
-from warpbrain.worlds.body.states import stiffness_modes
+from warpbrain.worlds.body.stiffness_field import stiffness_modes
 
 
 def refusal(folder, *changes, mesh: TetMesh | None = None) -> str:

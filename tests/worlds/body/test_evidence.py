@@ -12,7 +12,7 @@ from warpbrain.inference.marginal import RowsAtScales
 from warpbrain.worlds.body.base import Base
 from warpbrain.worlds.body.evidence import Sizes, evidence_of, sizes_of
 from warpbrain.worlds.body.nuisances import FIELD, UNKNOWN_MESH, Nuisances
-from warpbrain.worlds.body.states import FieldSizes
+from warpbrain.worlds.body.stiffness_field import FieldSizes
 
 FIELD_SIZES = np.array([0.25, 0.5, 1.0, 2.0])
 LOG_PRIOR = np.log([0.1, 0.2, 0.6, 0.1])

@@ -28,7 +28,8 @@ from warpbrain.worlds.body.effects import Effect, Effects
 from warpbrain.worlds.body.linearisation import Linearisation, Moment
 from warpbrain.worlds.body.mesh_error import MeshErrors, expected_answer
 from warpbrain.worlds.body.sensors import Sensors, kernel_columns, row_products, spread_points
-from warpbrain.worlds.body.states import FieldSizes, Hypothesis, States
+from warpbrain.worlds.body.states import Hypothesis, States
+from warpbrain.worlds.body.stiffness_field import FieldSizes
 
 #: The family of what is not known of the shape of tissues' laws.
 LAW = "shape of the law"
