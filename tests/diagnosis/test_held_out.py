@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from warpbrain.diagnosis.checking import HeldOut, blocks_of, distance
+from warpbrain.diagnosis.checking import Confirming, HeldOut, blocks_of, distance
 from warpbrain.inference import GaussianModel
 from warpbrain.inference.predict import p_value, predict, predict_with
 
@@ -38,6 +38,15 @@ def model(columns: np.ndarray) -> GaussianModel:
 def test_a_point_lies_in_one_block(local: bool) -> None:
     blocks = blocks_of(sensors(), local)
     assert all(len(set(blocks[3 * k : 3 * k + 3].tolist())) == 1 for k in range(10))
+
+
+@pytest.mark.parametrize(("centres", "local"), [((), False), ((None,), False), ((0.0,), True), ((None, 0.0), True)])
+def test_blocks_are_scattered_where_something_local_acts(centres: tuple[float | None, ...], local: bool) -> None:
+    """Nobody can tell from other regions what one local cause does, whatever acts beside it."""
+    effects = tuple(SimpleNamespace(proposed=SimpleNamespace(centre=centre)) for centre in centres)
+    checks = SimpleNamespace(_held_out={True: "scattered", False: "regions"})
+    blocks = Confirming.held_out_for(checks, SimpleNamespace(effects=effects))
+    assert blocks == ("scattered" if local else "regions")
 
 
 def test_a_block_is_as_probable_as_a_normal_distribution_says() -> None:

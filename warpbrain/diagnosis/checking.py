@@ -1,7 +1,7 @@
 """Checks of sets of causes: p-values, cross-validation by blocks of rows against patterns, and unseen recordings.
 
 Blocks do not depend on any fit; each is predicted from all others by conditioning the same model. Blocks are regions.
-The effect of a local cause cannot be predicted from other regions, so for that blocks are scattered points. Random
+What a local cause does cannot be predicted from other regions: where one acts, blocks are scattered points. Random
 patterns in the place of mechanisms say what chance predicts. To recordings with role `check` nothing is fitted: each is
 compared at its time.
 """
@@ -64,7 +64,7 @@ def distance(sensors: Sensors, errors: Floats) -> float:
 
 
 class HeldOut:
-    """Blocks of the rows of one case, each predicted from the others. `local`: whether all that acts is local."""
+    """Blocks of the rows of one case, each predicted from the others. `local`: whether something that acts is."""
 
     def __init__(self, sensors: Sensors, local: bool) -> None:
         self.sensors, self.blocks = sensors, blocks_of(sensors, local)
@@ -152,11 +152,8 @@ class Confirming:
         return predictive_p(model, fields, sizes, residual, self._draws, self._random, logs, levels, bound)
 
     def held_out_for(self, weighted_set: WeightedSet) -> HeldOut:
-        """Held-out blocks for a set: scattered points if all its effects are local, else regions."""
-        local = bool(weighted_set.effects) and all(
-            effect.proposed.centre is not None for effect in weighted_set.effects
-        )
-        return self._held_out[local]
+        """Held-out blocks for a set: scattered points if any of its effects is local, else regions."""
+        return self._held_out[any(effect.proposed.centre is not None for effect in weighted_set.effects)]
 
     def predict(self, weighted_set: WeightedSet, held_out: HeldOut) -> Prediction:
         """Held-out rows predicted with a set."""
