@@ -61,9 +61,14 @@ def linear(model: Model) -> Linearisation:
     return Linearisation(system, u, reactions, tracked_points(model.mesh, points, points.mean(axis=0)))
 
 
+def in_all_components(held: Bools) -> Bools:
+    """Of nodes (N,): (N, 3)."""
+    return np.repeat(held[:, None], 3, axis=1)
+
+
 def moved_by(model: Model, held: Bools, motion: tuple[float, ...]) -> Model:
     """The same with these nodes (N,) moved [m], and no other held."""
-    constrained = np.repeat(held[:, None], 3, axis=1)
+    constrained = in_all_components(held)
     return replace(model, constrained=constrained, prescribed=constrained * np.array(motion))
 
 
@@ -75,26 +80,31 @@ def change_of(at: Linearisation, other: Model, forces: Floats | None = None) -> 
 def test_the_border_of_what_is_held_lies_within_a_face(case: Case) -> None:
     mesh, x = case.mesh, case.mesh.points[:, 0]
     foot = mesh.node_sets["foot"]
-    ends, beside, means = border_of(mesh, mesh.node_sets["half"])
-    np.testing.assert_array_equal(ends, np.flatnonzero(foot & (np.abs(x - 0.5 * SIDE) < 1e-9)))
-    assert foot[beside].all()
-    np.testing.assert_allclose(x[beside], SIDE * (0.5 + 1.0 / CELLS[0]))
-    np.testing.assert_allclose(means @ x, 0.5 * SIDE)
+    border = border_of(mesh, in_all_components(mesh.node_sets["half"]))
+    np.testing.assert_array_equal(border.held, np.flatnonzero(foot & (np.abs(x - 0.5 * SIDE) < 1e-9)))
+    assert foot[border.free].all()
+    np.testing.assert_allclose(x[border.free], SIDE * (0.5 + 1.0 / CELLS[0]))
+    np.testing.assert_allclose(border.mean_of_held @ x, 0.5 * SIDE)
+    # what slides along a plane is neither held nor free
+    sliding = in_all_components(mesh.node_sets["half"])
+    sliding[border.free[0], 0] = True
+    np.testing.assert_array_equal(border_of(mesh, sliding).free, border.free[1:])
 
 
 def test_what_is_held_up_to_the_edges_of_a_body_ends_there(case: Case) -> None:
-    ends, beside, _ = border_of(case.mesh, case.mesh.node_sets["foot"])
-    assert not len(ends) and not len(beside)
+    border = border_of(case.mesh, in_all_components(case.mesh.node_sets["foot"]))
+    assert not len(border.held) and not len(border.free)
 
 
 @pytest.mark.parametrize("moved", [(0.0, 0.0, 0.0), (2e-7, 0.0, -1e-7)])
-def test_nodes_are_let_go_and_held_as_in_an_equilibrium(moved: tuple[float, ...], model: Model) -> None:
+def test_nodes_are_released_and_held_as_in_an_equilibrium(moved: tuple[float, ...], model: Model) -> None:
     held = model.constrained.all(axis=1)
     at = linear(moved_by(model, held, moved))
-    ends, beside, _ = border_of(model.mesh, held)
+    border = border_of(model.mesh, model.constrained)
+    count = len(border.held)
     found = boundary_columns(at) / belief("mesh.held_edge")
-    for number in (0, len(ends) // 2, len(ends), len(ends) + len(beside) // 2):
-        other, node = held.copy(), [*ends, *beside][number]
+    for number in (0, count // 2, count, count + len(border.free) // 2):
+        other, node = held.copy(), [*border.held, *border.free][number]
         other[node] = ~other[node]
         expected = change_of(at, moved_by(model, other, moved))
         np.testing.assert_allclose(found[:, number], expected, atol=2e-3 * np.abs(expected).max())

@@ -1,8 +1,8 @@
 """Nuisances of declared boundaries: where what is held ends, and how the nodes of a set share a force.
 
 A node set says where a boundary ends to half an element at best. What is held may end anywhere along the edges from
-its last nodes to the next ones that are free: each of the former may be let go in part, and each of the latter be held
-in part. Where the body itself has an edge there, as a cylinder between plates has, the border is known.
+its last nodes to the next ones that are free: each of the former may be released in part, each of the latter held in
+part. Where the body itself has an edge there, as a cylinder between plates has, the border is known.
 
 The nodes of a set share a force evenly by definition. A body has no nodes: of a force that is spread over an area each
 has a part in proportion to the area around it, which is half as large again or half as large.
@@ -23,44 +23,43 @@ from warpbrain.worlds.body.linearisation import Linearisation, Moment
 class Border(NamedTuple):
     """The line on the surface of a body where what is held ends, but for where that is an edge of the body."""
 
-    ends: Ints  # held nodes on it
-    beside: Ints  # (b,), free nodes of the triangles that it runs through
-    means: Any  # SciPy CSR (b, N): takes the mean of the held nodes of these triangles
+    held: Ints  # nodes on it
+    free: Ints  # (b,), nodes of the triangles that it runs through
+    mean_of_held: Any  # SciPy CSR (b, N): of the held nodes of the triangles of each
 
 
-def border_of(mesh: TetMesh, held: Bools) -> Border:
-    """Of nodes (N,) of a mesh that are held."""
+def border_of(mesh: TetMesh, constrained: Bools) -> Border:
+    """Of what is held of a mesh: nodes all of whose components (N, 3) are constrained; free ones have none that is."""
     from scipy.sparse import csr_matrix
 
+    held: Bools = np.all(constrained, axis=1)
+    movable: Bools = ~np.any(constrained, axis=1)
     faces, members = mesh.boundary, held[mesh.boundary]
     areas = face_vectors(mesh.points, faces)
     inside: Bools = np.all(members, axis=1)
     normals = np.zeros((len(held), 3))
-    for corner in range(3):
-        np.add.at(normals, faces[inside, corner], areas[inside])
+    for corners in faces[inside].T:
+        np.add.at(normals, corners, areas[inside])
     sizes = np.linalg.norm(areas, axis=1)[:, None] * np.linalg.norm(normals[faces], axis=2)
     # a node that is held without a triangle around it has no normal, and what is held ends there
     flat = np.einsum("ki,kci->kc", areas, normals[faces]) >= np.cos(belief("mesh.body_edge")) * sizes
-    ends = members & flat & ~inside[:, None]
-    across = ends.any(axis=1)
-    triangle, free = np.nonzero(~members & across[:, None])
-    beside, number = np.unique(faces[triangle, free], return_inverse=True)
-    weights = ends[triangle] / np.bincount(number, ends[triangle].sum(axis=1))[number, None]
+    at_border = members & flat & ~inside[:, None]
+    triangle, corner = np.nonzero(movable[faces] & at_border.any(axis=1)[:, None])
+    free, number = np.unique(faces[triangle, corner], return_inverse=True)
+    weights = at_border[triangle] / np.bincount(number, at_border[triangle].sum(axis=1))[number, None]
     rows, columns = np.repeat(number, 3), faces[triangle].ravel()
-    means = csr_matrix((weights.ravel(), (rows, columns)), (len(beside), len(held)))
-    return Border(np.unique(faces[ends]).astype(np.int64), beside.astype(np.int64), means)
+    mean_of_held = csr_matrix((weights.ravel(), (rows, columns)), (len(free), len(held)))
+    return Border(np.unique(faces[at_border]).astype(np.int64), free.astype(np.int64), mean_of_held)
 
 
 def boundary_columns(at: Linearisation) -> Floats:
     """One standard deviation of each: (n, k), k = 0 where nothing is held and no force shared by nodes."""
-    model = at.system.model
-    held: Bools = np.all(model.constrained, axis=1)
-    border = border_of(model.mesh, held)
+    border = border_of(at.system.model.mesh, at.system.model.constrained)
 
     def edges(moment: Moment) -> Floats:
-        return np.hstack([_let_go(moment.at, border.ends), _held(moment.at, border)])
+        return np.hstack([_released(moment.at, border.held), _restrained(moment.at, border)])
 
-    return np.hstack([belief("mesh.held_edge") * at.summed(edges, "stiffness"), at.summed(_shares, "loads")])
+    return np.hstack([belief("mesh.held_edge") * at.summed(edges, "stiffness"), at.summed(_force_shares, "loads")])
 
 
 def visible_modes(columns: Floats) -> Floats:
@@ -70,42 +69,42 @@ def visible_modes(columns: Floats) -> Floats:
     return np.asarray(modes[left > belief("unknown.cut") * left[:1].sum()].T)
 
 
-def _let_go(at: Linearisation, nodes: Ints) -> Floats:
-    """Response (n, k) where each of some held nodes (k,) is let go, and the others are not."""
+def _released(at: Linearisation, nodes: Ints) -> Floats:
+    """Response (n, k) where each of some held nodes (k,) is released, and the others are not."""
     components, sensors, free = _components(nodes), at.sensors, at.free
     coupling = at.stiffness[free][:, components].tocsc()
     condensed = at.stiffness[components][:, components].toarray() - at.factors.solve(coupling, left=coupling.T)
-    moved = _each(nodes, -_solved(condensed, at.reactions[nodes]), len(at.u))
+    moved = _nodal_vectors(nodes, -_block_solutions(condensed, at.reactions[nodes]), len(at.u))
     forces = at.stiffness @ moved
     direct = sensors.by_displacement @ moved + sensors.by_reactions @ forces
     forces = -forces.multiply(free[:, None]).tocsc()
     return np.asarray(direct.toarray() + at.answers_of_columns(forces))
 
 
-def _held(at: Linearisation, border: Border) -> Floats:
-    """Response (n, b) where each of the free nodes beside a border moves as what is held there."""
+def _restrained(at: Linearisation, border: Border) -> Floats:
+    """Response (n, b) where each of the free nodes at a border moves as what is held there."""
     from scipy.sparse import csc_matrix
 
-    nodes, number = border.beside, np.cumsum(at.free) - 1
+    nodes, number = border.free, np.cumsum(at.free) - 1
     rows, count = number[_components(nodes)], 3 * len(nodes)
     unit = csc_matrix((np.ones(count), (rows, np.arange(count))), (int(at.free.sum()), count))
     compliance = at.factors.solve(unit, left=unit.T)
-    forces = -_solved(compliance, at.u[nodes] - border.means @ at.u)
-    return at.answers_of_columns(_each(nodes, forces, len(at.u)))
+    forces = -_block_solutions(compliance, at.u[nodes] - border.mean_of_held @ at.u)
+    return at.answers_of_columns(_nodal_vectors(nodes, forces, len(at.u)))
 
 
 def _components(nodes: Ints) -> Ints:
     return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())
 
 
-def _solved(matrix: Floats, right: Floats) -> Floats:
+def _block_solutions(matrix: Floats, right: Floats) -> Floats:
     """Solution (k, 3) of each block on the diagonal of a matrix (3 k, 3 k) for the right-hand sides (k, 3)."""
     count, each = len(right), np.arange(len(right))
     blocks = matrix.reshape(count, 3, count, 3)[each, :, each]
     return np.asarray(np.linalg.solve(blocks, right[:, :, None])[:, :, 0])
 
 
-def _each(nodes: Ints, values: Floats, count: int) -> Any:
+def _nodal_vectors(nodes: Ints, values: Floats, count: int) -> Any:
     """Vectors (k, 3) of nodes (k,) as a column each, SciPy CSC (3 count, k)."""
     from scipy.sparse import csc_matrix
 
@@ -113,7 +112,7 @@ def _each(nodes: Ints, values: Floats, count: int) -> Any:
     return csc_matrix((values.ravel(), (_components(nodes), columns)), (3 * count, len(nodes)))
 
 
-def _shares(moment: Moment) -> Floats:
+def _force_shares(moment: Moment) -> Floats:
     """Response (n, k) where each node takes more of the force of its set, and all of them as much less."""
     at, model = moment.at, moment.at.system.model
     answers = [np.zeros((len(at.sensors), 0))]
@@ -121,6 +120,6 @@ def _shares(moment: Moment) -> Floats:
         if isinstance(load, NodalForce):
             nodes = np.flatnonzero(model.mesh.node_sets[load.nodes])
             each = belief("loads.share") * load.factor(moment.time) * np.asarray(load.total) / len(nodes)
-            answer = at.answers_of_columns(_each(nodes, np.tile(each, (len(nodes), 1)), len(at.u)))
+            answer = at.answers_of_columns(_nodal_vectors(nodes, np.tile(each, (len(nodes), 1)), len(at.u)))
             answers.append(answer - answer.mean(axis=1, keepdims=True))
     return np.hstack(answers)
