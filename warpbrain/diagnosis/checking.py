@@ -64,7 +64,7 @@ def distance(sensors: Sensors, errors: Floats) -> float:
 
 
 class HeldOut:
-    """Blocks of the rows of one case, each predicted from the others. `local`: whether something that acts is."""
+    """Blocks of the rows of one case, each predicted from the others. `local`: whether a local cause acts."""
 
     def __init__(self, sensors: Sensors, local: bool) -> None:
         self.sensors, self.blocks = sensors, blocks_of(sensors, local)

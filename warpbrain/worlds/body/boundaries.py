@@ -5,7 +5,7 @@ its last nodes to the next ones that are free: each of the former may be release
 part. Where the body itself has an edge there, as a cylinder between plates has, the border is known.
 
 The nodes of a set share a force evenly by definition. A body has no nodes: of a force that is spread over an area each
-has a part in proportion to the area around it, which is half as large again or half as large.
+has a part in proportion to the area around it, whose standard deviation is half of its mean.
 """
 
 from typing import Any, NamedTuple
@@ -15,9 +15,9 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.surface import face_vectors
+from warpbrain.mesh.surface import face_vectors, node_vectors
 from warpbrain.physics.load import NodalForce
-from warpbrain.worlds.body.linearisation import Linearisation, Moment
+from warpbrain.worlds.body.linearisation import Linearisation, Moment, gathered
 
 
 class Border(NamedTuple):
@@ -29,17 +29,14 @@ class Border(NamedTuple):
 
 
 def border_of(mesh: TetMesh, constrained: Bools) -> Border:
-    """Of what is held of a mesh: nodes all of whose components (N, 3) are constrained; free ones have none that is."""
+    """The border of the held nodes of a mesh, all of whose components (N, 3) are constrained; of free ones none is."""
     from scipy.sparse import csr_matrix
 
     held: Bools = np.all(constrained, axis=1)
     movable: Bools = ~np.any(constrained, axis=1)
     faces, members = mesh.boundary, held[mesh.boundary]
-    areas = face_vectors(mesh.points, faces)
     inside: Bools = np.all(members, axis=1)
-    normals = np.zeros((len(held), 3))
-    for corners in faces[inside].T:
-        np.add.at(normals, corners, areas[inside])
+    areas, normals = face_vectors(mesh.points, faces), node_vectors(mesh.points, faces[inside])
     sizes = np.linalg.norm(areas, axis=1)[:, None] * np.linalg.norm(normals[faces], axis=2)
     # a node that is held without a triangle around it has no normal, and what is held ends there
     flat = np.einsum("ki,kci->kc", areas, normals[faces]) >= np.cos(belief("mesh.body_edge")) * sizes
@@ -53,7 +50,10 @@ def border_of(mesh: TetMesh, constrained: Bools) -> Border:
 
 
 def boundary_columns(at: Linearisation) -> Floats:
-    """One standard deviation of each: (n, k), k = 0 where nothing is held and no force shared by nodes."""
+    """Change (n, k) of what is recorded [m], [N] by one standard deviation of each node's part in a boundary.
+
+    Held nodes of the border, free ones, and nodes that share a force; k = 0 if there are none.
+    """
     border = border_of(at.system.model.mesh, at.system.model.constrained)
 
     def edges(moment: Moment) -> Floats:
@@ -63,7 +63,7 @@ def boundary_columns(at: Linearisation) -> Floats:
 
 
 def visible_modes(columns: Floats) -> Floats:
-    """Combinations (b, k) of columns (n, b) that hold all of their variance but for `unknown.cut`."""
+    """Orthonormal combinations (b, k) of columns (n, b) that have all of their variance but the part `unknown.cut`."""
     _, sizes, modes = np.linalg.svd(columns, full_matrices=False)
     left = np.cumsum(sizes[::-1] ** 2)[::-1]
     return np.asarray(modes[left > belief("unknown.cut") * left[:1].sum()].T)
@@ -82,18 +82,18 @@ def _released(at: Linearisation, nodes: Ints) -> Floats:
 
 
 def _restrained(at: Linearisation, border: Border) -> Floats:
-    """Response (n, b) where each of the free nodes at a border moves as what is held there."""
-    from scipy.sparse import csc_matrix
+    """Response (n, b) where each of the free nodes at a border moves as the held ones there do on average."""
+    from scipy.sparse import eye
 
     nodes, number = border.free, np.cumsum(at.free) - 1
-    rows, count = number[_components(nodes)], 3 * len(nodes)
-    unit = csc_matrix((np.ones(count), (rows, np.arange(count))), (int(at.free.sum()), count))
+    unit = eye(number[-1] + 1, format="csc")[:, number[_components(nodes)]]
     compliance = at.factors.solve(unit, left=unit.T)
     forces = -_block_solutions(compliance, at.u[nodes] - border.mean_of_held @ at.u)
     return at.answers_of_columns(_nodal_vectors(nodes, forces, len(at.u)))
 
 
 def _components(nodes: Ints) -> Ints:
+    """Numbers (3 k,) of the components of nodes (k,)."""
     return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())
 
 
@@ -105,11 +105,9 @@ def _block_solutions(matrix: Floats, right: Floats) -> Floats:
 
 
 def _nodal_vectors(nodes: Ints, values: Floats, count: int) -> Any:
-    """Vectors (k, 3) of nodes (k,) as a column each, SciPy CSC (3 count, k)."""
-    from scipy.sparse import csc_matrix
-
-    columns = np.repeat(np.arange(len(nodes)), 3)
-    return csc_matrix((values.ravel(), (_components(nodes), columns)), (3 * count, len(nodes)))
+    """A column for the vector (k, 3) at each of some nodes (k,) of a body with `count` nodes, SciPy CSC (3 N, k)."""
+    columns = np.arange(len(nodes))
+    return gathered(nodes[:, None], values[:, None], columns, (count, len(nodes))).tocsc()
 
 
 def _force_shares(moment: Moment) -> Floats:

@@ -39,7 +39,7 @@ _ALWAYS = ("tissue.volume", "tissue.exponent")
 FIELD = "stiffness field"
 #: The family of what is not known of the case's loads.
 LOADS = "known loads"
-#: The family of what is not known of where loads and what is held end.
+#: The family of what is not known of where supports end, and of how nodes share a load.
 BOUNDARIES = "boundaries"
 #: The family of what is not known of the mesh's error, and that of mechanisms' shares of it, which only fits have.
 UNKNOWN_MESH, MESH_SHARE = "mesh, unknown", "mesh, of mechanisms"
