@@ -44,8 +44,9 @@ _NEAR = 0.1
 _KEPT = 9
 #: Steps that are expected to gain less of the log posterior density than this end the search (half the square of
 #: Newton's decrement, Boyd and Vandenberghe 2004, section 9.5.1); the same as long as laws, error of the mesh and noise
-#: are those of another point.
-ENOUGH, ROUGHLY = 0.02, 1.0
+#: are those of another point. Of 94 fits of 14 cases of run 43 the log evidence where 0.1 was left is that where 0.02
+#: was to 0.13 (RMS; 0.69 at most).
+ENOUGH, ROUGHLY = 0.1, 1.0
 #: Part of the expected gain of a step; where less is gained, columns that were made about another point are made anew.
 _AGREES = 0.5
 #: By how much an error of the mesh changes that is worth going on [standard deviations: of the noise, all sensors
@@ -53,8 +54,8 @@ _AGREES = 0.5
 _MATTERS = 0.3
 #: Change of the columns of laws that is none [standard deviations of the noise, all sensors together].
 _UNSEEN = 1e-3
-#: Gain that is expected of a step of which none comes, where that may be rounding.
-_ROUNDING = 0.1
+#: Gain of a step that may be rounding.
+_ROUNDING = 0.02
 
 
 class FitSearch:
@@ -222,9 +223,8 @@ class FitSearch:
             if not current and gained < _AGREES * gain:
                 # columns that were made elsewhere may point uphill
                 self._linearised_at = elsewhere
-            elif gained < ENOUGH:
-                # what is left is rounding, or no better point lies this way: the last good one stands
-                self.converged = gain < _ROUNDING
+            elif gained < _ROUNDING:
+                # no better point lies this way: the last good one stands
                 return
 
     def _moved(self) -> float:
