@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from gel import block_of_gel
 
-from warpbrain.arrays import Bools, Floats
+from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.cases.boundary import Fixed
 from warpbrain.cases.case import Case
 from warpbrain.inference.beliefs import belief
+from warpbrain.mesh.surface import node_areas
 from warpbrain.physics.load import NodalForce
 from warpbrain.simulation.equilibrium import EquilibriumOptions, EquilibriumSolver
 from warpbrain.simulation.model import Model
@@ -113,12 +114,25 @@ def test_nodes_are_released_and_held_as_in_an_equilibrium(moved: tuple[float, ..
 def test_a_force_is_shared_unevenly_and_as_large_as_before(at: Linearisation, model: Model) -> None:
     top = np.flatnonzero(model.mesh.node_sets["top"])
     found = boundary_columns(at)[:, -len(top) :] / belief("loads.share")
-    forces = np.zeros((len(at.u), 3))
-    forces[top] = -np.array(FORCE) / len(top) ** 2
-    forces[top[3]] += np.array(FORCE) / len(top)
-    expected = change_of(at, model, forces)
+    expected = change_of(at, model, shared(top, np.eye(len(top))[3] - 1.0 / len(top), len(at.u)))
     np.testing.assert_allclose(found[:, 3], expected, atol=2e-3 * np.abs(expected).max())
     np.testing.assert_allclose(found.sum(axis=1), 0.0, atol=1e-9 * np.abs(found).max())
+
+
+def test_a_force_is_shared_by_areas(at: Linearisation, model: Model) -> None:
+    top = np.flatnonzero(model.mesh.node_sets["top"])
+    areas = node_areas(model.mesh.points, model.mesh.boundary)[top]
+    assert areas.max() > 1.2 * areas.min()
+    found = boundary_columns(at)[:, -len(top) - 1] / belief("loads.by_area")
+    expected = change_of(at, model, shared(top, areas / areas.mean() - 1.0, len(at.u)))
+    np.testing.assert_allclose(found, expected, atol=2e-3 * np.abs(expected).max())
+
+
+def shared(nodes: Ints, more: Floats, count: int) -> Floats:
+    """Further forces (count, 3) [N] of nodes (k,) that take of the load by so much more (k,) than an even share."""
+    forces = np.zeros((count, 3))
+    forces[nodes] = more[:, None] * np.array(FORCE) / len(nodes)
+    return forces
 
 
 def test_modes_that_are_kept_hold_the_variance(at: Linearisation) -> None:

@@ -5,7 +5,8 @@ its last nodes to the next ones that are free: each of the former may be release
 part. Where the body itself has an edge there, as a cylinder between plates has, the border is known.
 
 The nodes of a set share a force evenly by definition. A body has no nodes: of a force that is spread over an area each
-has a part in proportion to the area around it, whose standard deviation is half of its mean.
+has a part in proportion to the area around it, which is known of this mesh, and whatever else another mesh of the same
+body would give it.
 """
 
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ import numpy as np
 from warpbrain.arrays import Bools, Floats, Ints
 from warpbrain.inference.beliefs import belief
 from warpbrain.mesh import TetMesh
-from warpbrain.mesh.surface import face_vectors, node_vectors
+from warpbrain.mesh.surface import face_vectors, node_areas, node_vectors
 from warpbrain.physics.load import NodalForce
 from warpbrain.worlds.body.linearisation import Linearisation, Moment, gathered
 
@@ -111,13 +112,19 @@ def _nodal_vectors(nodes: Ints, values: Floats, count: int) -> Any:
 
 
 def _force_shares(moment: Moment) -> Floats:
-    """Response (n, k) where each node takes more of the force of its set, and all of them as much less."""
+    """Response (n, k) where nodes share the force of their set by the area around each, and where each has more of it.
+
+    What one has more all of them have less.
+    """
     at, model = moment.at, moment.at.system.model
     answers = [np.zeros((len(at.sensors), 0))]
     for load in model.loads:
         if isinstance(load, NodalForce):
             nodes = np.flatnonzero(model.mesh.node_sets[load.nodes])
-            each = belief("loads.share") * load.factor(moment.time) * np.asarray(load.total) / len(nodes)
+            each = load.factor(moment.time) * np.asarray(load.total) / len(nodes)
             answer = at.answers_of_columns(_nodal_vectors(nodes, np.tile(each, (len(nodes), 1)), len(at.u)))
-            answers.append(answer - answer.mean(axis=1, keepdims=True))
+            answer -= answer.mean(axis=1, keepdims=True)
+            areas = node_areas(model.mesh.points, model.mesh.boundary)[nodes]
+            by_area = answer @ (areas / areas.mean() - 1.0) if areas.any() else np.zeros(len(answer))
+            answers += [belief("loads.by_area") * by_area[:, None], belief("loads.share") * answer]
     return np.hstack(answers)
