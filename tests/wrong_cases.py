@@ -51,7 +51,7 @@ WRONG = {
     ),
     "registration mm": (
         ('"RAS"', '"RAS"\nregistration = { mm = 0, degrees = 1.0 }'),
-        r"\[case\] registration: mm: found 0, expected a positive number \[mm\]",
+        r"\[case\] registration: mm: found 0, expected a number in the open interval \(0, 1000\) \[mm\]",
     ),
     "registration degrees": (
         ('"RAS"', '"RAS"\nregistration = { mm = 1, degrees = "one" }'),

@@ -23,7 +23,7 @@ SAID = {
     "nothing missing": "No missing physics is detected",
     "named": "held out",
     "group": "do not tell which",
-    "named + rest": "Something else is left",
+    "named + rest": "be left, which this does not explain",
     "unknown": "none of the known mechanisms explains",
     "not physics": "It is not physics that is missing",
     "cannot say": "cannot say what",
@@ -99,6 +99,7 @@ def test_every_verdict_is_said(verdict, data):
         group=() if several else kinds,
         ranking=ranking,
         p_value=data.draw(st.sampled_from([0.02, 1.0])) if verdict == "cannot say" else 0.02,
+        p_left=data.draw(st.sampled_from([None, 0.02, 0.5])),
         alpha=0.05,
         combinations=[
             SimpleNamespace(causes=(), kinds=(), probability=data.draw(chances)),
@@ -111,7 +112,8 @@ def test_every_verdict_is_said(verdict, data):
     )
     text = sentence_of(found)
     check(text)
-    assert SAID[verdict] in text
+    assert SAID[verdict].replace("be left", "is left" if found.p_left == 0.02 else "may be left") in text
+    assert ("contradict that" in text) == (verdict == "nothing missing")
     for kind in kinds[: 0 if verdict == "cannot say" else 1]:
         said = mechanisms()[kind].sentence if kind in mechanisms() else SENTENCES[kind]
         # within another sentence it begins with a small letter

@@ -32,9 +32,10 @@ def test_as_far_as_the_body_is_long_is_remarked_on_only(tmp_path):
     assert run(folder, "--out", tmp_path / "out").status == 0
 
 
-def test_a_noise_larger_than_the_body(tmp_path):
+@pytest.mark.parametrize(("sigma", "said"), [(9000.0, "9 m"), (1e-6, "1e-06 mm")])
+def test_a_noise_larger_than_the_body_or_finer_than_anything_measures(tmp_path, sigma, said):
     folder = write_recorded(tmp_path / "case", ("", ""))
     text = (folder / "case.toml").read_text()
-    (folder / "case.toml").write_text(text.replace("sigma = 0.1", "sigma = 9000.0"))
+    (folder / "case.toml").write_text(text.replace("sigma = 0.1", f"sigma = {sigma}"))
     [problem] = check_case(folder).problems
-    assert "beads.csv: sigma: a noise of 9 m in a body of 52 mm" in str(problem)
+    assert f"beads.csv: sigma: a noise of {said} in a body of 52 mm" in str(problem)

@@ -123,8 +123,7 @@ class Diagnosing:
             blocks = confirming.held_out_for(source or best)
             predictions = {name: confirming.predict(candidate, blocks) for name, candidate in weighted_sets.items()}
             fit = self._fit(confirming, weighted_sets, blocks, predictions, checked.confirmations)
-            ranking = Ranking(confirming)
-            ranked = ranking.all()
+            ranked = {cause.kind: cause for cause in Ranking(confirming).all(best)}
         confusing = beside(lambda: imitations(search.causes, nothing.marginal.model))
         with self.seconds.of("where"):
             where = map_of_search(search, options.draws, random, options.alpha)
@@ -142,7 +141,7 @@ class Diagnosing:
             seen = smallest(search.causes, nothing.marginal.model, confusion)
         self.listener.stage("what to measure next")
         with self.seconds.of("next measurement"):
-            measurements = _next(search, ranked)
+            measurements = _next(search, tuple(ranked.values()))
         return Diagnosis(
             case=self.case,
             decision=checked.decision,
@@ -151,8 +150,8 @@ class Diagnosing:
             p_value=p_value,
             alpha=options.alpha,
             p_left=checked.p_left,
-            named=ranking.named(best, named),
-            ranking=ranked,
+            named=tuple(ranked[name] for name in named),
+            ranking=tuple(ranked.values()),
             rejected=dict(search.candidates.rejected) | dict.fromkeys(search.invisible, _INVISIBLE),
             combinations=_combinations(search),
             map=where,

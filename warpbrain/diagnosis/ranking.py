@@ -24,18 +24,17 @@ class Ranking:
         self._search, self._confirming = confirming.search, confirming
         self._sets = list(zip(self._search.weighted_sets, self._search.probabilities.tolist(), strict=True))
 
-    def all(self) -> tuple[Ranked, ...]:
-        """Every cause as it is in the most probable set that has it, the most probable first."""
-        ranked = []
+    def all(self, of_verdict: WeightedSet) -> tuple[Ranked, ...]:
+        """Every cause as it is in the set of the verdict, else in the most probable one that has it.
+
+        The most probable first.
+        """
+        ranked, sets = [], (of_verdict, *(weighted_set for weighted_set, _ in self._sets))
         for cause in self._search.causes.causes:
-            best = next((weighted_set for weighted_set, _ in self._sets if cause.name in weighted_set.names), None)
+            best = next((weighted_set for weighted_set in sets if cause.name in weighted_set.names), None)
             if best is not None:
                 ranked.append(self._ranked(cause, best))
         return tuple(sorted(ranked, key=lambda cause: (-cause.probability, -cause.log_evidence)))
-
-    def named(self, weighted_set: WeightedSet, names: tuple[str, ...]) -> tuple[Ranked, ...]:
-        """Mechanisms as they are in one set."""
-        return tuple(self._ranked(self._search.causes.named(name), weighted_set) for name in names)
 
     def _ranked(self, cause: Cause, weighted_set: WeightedSet) -> Ranked:
         probability = sum(p for other, p in self._sets if cause.name in other.names)

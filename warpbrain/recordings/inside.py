@@ -28,6 +28,8 @@ _MISTAKES = (
 _DOT = 0.02
 #: Of the size of the mesh: a surface farther away than this is not a moved surface of it.
 _FAR = 0.25
+#: Of the extent of the mesh: no recording has less noise.
+_FINEST = 1e-6
 _FAR_MOVED = "are the units right, and are ux, uy, uz how far it went and not where?"
 #: Points that are enough to try it on.
 _SAMPLE = 1000
@@ -40,16 +42,19 @@ def check_possible(
     noises: Sequence[float | Floats | None],
     displacement: Floats | None = None,
 ) -> None:
-    """Note as a problem points that move (n, 3) [m] farther than the body is long, and noise [m] larger than it."""
+    """Note as problems points that move (n, 3) [m] farther than the body is long, and noise [m] that nothing has.
+
+    That is larger than the body, or less than a millionth of it.
+    """
     size = extent(mesh.points)
     moved = np.zeros(0) if displacement is None else np.linalg.norm(displacement, axis=1)
     with collected(path, problems) as of_file:
         for row in np.flatnonzero(moved > size):
             message = f"moves {_metres(float(moved[row]))} in a body of {_metres(size)}"
             of_file.add(path, f"point {row + 1}", message, _FAR_MOVED)
-        largest = max((float(np.max(noise)) for noise in noises if noise is not None), default=0.0)
-        if largest > size:
-            message = f"a noise of {_metres(largest)} in a body of {_metres(size)}"
+        declared = np.concatenate([np.zeros(0), *(np.ravel(noise) for noise in noises if noise is not None)])
+        for noise in np.unique(declared[(declared > size) | (declared < _FINEST * size)])[:1].tolist():
+            message = f"a noise of {_metres(noise)} in a body of {_metres(size)}"
             of_file.add(path, "sigma", message, "in units of the case, one standard deviation of one component")
 
 

@@ -136,11 +136,15 @@ def _without_doubts(diagnosis: Verdict, words: Words) -> str:
     verdict = decision.verdict
     if verdict == NOTHING:
         seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in diagnosis.smallest.items())
-        return f"No missing physics is detected ({p}). What {data} would have shown: {seen or words.nothing}."
+        poorly = (
+            ", although these data contradict that nothing is missing" if diagnosis.p_value <= diagnosis.alpha else ""
+        )
+        return f"No missing physics is detected{poorly} ({p}). What {data} would have shown: {seen or words.nothing}."
     if decision.named:
         first, *others = words.named
         sentences = [first, *(f"Beside it: {_lower(sentence)}" for sentence in others), words.grounds]
-        rest = f" Something else is left, which this does not explain.{words.rest}"
+        is_left = "is" if diagnosis.p_left is not None and diagnosis.p_left <= diagnosis.alpha else "may be"
+        rest = f" Something else {is_left} left, which this does not explain.{words.rest}"
         return f"{' '.join(sentences)}{rest if verdict == NAMED_AND_REST else ''}"
     if verdict == NOT_PHYSICS:
         errors = " ".join(sentence for sentence, _ in words.members)

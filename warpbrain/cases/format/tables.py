@@ -34,8 +34,16 @@ CASE = Table(
             "table",
             "How well recordings are registered to the anatomy (one sd); 1 degree, in a brain 1 mm, if absent.",
             keys=(
-                Key("mm", "number", "Of each component of the shift, whatever the units.", "mm", True, above=0.0),
-                Key("degrees", "number", "Of the turn about each axis.", "degrees", True, above=0.0),
+                Key(
+                    "mm",
+                    "number",
+                    "Of each component of the shift, whatever the units.",
+                    "mm",
+                    True,
+                    above=0.0,
+                    below=1e3,
+                ),
+                Key("degrees", "number", "Of the turn about each axis.", "degrees", True, above=0.0, below=360.0),
             ),
             hint="registration = { mm = 2.0, degrees = 1.0 }",
         ),

@@ -27,8 +27,10 @@ def shown_of(summary: Summary) -> dict[str, Any]:
     held, sets = summary["fit"][f"heldout_rmse_{suffix}"], summary.get("combinations", summary.get("hypotheses"))
     # that of a specimen is against nothing already
     nothing = summary.get("log_evidence_of_nothing", 0.0)
-    smallest = []
+    smallest, seen = [], {mechanism["mechanism"] for mechanism in summary["mechanisms"]}
     for kind, effect in summary["smallest_detectable"].items():
+        if kind in seen:
+            continue
         named = effect.get("named_from")
         # of what is there or not there is no size
         of_size = named is not None and effect["unit"] != "of being there"
@@ -44,7 +46,7 @@ def shown_of(summary: Summary) -> dict[str, Any]:
         "rejected": [[c["mechanism"], c["rejected_because"]] for c in summary["ranking"] if c["log_evidence"] is None],
         "fit": _fit_rows(summary),
         "held_out": [f"{factor * held[state]:.3g}" for state in ("refitted", "explained") if held[state] is not None],
-        # what these data would have shown of each mechanism, and from which size half would be named
+        # what these data would have shown of each mechanism that is not named, and from which size half would be named
         "smallest": smallest,
         "measurements": [[m["what"], f"{m['expected_nats']:.1f}"] for m in summary["next_measurement"]],
         "where": summary["where"] and _where_in_words(summary["where"]),
