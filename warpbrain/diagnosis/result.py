@@ -230,6 +230,10 @@ def assumptions_of(case: Case, base: Base, best: WeightedSet) -> tuple[str, ...]
         f"{len(sensors)} numbers were recorded; their noise is {best.marginal.scale:.2f} times what was declared or "
         "found, of which neighbours have a part in common."
     )
+    parameters, state = base.states.parameters, base.state if best.refit is None else best.refit.state
+    laws = zip(parameters.tissues, parameters.laws(state.hypothesis.theta), strict=True)
+    moduli = " and ".join(f"{law.shear_modulus:.4g} Pa of {tissue}" for tissue, law in laws)
+    assumptions.append(f"Tissue was fitted, too: shear modulus {moduli}.")
     gross = [int(sensors.groups[base.points[k][0]]) for k in np.flatnonzero(best.marginal.gross).tolist()]
     if gross:
         acting = " and ".join(best.mechanisms)
