@@ -45,7 +45,7 @@ def main() -> None:
         for name, made in ESTIMATES.items():
             shutil.copy(Path(folder) / made, FIGURES / name)
     for name, arguments in CASES.items():
-        _warpbrain("cases", "show", *arguments, "--out", str(FIGURES / name))
+        _warpbrain("cases", "show", *arguments, "--out", str(FIGURES / name), "--overwrite")
     record(COMMAND, [*RUNS, *ENSEMBLES, *ESTIMATES, *CASES])
     draw_generative_model()
 

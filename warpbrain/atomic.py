@@ -139,10 +139,12 @@ def safe_name(name: str) -> str:
     return re.sub(r"[^\w.-]+", "-", name)[:80] or "unnamed"
 
 
-def check_writable(path: Path) -> None:
-    """`InputError` if a file cannot be written there: to know it before long work, not after."""
+def check_writable(path: Path, overwrite: bool = True) -> None:
+    """`InputError` if a file cannot be written there, or must not: to know it before long work, not after."""
     if path.is_dir():
         raise InputError(f"{path}: cannot be written: there is a folder of that name")
+    if not overwrite and path.exists():
+        raise InputError(f"{path}: is there already: --overwrite replaces it")
     _check_folder(path.parent)
 
 

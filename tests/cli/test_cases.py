@@ -41,6 +41,10 @@ def test_show_refuses_a_place_it_cannot_write_to(tmp_path):
     assert done.status == 2
     assert done.out == ""
     assert "no such folder" in done.err
+    (tmp_path / "case.toml").write_text("kept")
+    done = warpbrain("cases", "show", "phantom", "--out", tmp_path / "case.toml")
+    assert done.status == 2 and "case.toml: is there already: --overwrite replaces it" in done.err
+    assert (tmp_path / "case.toml").read_text() == "kept"
 
 
 def test_check_of_a_good_folder(tmp_path):

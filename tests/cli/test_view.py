@@ -22,6 +22,8 @@ def result(tmp_path_factory):
 def test_a_page_of_a_result(result, tmp_path):
     ran = warpbrain("view", result, "--html", tmp_path / "view.html", "--exaggeration", "3")
     assert (ran.status, ran.out, ran.err) == (0, f"written: {tmp_path / 'view.html'}\n", "")
+    ran = warpbrain("view", result, "--html", tmp_path / "view.html")
+    assert ran.status == 2 and "view.html: is there already: --overwrite replaces it" in ran.err
     page = (tmp_path / "view.html").read_text(encoding="utf-8")
     assert not re.findall(r'(?:src|srcset|href)="(?!data:|#)', page) and '"exaggeration": 3.0' in page
     largest = 1000.0 * np.linalg.norm(read_state(result).u, axis=1).max()

@@ -41,6 +41,8 @@ def test_the_same_run_twice_differs_in_nothing(results):
 def test_another_tissue(results, tmp_path):
     ran = warpbrain("compare", results / "a", results / "softer", "--json", tmp_path / "c.json")
     assert (ran.status, ran.err) == (0, "")
+    again = warpbrain("compare", results / "a", results / "softer", "--json", tmp_path / "c.json")
+    assert again.status == 2 and "c.json: is there already" in again.err
     said = json.loads((tmp_path / "c.json").read_text())
     assert said["tissue"]["soft, shear modulus"] == {
         "unit": "Pa",

@@ -36,7 +36,7 @@ def show(options: argparse.Namespace) -> None:
 
     case = find_case(options.name, options.tissue)
     path = options.out or Path(f"warpbrain-{safe_name(case.name)}-{options.tissue}.png")
-    check_writable(path.absolute())
+    check_writable(path.absolute(), options.overwrite)
     print(*show_lines(case), sep="\n")
     missing = write_case_picture(path.absolute(), case)
     print(f"\nwritten: {path}" + (f", without the body from outside: {missing}" if missing else ""))

@@ -110,7 +110,7 @@ def sample(options: argparse.Namespace) -> None:
         raise InputError(f"--group {' '.join(options.group)}: a group is given twice")
 
     if options.csv is not None:
-        check_writable(options.csv.absolute())
+        check_writable(options.csv.absolute(), options.overwrite)
     model = _chosen_model(options)
     if options.sweep is None:
         draws, seed = [], options.seed or 0

@@ -17,7 +17,7 @@ def view(options: argparse.Namespace) -> None:
     # windows that are not those of X11 or Wayland can always be opened
     has_display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if options.html is not None:
-        check_writable(options.html)
+        check_writable(options.html, options.overwrite)
     elif not has_display:
         raise InputError("view: there is no display here: --html FILE writes a page that any browser shows")
     state = read_state(options.result)
@@ -31,7 +31,7 @@ def view(options: argparse.Namespace) -> None:
 def compare(options: argparse.Namespace) -> None:
     """Say what differs between two folders of results."""
     if options.json is not None:
-        check_writable(options.json.absolute())
+        check_writable(options.json.absolute(), options.overwrite)
     first, second = read_result(options.first), read_result(options.second)
     try:
         comparison = describe_two(first, second)
