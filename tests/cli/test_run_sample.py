@@ -1,5 +1,6 @@
 """`warpbrain run` with laws of the generative model: `--sample`, `--seed`, `--gp` and `mu = "prior"`."""
 
+import hashlib
 import json
 import re
 
@@ -8,7 +9,7 @@ from command import run
 from folders import write_folder
 
 from warpbrain.gp.sampling import draw_laws, law_of_curve
-from warpbrain.gp.trained import trained
+from warpbrain.gp.trained import trained, write_model
 
 GREY, WHITE, BRAIN = (f"hyperelastic/{anatomy}" for anatomy in ("grey matter", "white matter", "brain"))
 SOFT = ("mu = 1000.0", f'mu = 1000.0\nprior = "{GREY}"')
@@ -61,6 +62,19 @@ def test_seed_and_model_choose_another_draw(folder, tmp_path):
         said = summary(tmp_path / "out")
         moduli.add(said["case"]["tissues"]["1"]["shear_modulus_Pa"])
     assert said["prior"]["model"] == "coregionalised" and len(moduli) == 3
+
+
+def test_a_model_of_the_users_is_an_input(folder, tmp_path):
+    model = tmp_path / "mine"
+    model.mkdir()
+    write_model(model, trained(), {})
+    done = run(folder, "--sample", "0", "--gp", model, "--out", tmp_path / "out")
+    assert done.status == 0, done.err
+    assert f"by the generative model hierarchical (corrected) of {model};" in done.out
+    said = summary(tmp_path / "out")
+    digest = hashlib.sha256((model / "model.json").read_bytes()).hexdigest()
+    assert said["prior"]["folder"] == str(model)
+    assert said["inputs_sha256"]["generative model, model.json"] == digest
 
 
 def test_a_draw_that_was_redrawn_says_why(folder, tmp_path):

@@ -16,6 +16,7 @@ from warpbrain.ensemble.sample import Sample
 from warpbrain.ensemble.store import Store, discard
 from warpbrain.ensemble.workers import Job, Workers
 from warpbrain.errors import InputError, SolveError
+from warpbrain.gp.process import Process
 from warpbrain.gp.trained import find_model
 from warpbrain.report import ensemble as report
 from warpbrain.report import summary as tables
@@ -46,7 +47,8 @@ def ensemble(options: argparse.Namespace) -> None:
         case = case.with_law(options.model)
     if options.poisson is not None:
         case = replace(case, poisson=options.poisson)
-    samples, chosen = _samples(options, case)
+    process = _process(options)
+    samples, chosen = _samples(options, case, process)
     model = model_of(case)
     job = Job(model, tuple(samples), steps=options.steps, tolerance=options.tolerance, precision=options.precision)
     described = tables.describe_case(case, model)
@@ -80,7 +82,7 @@ def ensemble(options: argparse.Namespace) -> None:
     say("", *report.ensemble_lines(result_summary))
     summary = {
         "case": described,
-        "inputs_sha256": fingerprints(case),
+        "inputs_sha256": fingerprints(case, process),
         "chosen": chosen,
         "course": course,
         "precision": options.precision,
@@ -116,13 +118,18 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError(f"--batch {options.batch}: expected auto or a whole number of at least 1")
 
 
-def _samples(options: argparse.Namespace, case: Case) -> tuple[list[Sample], str]:
-    """The samples, and in words how they were chosen."""
+def _process(options: argparse.Namespace) -> Process:
+    """The generative model of the samples."""
     if options.grid and options.gp is None:
-        process = find_model("coregionalised", "as_published")
-    else:
-        process = find_model(options.gp or "hierarchical")
+        return find_model("coregionalised", "as_published")
+    return find_model(options.gp or "hierarchical")
+
+
+def _samples(options: argparse.Namespace, case: Case, process: Process) -> tuple[list[Sample], str]:
+    """The samples, and in words how they were chosen."""
     by = f"the generative model {process.name} ({process.variant})"
+    if process.folder is not None:
+        by += f" of {process.folder}"
     if options.grid:
         return chosen_samples(case, "grid", process=process), f"the paper's sweep by {by}"
     count, seed = options.samples or SAMPLES, options.seed or 0

@@ -153,7 +153,7 @@ def _sweep(options: argparse.Namespace, case: Case, out: Path) -> None:
     # the paper's process on the paper's data
     model = find_model(options.gp or "coregionalised", "corrected" if options.gp else "as_published")
     parameters = Parameters.of(case)
-    header = table.columns(parameters, fingerprint_of(case, model.name, model.variant))
+    header = table.columns(parameters, fingerprint_of(case, model))
     path = out / table.TABLE
     estimated = table.estimated_in(out / "estimate.json")
     if options.overwrite:

@@ -45,10 +45,9 @@ _LONG_HISTORY = 16
 def run_case(options: argparse.Namespace) -> None:
     """Simulate a case, a body or a specimen, print what happened and write it."""
     to_warp = warp.requested(options)
-    case, drawn_laws = _case(options)
+    case, prior = _case(options)
     warp.check_place(to_warp, case)
     out = choose_folder(options.out, f"warpbrain-{safe_name(case.name)}-{options.tissue}", options.overwrite)
-    prior = None if drawn_laws is None else tables.describe_prior(drawn_laws)
     if case.specimen is not None:
         render_nothing()
         _run_tests(options, case, out, prior)
@@ -65,7 +64,7 @@ def run_case(options: argparse.Namespace) -> None:
     system = running.system
     system.begin_loading_kernels()
     described = tables.describe_case(case, running.model, why or running.chosen)
-    say(*lines("run.txt", "case", described, prior, tables.STAND_IN))
+    say(*lines("run.txt", "case", described, prior and tables.describe_prior(prior), tables.STAND_IN))
     note_device(record, case, system, options.precision)
 
     with Progress("kernels", options.quiet) as loading:
@@ -112,9 +111,9 @@ def run_case(options: argparse.Namespace) -> None:
             warp.warp(read_state(out / "result.vtu"), out, to_warp, record, options.quiet)
 
 
-def _run_tests(options: argparse.Namespace, case: Case, out: Path, prior: dict[str, Any] | None) -> None:
-    """Simulate every test of a case with a specimen, as the options of `warpbrain run` change it; `prior` is what is to
-    be said of laws that the generative model gave. Refuses options that mean nothing for tests."""
+def _run_tests(options: argparse.Namespace, case: Case, out: Path, prior: FromPrior | None) -> None:
+    """Simulate every test of a case with a specimen, as the options of `warpbrain run` change it; `prior` says which of
+    its laws are the generative model's. Refuses options that mean nothing for tests."""
     has = f"{case.path} has a [specimen]"
     if options.mesh_error is not None:
         raise InputError(f"--mesh-error: {has}, which has no one state: compare --elements tet4-averaged")
@@ -131,7 +130,7 @@ def _run_tests(options: argparse.Namespace, case: Case, out: Path, prior: dict[s
     system = rig.system
     in_time = any(rig.follows_time(recording) for recording in running.tests)
     described = specimen.describe_specimen(case, rig.specimen, system.model, in_time, rig.chosen)
-    say(*lines("run.txt", "specimen", described, prior))
+    say(*lines("run.txt", "specimen", described, prior and tables.describe_prior(prior)))
     note_device(record, case, system, options.precision)
 
     seconds = {"pre-processing": system.seconds, "loading kernels": system.load_kernels()}

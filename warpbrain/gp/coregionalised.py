@@ -29,6 +29,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -398,6 +399,7 @@ class Coregionalised:
     jitter: float = JITTER
     mean_modulus: float = 0.0
     points: int = 100
+    folder: Path | None = None
     name = "coregionalised"
 
     @property

@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -416,6 +417,7 @@ class Hierarchical:
     hierarchy: Hierarchy
     variant: str = "corrected"
     sample: tuple[Hierarchy, ...] = ()
+    folder: Path | None = None
     name = "hierarchical"
 
     @classmethod

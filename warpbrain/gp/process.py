@@ -5,6 +5,7 @@ A draw is drawn at anchors; elsewhere it is what follows from its values there.
 
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -69,6 +70,10 @@ class Process(Protocol):
     @property
     def variant(self) -> str:
         """Of the literature that it learnt from."""
+
+    @property
+    def folder(self) -> Path | None:
+        """Where it was read from, if it does not ship."""
 
     @property
     def studies(self) -> tuple[Study, ...]:

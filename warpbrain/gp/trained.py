@@ -10,7 +10,7 @@ import json
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -65,7 +65,8 @@ def find_model(name: str | Path, variant: Variant = "corrected") -> Process:
         raise InputError(
             f"{name}: no such generative model: expected {', '.join(KINDS)} or a folder of warpbrain gp fit"
         )
-    return read_model(Path(name))
+    model: Any = read_model(Path(name))
+    return replace(model, folder=Path(name))
 
 
 def read_model(folder: Path) -> Process:

@@ -17,7 +17,7 @@ from warpbrain.report.comparison import SHOWN, error_text
 from warpbrain.report.diagnosis.files import seen
 from warpbrain.report.files import MILLIMETRES, body_file, fingerprints, picked, write_body
 from warpbrain.report.page import lines
-from warpbrain.report.summary import machine
+from warpbrain.report.summary import describe_model, machine
 from warpbrain.worlds.body.uncertainty import AveragedTissue
 
 #: More than this part of a recording being gross errors is said.
@@ -40,7 +40,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
     errors_mm = {f"root_mean_square_{key}_mm": key for key in ("before", "after", "of_run")}
     return {
         "case": picked(case, "name", "title", "origin", "assumptions"),
-        "inputs_sha256": fingerprints(case),
+        "inputs_sha256": fingerprints(case, prior.model),
         "identifiability": {
             **picked(known, "nothing", "sentences", "informed", "weakly_informed", "hidden", "scale_is_hidden"),
             "directions": directions,
@@ -78,7 +78,7 @@ def describe_estimate(posterior: Posterior, device: str, averaged: AveragedTissu
         "discretisation": describe_discretisation(posterior),
         "registration": describe_registration(posterior),
         "prior": {
-            **picked(prior.model, model="name", variant="variant"),
+            **describe_model(prior.model),
             **picked(prior, groups="groups", laws="laws_of", poisson="poisson"),
             "draws": len(prior.theta),
             **picked(prior, seed="seed", rejection_rate="rejection_rate", distance_from_gaussian="distances"),

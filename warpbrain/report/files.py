@@ -13,6 +13,8 @@ from warpbrain.arrays import Floats, Ints
 from warpbrain.atomic import whole_file, write_text
 from warpbrain.cases.case import Case
 from warpbrain.errors import InputError
+from warpbrain.gp.process import Process
+from warpbrain.gp.trained import MODEL, STUDIES
 from warpbrain.mesh import TetMesh
 from warpbrain.mesh.patience import patience
 from warpbrain.mesh.vtu import read_vtu, write_vtu
@@ -92,21 +94,25 @@ def picked(instance: Any, *names: str, **renamed: str) -> Any:
     return None if instance is None else {key: getattr(instance, name) for key, name in keys.items()}
 
 
-def fingerprints(case: Case) -> dict[str, str]:
-    """SHA-256 of `case.toml`, mesh and recordings, by their names in the case folder; of those that are there."""
+def fingerprints(case: Case, model: Process | None = None) -> dict[str, str]:
+    """SHA-256 of `case.toml`, mesh and recordings, by their names in the case folder, and of the files of a generative
+    model that does not ship; of those that are there."""
     files = [case.path.name, case.mesh_file]
     for recording in case.recordings:
         files.append(recording.file)
         if isinstance(recording, PointsRecording) and recording.moved_file is not None:
             files.append(recording.moved_file)
-    there = [name for name in dict.fromkeys(files) if name and (case.folder / name).is_file()]
-    return {name: hashlib.sha256((case.folder / name).read_bytes()).hexdigest() for name in there}
+    paths = {name: case.folder / name for name in files if name}
+    if model is not None and model.folder is not None:
+        paths |= {f"generative model, {name}": model.folder / name for name in (MODEL, STUDIES)}
+    return {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in paths.items() if path.is_file()}
 
 
-def fingerprint_of(case: Case, *others: str) -> str:
-    """Twelve digits that change when a file of the case, its laws or something else that is named changes."""
+def fingerprint_of(case: Case, model: Process) -> str:
+    """Twelve digits that change when a file of the case, its laws or the generative model changes."""
     laws = [f"{label}: {t.model} {t.formulation} {t.prior}" for label, t in sorted(case.tissues.items())]
-    text = "\n".join([*(f"{name} {value}" for name, value in fingerprints(case).items()), *laws, *others])
+    hashes = [f"{name} {value}" for name, value in fingerprints(case, model).items()]
+    text = "\n".join([*hashes, *laws, model.name, model.variant])
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 

@@ -9,6 +9,7 @@ from warpbrain import __version__
 from warpbrain.cases.case import Case, Tissue
 from warpbrain.cases.checking import NOTHING_ACTS
 from warpbrain.cases.drawn import FromPrior
+from warpbrain.gp.process import Process
 from warpbrain.mesh import measure
 from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.physics.words import tabled
@@ -83,13 +84,13 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
 
 
 def describe_opening(
-    case: Case, described: Mapping[str, Any], prior: Mapping[str, Any] | None, system: System, precision: str
+    case: Case, described: Mapping[str, Any], prior: FromPrior | None, system: System, precision: str
 ) -> dict[str, Any]:
     """How every summary of a run begins: what was computed, of which files, and where."""
     return {
         "case": described,
-        "inputs_sha256": fingerprints(case),
-        **({} if prior is None else {"prior": prior}),
+        "inputs_sha256": fingerprints(case, None if prior is None else prior.model),
+        **({} if prior is None else {"prior": describe_prior(prior)}),
         "device": {"name": system.device.name, "alias": system.device.alias, "precision": precision},
     }
 
@@ -137,7 +138,13 @@ def describe_prior(prior: FromPrior) -> dict[str, Any]:
         draw = {"sample": drawn.number, "seed": drawn.seed, "redrawn": len(drawn.rejected), "reasons": drawn.rejected}
         for described, fitted in zip(tissues.values(), drawn.fits, strict=True):
             described["rms_of_fit"] = fitted.rms
-    return {"model": prior.model.name, "variant": prior.model.variant, "draw": draw, "tissues": tissues}
+    return {**describe_model(prior.model), "draw": draw, "tissues": tissues}
+
+
+def describe_model(model: Process) -> dict[str, Any]:
+    """Which generative model it is, and the folder of one that does not ship."""
+    folder = None if model.folder is None else str(model.folder)
+    return {"model": model.name, "variant": model.variant, "folder": folder}
 
 
 def show_lines(case: Case) -> list[str]:
