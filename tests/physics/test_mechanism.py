@@ -9,11 +9,14 @@ from warpbrain.physics.mechanism import Mechanism
 from warpbrain.physics.mechanisms.cavity import Cavity
 from warpbrain.physics.mechanisms.compressibility import Compressibility
 from warpbrain.physics.mechanisms.contact import Contact
+from warpbrain.physics.mechanisms.drainage import Drainage
 from warpbrain.physics.mechanisms.falx import Falx
+from warpbrain.physics.mechanisms.fibres import Fibres
 from warpbrain.physics.mechanisms.gravity import Gravity
 from warpbrain.physics.mechanisms.inclusion import Inclusion
 from warpbrain.physics.mechanisms.pressure import Pressure
 from warpbrain.physics.mechanisms.resection import Resection
+from warpbrain.physics.mechanisms.residual_stress import ResidualStress
 from warpbrain.physics.mechanisms.swelling import Swelling
 from warpbrain.physics.mechanisms.traction import Traction
 from warpbrain.physics.mechanisms.viscoelasticity import Viscoelasticity
@@ -41,6 +44,11 @@ BRANCHES = Viscoelasticity(moduli=(1.0, 2.0), times=(3.0, 40.0))
 )
 def test_which_there_are(mechanism: Mechanism, names: list[str]) -> None:
     assert [place.name for place in continuous(mechanism)] == [f"{mechanism.kind} {name}" for name in names]
+
+
+@pytest.mark.parametrize("kind", [Drainage, Fibres, Inclusion, ResidualStress, Swelling])
+def test_what_names_no_elements_is_of_all_tissue(kind: type[Mechanism]) -> None:
+    assert kind.described("elements").endswith("all tissue if absent.")
 
 
 def test_other_numbers_and_back() -> None:

@@ -85,7 +85,7 @@ class Drainage(Mechanism):
         size=1e-4,
     )
     drained: str = parameter(
-        "Node set on whose faces the fluid is free to leave; the whole surface if empty.", default="", kind="node set"
+        "Node set on whose faces the fluid may leave.", default="", kind="node set", absent="the whole surface"
     )
     pressure: float = parameter(
         "Pressure of the fluid at drained faces.", default=0.0, unit="Pa", expectation=Expectation.normal(0.0, 500.0)
@@ -104,7 +104,7 @@ class Drainage(Mechanism):
         unit="Pa",
         expectation=Expectation.normal(0.0, 1000.0),
     )
-    elements: str = parameter("Element set that has pores; all if empty.", default="", kind="element set")
+    elements: str = parameter("Element set that has pores.", default="", kind="element set", absent="all tissue")
     kind: ClassVar[str] = "drainage"
     changes_by_itself: ClassVar[bool] = True
     example: ClassVar[str] = "drainage:permeability=1e-9,exchange=1e-6,capillary_pressure=1000"

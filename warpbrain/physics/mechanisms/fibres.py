@@ -120,7 +120,7 @@ class Fibres(Mechanism):
         expectation=Expectation.uniform(0.0, 1.0 / 3.0),
         told=("their scatter, from 0 all parallel to 1/3 no direction, is {}",),
     )
-    elements: str = parameter("Element set that has them.", default="", kind="element set")
+    elements: str = parameter("Element set that has them.", default="", kind="element set", absent="all tissue")
     kind: ClassVar[str] = "fibres"
     quadratic: ClassVar[bool] = True
     of_specimens: ClassVar[bool] = True

@@ -35,7 +35,7 @@ class Inclusion(Mechanism):
         typical="glioblastoma 0.86 in the mean, 5 of 22 stiffer; meningioma stiffest",
         source="elastography of tumours (diagnosis design, M11)",
     )
-    elements: str = parameter("Element set of it.", default="", kind="element set")
+    elements: str = parameter("Element set of it.", default="", kind="element set", absent="a ball or all tissue")
     centre: tuple[float, float, float] | None = parameter("Centre of a ball.", default=None, kind="position")
     radius: float | None = parameter(
         "Its radius.", default=None, unit="mm", si=1e-3, above=0.0, told=("its radius is {}",)

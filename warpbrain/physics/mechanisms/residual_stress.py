@@ -69,7 +69,7 @@ class ResidualStress(Mechanism):
         default="",
         typical="principal direction of diffusion tensor imaging",
     )
-    elements: str = parameter("Element set that is under it.", default="", kind="element set")
+    elements: str = parameter("Element set that is under it.", default="", kind="element set", absent="all tissue")
     kind: ClassVar[str] = "residual-stress"
     quadratic: ClassVar[bool] = True
     of_specimens: ClassVar[bool] = True

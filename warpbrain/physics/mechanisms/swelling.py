@@ -36,7 +36,7 @@ class Swelling(Mechanism):
         source="diagnosis design, M7",
         told=("it swells by {} of its volume", "it shrinks by {} of its volume", "it grows by {} of its volume"),
     )
-    elements: str = parameter("Element set that swells.", default="", kind="element set")
+    elements: str = parameter("Element set that swells.", default="", kind="element set", absent="a ball or all tissue")
     centre: tuple[float, float, float] | None = parameter("Centre of a ball.", default=None, kind="position")
     radius: float | None = parameter(
         "Its radius.", default=None, unit="mm", si=1e-3, above=0.0, told=("its radius is {}",)
