@@ -128,6 +128,7 @@ def test_the_report_is_one_file(ran):
 
 
 def test_summary(ran):
+    assert summary(ran[1])["case"]["remarks"] == []
     _, out = ran
     said = summary(out)
     assert said["case"]["specimen"] == {

@@ -113,9 +113,12 @@ class Case(Shown):
 
     @property
     def nothing_acts(self) -> bool:
-        """Whether the body must stay at rest: it is held, and cut perhaps, but nothing moves or loads it."""
+        """Whether the body must stay at rest: it is held, and cut perhaps, but nothing moves or loads it. A specimen is
+        moved by its tests."""
         holding = all(isinstance(boundary, Fixed | Sliding) for boundary in self.boundaries)
-        return holding and all(isinstance(mechanism, Resection) for mechanism in self.mechanisms)
+        return (
+            self.specimen is None and holding and all(isinstance(mechanism, Resection) for mechanism in self.mechanisms)
+        )
 
     @property
     def resection(self) -> Resection | None:

@@ -120,7 +120,7 @@ def _nothing_there(case: Case) -> list[str]:
     remarks = []
     if not case.boundaries and case.specimen is None:
         remarks.append("no [[boundary]]: nothing holds the body, so it cannot be simulated")
-    if case.nothing_acts and case.specimen is None:
+    if case.nothing_acts:
         remarks.append(NOTHING_ACTS)
     if case.recordings and case.specimen is None:
         fitted = [recording for recording in case.recordings if recording.role == "fit"]
