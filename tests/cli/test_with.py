@@ -40,6 +40,20 @@ def test_each_changes_what_happens(tmp_path, plain, said):
     assert abs(largest(tmp_path / "with") - plain) > 1e-4, kind
 
 
+def test_what_takes_the_place_of_the_cases_own_is_said(tmp_path):
+    case = write_folder(tmp_path / "case")
+    with (case / "case.toml").open("a", encoding="utf-8") as stream:
+        stream.write('[[mechanism]]\nkind = "gravity"\ncsf_level = 10.0\ndirection = [0, 0, -1]\n')
+    said = "gravity:level=20,direction=0/0/-1"
+    done = run(case, "--with", said, "--out", tmp_path / "out")
+    assert done.status == 0 and f"  remark    in place of its gravity: {said}\n" in done.out, done.err
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["case"]["remarks"] == [
+        f"in place of its gravity: {said}"
+    ]
+    twice = run(case, "--with", said, "--with", "gravity:direction=0/0/-1", "--out", tmp_path / "twice")
+    assert twice.status == 2 and f"--with gravity:direction=0/0/-1: a second gravity, beside {said}" in twice.err
+
+
 def test_what_is_assumed_is_not_said_to_be_left_out(tmp_path):
     case = write_folder(tmp_path / "case")
     for number, said in enumerate(("swelling:amount=5", "contact:nodes=top")):

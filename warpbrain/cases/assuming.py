@@ -16,7 +16,8 @@ from warpbrain.problems import Problems, nearest
 
 
 def assume(case: Case, said: str) -> Case:
-    """The same case with one more mechanism; one that a case can have only once takes the place of the case's own.
+    """The same case with one more mechanism; one that a case can have only once takes the place of the case's own,
+    which is said in its remarks.
 
     Parameters
     ----------
@@ -77,7 +78,8 @@ def _with(case: Case, said: str) -> Case:
     facts = Facts(named.mesh, case.gravity_axis, case.density, removing)
     acting = (*others, mechanism.of_case(values, facts))
     require_composable(acting, require_left(acting, named.mesh))
-    return replace(case, mesh=named.mesh, mechanisms=acting)
+    replaced = () if len(others) == len(case.mechanisms) else (f"in place of its {kind}: {said}",)
+    return replace(case, mesh=named.mesh, mechanisms=acting, remarks=(*case.remarks, *replaced))
 
 
 def _value(spec: ParameterSpec, key: str, text: str) -> Any:

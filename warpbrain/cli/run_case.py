@@ -19,6 +19,7 @@ from warpbrain.errors import InputError, SolveError
 from warpbrain.gp.trained import find_model
 from warpbrain.kernels.module import is_compiling
 from warpbrain.physics.laws.stability import UnstableLawError, require_stable
+from warpbrain.physics.mechanisms import mechanisms
 from warpbrain.report import specimen, views
 from warpbrain.report import summary as tables
 from warpbrain.report.comparison import describe_comparisons, describe_mesh_error, recorded_rows, write_comparisons
@@ -167,8 +168,12 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     case = case.with_shear_moduli(dict.fromkeys(case.tissues, moduli[None]) if None in moduli else moduli)
     if options.poisson is not None:
         case = replace(case, poisson=options.poisson)
+    said: dict[str, str] = {}
     for text in options.assumed:
-        case = assume(case, text)
+        kind = text.partition(":")[0]
+        if kind in said and not mechanisms()[kind].several:
+            raise InputError(f"--with {text}: a second {kind}, beside {said[kind]}")
+        case, said[kind] = assume(case, text), text
     prior = None
     if options.sample is not None or any(tissue.law is None for tissue in case.tissues.values()):
         model = find_model(options.gp or "hierarchical")
