@@ -10,7 +10,7 @@ from folders import block, write_folder, write_recorded
 from warpbrain.cases.checking import check_case
 from warpbrain.cases.reading import read_case
 from warpbrain.errors import InputError
-from warpbrain.mesh import write_mesh
+from warpbrain.mesh import TetMesh, write_mesh
 
 FORCE = 'kind = "force"\ntotal = [0.01, 0.02, -0.05]'
 
@@ -82,6 +82,27 @@ def test_a_mesh_in_another_unit(tmp_path, unit, factor, expected):
     mesh = block()
     write_mesh(tmp_path / "mesh.vtu", mesh, unit="m" if unit == "mm" else "mm")
     assert re.search(expected, only(tmp_path))
+
+
+@pytest.mark.parametrize(("corner", "share"), [(30.0, "all"), (20.0, "67 %")])
+def test_a_load_on_what_is_held_does_nothing(tmp_path, corner, share):
+    mesh = block()
+    bottom = mesh.node_sets["bottom"]
+    sets = {"top": bottom, "bottom": bottom & (1000.0 * mesh.points[:, 0] <= corner)}
+    mesh = TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, sets)
+    said = check_case(write_folder(tmp_path, mesh=mesh)).remarks
+    assert f"[[boundary]] 'press' does nothing on {share} of 'top', which a [[boundary]] fixes or displaces" in said
+
+
+@pytest.mark.parametrize(
+    ("level", "what"), [("0.04", "has its weight"), ("-4", "has its weight"), ("400", "floats"), ("15", "")]
+)
+def test_a_level_beside_the_body_is_doubted(tmp_path, level, what):
+    folder = write_folder(tmp_path)
+    with (folder / "case.toml").open("a", encoding="utf-8") as stream:
+        stream.write(f'[[mechanism]]\nkind = "gravity"\ncsf_level = {level}\ndirection = [0, 0, -1]\n')
+    said = f"gravity: csf_level = {level} mm: all of a body 30 mm high {what}: is the unit right?"
+    assert (said in check_case(folder).remarks) == bool(what)
 
 
 def test_a_density_that_is_not_given_is_said(tmp_path):

@@ -54,6 +54,14 @@ def test_what_takes_the_place_of_the_cases_own_is_said(tmp_path):
     assert twice.status == 2 and f"--with gravity:direction=0/0/-1: a second gravity, beside {said}" in twice.err
 
 
+@pytest.mark.parametrize("said", ["pressure:nodes=bottom,value=40", "traction:nodes=bottom,force=0/0/1"])
+def test_a_load_on_what_is_held_is_said(tmp_path, said):
+    done = run(write_folder(tmp_path / "case"), "--with", said, "--out", tmp_path / "out")
+    assert (
+        f"  remark    {said.partition(':')[0]} does nothing on all of 'bottom', which a [[boundary]] fixes" in done.out
+    )
+
+
 def test_what_is_assumed_is_not_said_to_be_left_out(tmp_path):
     case = write_folder(tmp_path / "case")
     for number, said in enumerate(("swelling:amount=5", "contact:nodes=top")):

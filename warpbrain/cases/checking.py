@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from warpbrain.cases.boundary import Forced
+from warpbrain.cases.boundary import Displaced, Fixed, Forced
 from warpbrain.cases.case import Case
 from warpbrain.cases.reading import examine_case
 from warpbrain.errors import require_kind
-from warpbrain.mesh import Quality, measure
+from warpbrain.mesh import Quality, faces_of, measure
 from warpbrain.mesh.quality import extent
+from warpbrain.physics.load import Load
 from warpbrain.problems import Problem, Problems
 from warpbrain.recordings.points import distinct_rows
 from warpbrain.recordings.recording import ForceRecording, PointsRecording, Recording
@@ -116,12 +117,38 @@ def _look_again(case: Case, quality: Quality) -> list[str]:
     return remarks
 
 
+def idle_loads(case: Case) -> list[str]:
+    """What should be said of loads that do nothing, not all that they say or what is hardly meant: a sentence each."""
+    mesh = case.remaining[0]
+    moving, held = [], np.zeros(len(mesh.points), dtype=bool)
+    for boundary in case.boundaries:
+        if isinstance(boundary, Fixed | Displaced):
+            held |= mesh.node_sets[boundary.nodes]
+        else:
+            moving.append((f"[[boundary]] '{boundary.name}'", boundary.nodes, isinstance(boundary, Forced)))
+    for mechanism in case.mechanisms:
+        for name, spec in mechanism.parameters().items():
+            # one without which all of the surface is meant is no place of a load
+            if spec.kind == "node set" and not spec.absent and (nodes := getattr(mechanism, name)):
+                moving.append((mechanism.kind, nodes, isinstance(mechanism, Load)))
+    remarks = [NOTHING_ACTS] if case.nothing_acts else []
+    remarks += [f"{each.kind}: {doubt}" for each in case.mechanisms if (doubt := each.doubt(case.mesh))]
+    for name, nodes, shared in moving:
+        members = mesh.node_sets[nodes]
+        # what nodes share is of each of them, all else of faces, whose rim may well be held
+        faces = faces_of(mesh, members)
+        parts = held[members] if shared or not len(faces) else held[faces].all(axis=1)
+        if parts.any():
+            share = "all" if parts.all() else f"{100.0 * parts.mean():.2g} %"
+            remarks.append(f"{name} does nothing on {share} of '{nodes}', which a [[boundary]] fixes or displaces")
+    return remarks
+
+
 def _nothing_there(case: Case) -> list[str]:
     remarks = []
     if not case.boundaries and case.specimen is None:
         remarks.append("no [[boundary]]: nothing holds the body, so it cannot be simulated")
-    if case.nothing_acts:
-        remarks.append(NOTHING_ACTS)
+    remarks += idle_loads(case)
     if case.recordings and case.specimen is None:
         fitted = [recording for recording in case.recordings if recording.role == "fit"]
         remarks += [why for recording in fitted if (why := too_few_for_noise(case, recording))]

@@ -326,6 +326,10 @@ class Mechanism(Ramped, abc.ABC):
             if not sets[value].any():
                 raise ParameterError(name, f"the {spec.kind} '{value}' is empty")
 
+    def doubt(self, mesh: TetMesh) -> str:
+        """What is allowed in an imaged anatomy and hardly meant; empty if nothing is."""
+        return ""
+
     def held(self, mesh: TetMesh) -> tuple[Ints, Floats]:
         """Nodes (k,), repeated if need be, and directions (k, 3) in which it holds them."""
         return np.zeros(0, dtype=np.int64), np.zeros((0, 3))

@@ -47,6 +47,8 @@ BRAIN_DENSITY = 1040.0
 _LEVELS, _SHARE, _POSE = 9, 0.1, 0.12
 #: Standard deviation of a level that changes, of the height of the body.
 _FALL = 0.2
+#: Part of the height of the body up to which a level leaves no fluid.
+_LOW = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,6 +234,14 @@ class Gravity(BodyForce, Mechanism):
         """See `warpbrain.physics.mechanism.Mechanism`; levels are counted from what is the lowest point then."""
         direction = tuple((rotation.T @ np.array(self.direction)).tolist())
         return dataclasses.replace(self, direction=direction, lowest=None)
+
+    def doubt(self, mesh: TetMesh) -> str:
+        height = float(np.ptp(mesh.points @ self._up))
+        if self.csf_level is None or _LOW * height < self.csf_level < height:
+            return ""
+        what = "floats" if self.csf_level > 0.5 * height else "has its weight"
+        of = f"all of a body {1e3 * height:.3g} mm high {what}"
+        return f"csf_level = {1e3 * self.csf_level:g} mm: {of}: is the unit right?"
 
     def datum(self, mesh: TetMesh | QuadraticMesh) -> float:
         """Height [m], `-x . direction`, of the point that levels are counted from."""
