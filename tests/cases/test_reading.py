@@ -192,6 +192,16 @@ def test_vectors_must_be_three_finite_numbers(tmp_path, key, value):
     assert message.startswith(f"case.toml: [boundary 2] {key}: {expected}")
 
 
+def test_a_resection_must_leave_something(tmp_path):
+    mesh = block()
+    whole = TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, mesh.node_sets, {"corner": mesh.tissue > 0})
+    folder = write_folder(
+        tmp_path, (FORCE, FORCE + '\n[[mechanism]]\nkind = "resection"\nelements="corner"'), mesh=whole
+    )
+    with pytest.raises(InputError, match=r"case.toml: \[mechanism 1\] elements: .* 'corner' is the whole body"):
+        read_case(folder)
+
+
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_wrong_is_named(tmp_path, name):
     change, expected = WRONG[name]

@@ -196,6 +196,14 @@ def test_units_of_a_mesh_that_cannot_be(tmp_path, written, told, hint):
     assert list(tmp_path.iterdir()) == [source]
 
 
+def test_a_mesh_that_is_all_resected_is_refused(tmp_path):
+    mesh = hollow_block()
+    gone = TetMesh(mesh.points, mesh.tetrahedra, mesh.tissue, {}, {"resection": np.ones(len(mesh.tetrahedra), bool)})
+    with pytest.raises(InputError, match=r"b\.vtu: all tissue is a resection, .*: say by --tissue what stays"):
+        start_from_mesh(tmp_path / "mine", write_block(tmp_path / "b.vtu", mesh=gone), Frame())
+    assert not (tmp_path / "mine").exists()
+
+
 def two_pieces() -> TetMesh:
     block = hollow_block()
     count = len(block.points)

@@ -206,6 +206,8 @@ def _check_folder(folder: Path, overwrite: bool) -> None:
 def _write(folder: Path, mesh: TetMesh, tissues: Mapping[int, str], source: Path, overwrite: bool) -> None:
     if not mesh.node_sets["base"].any():
         raise InputError(f"{source}: found no outer nodes that face down in the lower third: is its z axis up?")
+    if RESECTION in mesh.element_sets and mesh.element_sets[RESECTION].all():
+        raise InputError(f"{source}: all tissue is a {RESECTION}, so that nothing is left: say by --tissue what stays")
     name = folder.resolve().name
     text = case_text(name, source.name, tissues, "ventricle" in mesh.node_sets, RESECTION in mesh.element_sets)
     if overwrite and (folder / CASE_FILE).is_file():

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from warpbrain.arrays import Int32s
-from warpbrain.errors import InputError
 from warpbrain.mesh import TetMesh
-from warpbrain.physics.mechanism import Mechanism, parameter
+from warpbrain.physics.mechanism import Mechanism, ParameterError, parameter
 from warpbrain.physics.potential import Enters
 from warpbrain.physics.proposal import NotTestableError, Proposal, Situation
 
@@ -40,14 +39,14 @@ class Resection(Mechanism):
             return ""
         return f"where nothing is left of what {other.kind} acts on"
 
+    def check(self, mesh: TetMesh) -> None:
+        """See `warpbrain.physics.mechanism.Mechanism`; of the set something must be left, too."""
+        super().check(mesh)
+        if not self.elements or mesh.element_sets[self.elements].all():
+            raise ParameterError("elements", f"the element set '{self.elements}' is the whole body: nothing is left")
+
     def remaining(self, mesh: TetMesh) -> tuple[TetMesh, Int32s]:
-        """See `Removing`; `InputError` if the mesh has no such set, or the set is empty or everything."""
-        members = mesh.element_sets.get(self.elements)
-        if members is None:
-            present = ", ".join(sorted(mesh.element_sets)) or "none"
-            raise InputError(f"resection: the mesh has no element set '{self.elements}' (it has {present})")
-        if not members.any() or members.all():
-            count = int(members.sum())
-            raise InputError(f"resection: element set '{self.elements}' holds {count} of {len(members)} tetrahedra")
-        left, nodes, _ = mesh.without(members)
+        """See `Removing`; `ParameterError` if the mesh has no such set, or the set is empty or everything."""
+        self.check(mesh)
+        left, nodes, _ = mesh.without(mesh.element_sets[self.elements])
         return left, nodes
