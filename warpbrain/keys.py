@@ -14,6 +14,8 @@ from warpbrain.frame import Frame
 
 #: Characters of a name, which stands in tables and names files.
 LONGEST_NAME = 100
+#: A limit that is no farther from 0 lets 0 itself pass.
+_NEXT_TO = 1e-9
 #: What a value can be, and how a message calls it.
 KINDS = {
     "text": "text",
@@ -90,7 +92,9 @@ class Key:
 
     def _limits(self) -> str:
         if math.isinf(self.below):
-            return ("a positive number" if self.above == 0.0 else f"a number above {self.above:g}") + self._in_unit
+            # the least number that is allowed is 0 where the limit is next to it
+            least = "of at least 0" if -_NEXT_TO < self.above < 0.0 else f"above {self.above:g}"
+            return ("a positive number" if self.above == 0.0 else f"a number {least}") + self._in_unit
         return f"a number in the open interval ({self.above:g}, {self.below:g}){self._in_unit}"
 
     def in_si(self, value: Any, frame: Frame) -> Any:

@@ -9,6 +9,7 @@ from warpbrain.cases.case import Case
 from warpbrain.cases.format.tables import MECHANISM
 from warpbrain.cases.parts.named import Named
 from warpbrain.errors import InputError, require_kind
+from warpbrain.keys import Key
 from warpbrain.physics.composition import require_composable, require_left
 from warpbrain.physics.mechanism import NUMBERS, Facts, ParameterError, ParameterSpec, Removing
 from warpbrain.physics.mechanisms import mechanisms
@@ -65,7 +66,7 @@ def _with(case: Case, said: str) -> Case:
         key = matching[0]
         if not equals or key in values:
             raise InputError(f"{part}: expected KEY=VALUE, each key once")
-        value = keys[key].in_si(_value(specs[key], key, text), case.frame)
+        value = keys[key].in_si(_value(specs[key], keys[key], text), case.frame)
         values[key] = named.look_up(specs[key].kind, value, partial(Path, value)) if isinstance(value, str) else value
         if named.problems:
             raise InputError(f"{key}: {named.problems.found[0]}")
@@ -82,10 +83,10 @@ def _with(case: Case, said: str) -> Case:
     return replace(case, mesh=named.mesh, mechanisms=acting, remarks=(*case.remarks, *replaced))
 
 
-def _value(spec: ParameterSpec, key: str, text: str) -> Any:
+def _value(spec: ParameterSpec, key: Key, text: str) -> Any:
     if spec.kind not in NUMBERS:
-        if spec.choices and text not in spec.choices:
-            raise InputError(f"{key}: found '{text}', expected one of {', '.join(spec.choices)}")
+        if fault := key.fault(text):
+            raise InputError(f"{key.name}: {fault}")
         return text
     try:
         numbers = [float(part) for part in text.split("/")]
@@ -94,8 +95,8 @@ def _value(spec: ParameterSpec, key: str, text: str) -> Any:
     count = {"number": 1, "position": 3, "vector": 3}.get(spec.kind)
     if not numbers or (count is not None and len(numbers) != count):
         expected = {1: "a number", 3: "three numbers joined by /"}.get(count or 0, "numbers joined by /")
-        raise InputError(f"{key}: found '{text}', expected {expected}{f' [{spec.unit}]' if spec.unit else ''}")
+        raise InputError(f"{key.name}: found '{text}', expected {expected}{f' [{spec.unit}]' if spec.unit else ''}")
     for number in numbers:
-        if not spec.above < number < spec.below:
-            raise InputError(f"{key}: found {number:g}, expected a number between {spec.above:g} and {spec.below:g}")
+        if fault := replace(key, kind="number").fault(number):
+            raise InputError(f"{key.name}: {fault}")
     return numbers[0] if count == 1 else numbers
