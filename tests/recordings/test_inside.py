@@ -31,6 +31,11 @@ def test_points_within_an_edge_are_no_problem():
     assert not checked([[9.0, 9, 9]], outside="nearest")
 
 
+def test_rows_at_one_place_are_no_dot():
+    assert "multiplied by 1000 they would not" in checked(0.001 * INSIDE + 0.05).found[0].cure
+    assert not checked(np.tile(INSIDE[0], (20, 1)))
+
+
 def test_points_farther_away_are():
     problems = checked([*INSIDE, [0.05, 0.05, 0.15], [0.05, 0.05, 0.2]])
     assert [problem.place for problem in problems.found] == ["point 32", "point 31"]

@@ -73,7 +73,8 @@ def check_points_inside(recording: TrackedPoints, mesh: TetMesh, path: Path, pro
     far = np.flatnonzero(place.distance > place.edge)
     far = far[np.argsort(-place.distance[far], kind="stable")]
     inside = len(far) <= len(place) / 2
-    if inside and recording.time is None and len(place) > 3 and _is_dot(points, mesh):
+    dot = len(place) > 3 and _is_dot(points, mesh) and not _is_dot(1000.0 * points, mesh)
+    if inside and recording.time is None and dot:
         size = 1000.0 * float(np.ptp(points, axis=0).max())
         message = f"all {len(place)} points lie within {size:.3g} mm of each other, a dot in the body"
         cure = "multiplied by 1000 they would not: is one of mesh and recording in m, the other in mm?"
