@@ -9,7 +9,11 @@ from warpbrain.terminal.command import OneLineParser
 SHARED = {"--steps": {"type": "int", "least": 1, "default": 3}}
 DESCRIBED = {
     "call": "first:run",
-    "arguments": {"--steps": {}, "--nu": {"type": "float", "above": 0, "below": 0.5, "expected": "a ratio"}},
+    "arguments": {
+        "--steps": {},
+        "--nu": {"type": "float", "above": 0, "below": 0.5, "expected": "a ratio"},
+        "--out": {"type": "path"},
+    },
     "actions": {"again": {"help": "once more", "call": "second:run", "arguments": {"--steps": {"default": 7}}}},
 }
 
@@ -24,6 +28,12 @@ def test_what_several_commands_share_each_may_change():
     assert (parsed().steps, parsed("again").steps, parsed("again", "--steps", "2").steps) == (3, 7, 2)
     assert (parsed().program, parsed("again").program) == ("tool", "tool again")
     assert (parsed().call, parsed("again").call) == ("first:run", "second:run")
+
+
+def test_an_empty_text_is_no_path(capsys):
+    with pytest.raises(SystemExit) as ended:
+        parsed("--out", "")
+    assert ended.value.code == 2 and "--out: expected a path, found an empty text" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -20,8 +20,15 @@ from typing import Any
 
 from warpbrain.errors import InputError
 
+
+def _path(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("expected a path, found an empty text")
+    return Path(text)
+
+
 #: Types of arguments and comparisons of their numbers with limits, by their names in a table.
-_TYPES = {"path": Path, "int": int, "float": float}
+_TYPES = {"path": _path, "int": int, "float": float}
 _LIMITS = {"least": operator.ge, "above": operator.gt, "below": operator.lt}
 
 
