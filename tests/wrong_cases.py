@@ -37,6 +37,10 @@ WRONG = {
     ),
     # values: of the wrong type or outside their range
     "name": (('"block"', "529"), r"\[case\] name: expected text, found 529"),
+    "title": (
+        ('"A block of gel"', r'"red \u001b[31m"'),
+        r"\[case\] title: expected text without control characters, found 'red \\x1b\[31m'",
+    ),
     "units": (('"mm"', '"cm"'), r"\[case\] units: found 'cm', expected one of m, mm"),
     "axes": (('"RAS"', '"RAI"'), r"\[case\] axes: found 'RAI', expected one of RAS, LPS"),
     "origin": (('"synthetic"', '"made up"'), r"\[case\] origin: found 'made up', expected one of measured, stand-in"),

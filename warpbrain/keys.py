@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,6 +17,8 @@ from warpbrain.frame import Frame
 LONGEST_NAME = 100
 #: A limit that is no farther from 0 lets 0 itself pass.
 _NEXT_TO = 1e-9
+#: What would move the cursor of a terminal, or end the name of a file.
+CONTROL = r"[\x00-\x1f\x7f-\x9f]"
 #: What a value can be, and how a message calls it.
 KINDS = {
     "text": "text",
@@ -73,8 +76,8 @@ class Key:
         if isinstance(value, str):
             if self.choices and value not in self.choices:
                 return f"found '{value}', expected {self.expected()}"
-            if "\0" in value:
-                return f"expected {self.expected()}, found {short(value)}"
+            if re.search(CONTROL, value):
+                return f"expected {self.expected()} without control characters, found {short(value)}"
             if self.name == "name" and not (value.strip() and value.isprintable() and len(value) <= LONGEST_NAME):
                 return f"expected 1 to {LONGEST_NAME} printable characters, found {short(value)}"
         elif isinstance(value, dict):

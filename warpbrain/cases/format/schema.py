@@ -10,13 +10,13 @@ from collections.abc import Collection
 from typing import Any
 
 from warpbrain.cases.format.tables import PRIOR, TABLES, TISSUE
-from warpbrain.keys import Key, Table
+from warpbrain.keys import CONTROL, Key, Table
 from warpbrain.physics.laws import LAWS
 
 _NUMBER = {"type": "number"}
 _KINDS: dict[str, dict[str, Any]] = {
-    "text": {"type": "string"},
-    "file": {"type": "string", "minLength": 1},
+    "text": {"type": "string", "not": {"pattern": CONTROL}},
+    "file": {"type": "string", "minLength": 1, "not": {"pattern": CONTROL}},
     "number": _NUMBER,
     "vector": {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3},
     "numbers": {"type": "array", "items": _NUMBER},
