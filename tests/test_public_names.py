@@ -72,6 +72,7 @@ def test_cases_laws_and_mechanisms_are_mappings():
         (lambda: wb.html(5), "what: expected a result or a case, found int"),
         (lambda: wb.estimate("0529", options=5), "options: expected EstimationOptions.*, found int"),
         (lambda: wb.diagnose("0529", options=5), "options: expected DiagnosisOptions.*, found int"),
+        (lambda: wb.DiagnosisOptions(candidates="gravity"), "candidates: expected a sequence of names, found str"),
         (lambda: wb.ensemble("0529", 2, batch=0), "batch = 0"),
         (lambda: wb.ensemble("0529", 2, dask=5), "dask: expected the address of a scheduler"),
         (lambda: wb.assume("0529", "gravity"), "case: expected a Case, as warpbrain.find_case gives, found str"),

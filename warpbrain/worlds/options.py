@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from warpbrain.errors import InputError
+from warpbrain.errors import InputError, require_kind
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class DiagnosisOptions:
     ends: bool = True
 
     def __post_init__(self) -> None:
+        require_kind(self.candidates, (tuple, list, type(None)), "candidates", "a sequence of names")
         if not (math.isfinite(self.alpha) and 0.0 < self.alpha < 0.5):
             raise InputError(f"alpha = {self.alpha:g}: expected a number between 0 and 0.5")
         if self.draws < 1.0 / self.alpha:
