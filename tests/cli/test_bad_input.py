@@ -45,7 +45,7 @@ def refusal(ran: Ran) -> str:
         (["--mu", "=900"], "--mu =900: expected a number [Pa] or LABEL=PA"),
         (["--mu", "grey=900"], "--mu grey=900: expected a number [Pa] or LABEL=PA"),
         (["--mu", "1.5=900"], "--mu 1.5=900: expected a number [Pa] or LABEL=PA"),
-        (["--mu", "7=900"], "mu 7=900: no tissue 7 in this case (it has 1 (soft), 2 (stiff))"),
+        (["--mu", "7=900"], "--mu 7=900: no tissue 7 in this case (it has 1 (soft), 2 (stiff))"),
         (["--mu", "900", "1=900"], "--mu 900 1=900: give one number for every tissue or LABEL=PA for some, not both"),
         (["--mu", "1=900", "900"], "--mu 1=900 900: give one number for every tissue or LABEL=PA for some, not both"),
         (["--mu", "900", "800"], "--mu 900 800: expected one number for every tissue, or LABEL=PA for each"),

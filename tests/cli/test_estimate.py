@@ -148,7 +148,7 @@ def test_quiet_says_nothing(folder, tmp_path):
     [
         (("--registration", "0", "1"), "expected two positive numbers"),
         (("--nu", "-1"), "expected a positive number of degrees of freedom"),
-        (("--samples", "3"), "samples = 3: expected a whole number of at least 25"),
+        (("--samples", "3"), "--samples 3: expected a whole number of at least 25"),
         (("--gp", "nonsense"), "no such generative model"),
         (("--model", "rubber"), "expected one of"),
         (("--device", "toaster"), "not found on this machine"),

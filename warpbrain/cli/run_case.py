@@ -165,7 +165,10 @@ def _case(options: argparse.Namespace) -> tuple[Case, FromPrior | None]:
     if options.model is not None:
         case = case.with_law(options.model)
     moduli = options.moduli
-    case = case.with_shear_moduli(dict.fromkeys(case.tissues, moduli[None]) if None in moduli else moduli)
+    try:
+        case = case.with_shear_moduli(dict.fromkeys(case.tissues, moduli[None]) if None in moduli else moduli)
+    except InputError as error:
+        raise InputError(f"--{error}") from None
     if options.poisson is not None:
         case = replace(case, poisson=options.poisson)
     said: dict[str, str] = {}
