@@ -223,9 +223,18 @@ def _skew(image):
     return nibabel.Nifti1Image(np.asarray(image.dataobj), image.affine)
 
 
+def _metres(image):
+    image.header.set_xyzt_units("meter")
+    return image
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
-    [(_far, "bad.nii.gz: affine: 0 % of the body"), (_skew, "bad.nii.gz: affine: its axes are not at right angles")],
+    [
+        (_far, "bad.nii.gz: affine: 0 % of the body"),
+        (_skew, "bad.nii.gz: affine: its axes are not at right angles"),
+        (_metres, "bad.nii.gz: a voxel of 1000 mm is larger than the body of"),
+    ],
 )
 def test_images_that_cannot_be_of_the_body(folder, warped, tmp_path, change, message):
     nibabel.save(change(nibabel.load(folder / "T1.nii.gz")), tmp_path / "bad.nii.gz")

@@ -148,6 +148,10 @@ def check_place(request: WarpRequest, mesh: TetMesh, path: Path) -> None:
     """`InputError` if most of a body is outside of an image: in another place, unit or orientation."""
     points = MILLIMETRES * mesh.points
     for image in request.images:
+        if (edge := float(image.grid.voxel.max())) > np.ptp(points, axis=0).max():
+            raise InputError(
+                f"{image.path}: a voxel of {edge:.4g} mm is larger than the body of {path}: what is its unit?"
+            )
         share = float(np.mean(image.grid.contains(points)))
         if share < _INSIDE:
             # all eight: of an oblique image two opposite ones span less than the image
