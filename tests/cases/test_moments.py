@@ -116,6 +116,7 @@ def test_a_reference_and_turns_are_written_and_read(tmp_path) -> None:
         (block(3, (level(0.05, ((0, 1), (9, 0.5))), level(0.02, ((0, 0), (9, 1))))), "a second 'gravity'"),
         (replace(block(3), recordings=(marker(1, reference=5.0),)), "no row is of another time than 5 s"),
         (replace(block(3), recordings=(marker(1, reference=-5.0),)), "reference"),
+        (replace(block(3), recordings=(replace(marker(1), time=np.zeros(1)),)), "no row is of a time after 0 s"),
     ],
 )
 def test_what_means_nothing_is_refused(case: Case, expected: str, tmp_path) -> None:

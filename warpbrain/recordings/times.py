@@ -8,11 +8,9 @@ from warpbrain.recordings.base import Recording
 
 
 def times_of(recording: Recording) -> Floats:
-    """Time (n,) [s] of each row; infinite of the end, where a recording has no times, or none after the loads came."""
+    """Time (n,) [s] of each row; infinite, the end, where a recording has no times."""
     times = recording.time
-    if times is None or not (times > 0.0).any():
-        return np.full(recording.count, np.inf)
-    return np.asarray(times, dtype=np.float64)
+    return np.full(recording.count, np.inf) if times is None else np.asarray(times, dtype=np.float64)
 
 
 def compared_rows(recording: Recording) -> Ints:

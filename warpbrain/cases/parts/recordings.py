@@ -12,7 +12,7 @@ from warpbrain.cases.parts.named import Named
 from warpbrain.cases.parts.tissues import OTHER_MU
 from warpbrain.cases.specimen import REST, Specimen
 from warpbrain.recordings.recording import RECORDINGS, Recording, TestRecording
-from warpbrain.recordings.times import compared_rows
+from warpbrain.recordings.times import compared_rows, times_of
 
 
 def read_recordings(context: Context, named: Named | None, boundaries: set[str]) -> tuple[Recording, ...]:
@@ -44,7 +44,10 @@ def read_recordings(context: Context, named: Named | None, boundaries: set[str])
         for key, fault in recording.without_meaning().items():
             if table.named(key):
                 table.problem(key, *fault)
-        if not specimen and recording.reference is not None and not len(compared_rows(recording)):
+        if not specimen and not (times_of(recording) > 0.0).any():
+            message = "no row is of a time after 0 s, when loads come: there is nothing to compare"
+            table.problem("file", message, "leave t out of what was recorded in the end")
+        elif not specimen and recording.reference is not None and not len(compared_rows(recording)):
             at = f"{recording.reference:g} s"
             table.problem("reference", f"no row is of another time than {at}: there is no difference to compare")
         recordings.append(recording)
