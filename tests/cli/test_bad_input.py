@@ -183,6 +183,12 @@ def test_a_body_that_nothing_holds(tmp_path):
     assert run(tmp_path, "--out", tmp_path / "out", "--steps", "2").status == 0
 
 
+def test_what_is_of_specimens_is_refused_of_a_body(folder, tmp_path):
+    ran = warpbrain("diagnose", "--case", folder, "--homogeneous", "--out", tmp_path / "out")
+    assert refusal(ran) == f"--homogeneous: {folder / 'case.toml'} has no [specimen]"
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_step_of_a_motion_that_is_not_followed(folder):
     for arguments in ([], ["--steps", "3"]):
         ran = run(folder, "--time-step", "0.01", *arguments)

@@ -148,6 +148,11 @@ def test_quiet_says_nothing(folder, tmp_path):
     [
         (("--registration", "0", "1"), "expected two positive numbers"),
         (("--nu", "-1"), "expected a positive number of degrees of freedom"),
+        (("--registration", "1", "1", "--no-registration"), "not allowed with argument --registration"),
+        (("--method", "grid", "--nu", "4"), "--nu: means nothing with --method grid"),
+        (("--method", "grid", "--no-discretisation"), "--no-discretisation: means nothing with --method grid"),
+        (("--method", "grid", "--seed", "0"), "--seed: means nothing with --method grid"),
+        (("--method", "grid", "--causes"), "--causes: means nothing with --method grid"),
         (("--samples", "3"), "--samples 3: expected a whole number of at least 25"),
         (("--gp", "nonsense"), "no such generative model"),
         (("--model", "rubber"), "expected one of"),

@@ -230,6 +230,11 @@ def test_motion_is_refused(folder, tmp_path, arguments):
     assert not (tmp_path / "out").exists()
 
 
+def test_what_is_of_positions_is_refused(folder, tmp_path):
+    found = run(folder, "--legacy-rmse", "--out", tmp_path / "out")
+    assert found.status == 2 and "--legacy-rmse: " in found.err and not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -10,6 +10,7 @@ from warpbrain.cases.shipped import find_case
 from warpbrain.cli import warp
 from warpbrain.cli.log import note_case
 from warpbrain.diagnosis.diagnose import Diagnosing
+from warpbrain.errors import InputError
 from warpbrain.estimation.options import Listener
 from warpbrain.kernels.module import find_device
 from warpbrain.report.diagnosis import files
@@ -54,6 +55,8 @@ def diagnose(options: argparse.Namespace) -> None:
     device = find_device(options.device).alias
     images = warp.requested(options)
     case = find_case(options.case, options.tissue)
+    if options.homogeneous and case.specimen is None:
+        raise InputError(f"--homogeneous: {case.path} has no [specimen]")
     warp.check_place(images, case)
     run: Callable[..., Any] = Diagnosing if case.specimen is None else DiagnosingSpecimen
     tables = _OF_A_BODY if case.specimen is None else _OF_A_SPECIMEN

@@ -46,19 +46,25 @@ from warpbrain.worlds.options import DiagnosisOptions
 
 #: Nodes up to which it is said unasked what else may act: its cost grows faster than that of an estimate.
 _LARGEST = 20_000
+#: Options that mean nothing for a sweep.
+_OF_THE_POSTERIOR = ("nu", "registration", "no_registration", "no_discretisation", "samples", "seed", "causes")
 
 
 def estimate(options: argparse.Namespace) -> None:
     """Estimate the tissue of a case, by a posterior or by a sweep."""
+    if options.method == "grid":
+        for name in _OF_THE_POSTERIOR:
+            if (value := getattr(options, name)) is not None and value is not False:
+                raise InputError(f"--{name.replace('_', '-')}: means nothing with --method grid")
     settings = EstimationOptions(
-        Likelihood(None) if math.isinf(options.nu) else Likelihood(),
+        Likelihood(None) if options.nu == math.inf else Likelihood(),
         None if options.no_discretisation else Discretisation(),
         not options.no_registration,
-        samples=options.samples,
-        seed=options.seed,
+        samples=options.samples or EstimationOptions.samples,
+        seed=options.seed or 0,
     )
     registration = None
-    if options.registration is not None and not options.no_registration:
+    if options.registration is not None:
         shift, turn = options.registration
         if not (shift > 0.0 and turn > 0.0 and math.isfinite(shift + turn)):
             raise InputError(f"--registration {shift:g} {turn:g}: expected two positive numbers [mm] and [degrees]")

@@ -118,6 +118,8 @@ def _run_tests(options: argparse.Namespace, case: Case, out: Path, prior: FromPr
     has = f"{case.path} has a [specimen]"
     if options.mesh_error is not None:
         raise InputError(f"--mesh-error: {has}, which has no one state: compare --elements tet4-averaged")
+    if options.legacy_rmse:
+        raise InputError(f"--legacy-rmse: {has}, whose tests record no positions")
     for option, asked_of in (("--steps", options.steps), ("--to-rest", options.to_rest), ("--until", options.until)):
         if asked_of:
             raise InputError(f"{option}: {has}, whose tests are quasi-static: there is no motion")
