@@ -48,7 +48,10 @@ def test_fluid_flows_away_until_the_skeleton_carries_the_load(tmp_path):
         (["--until", "5", "--to-rest"], "--until 5: means nothing with --to-rest"),
         (["--until", "5", "--mesh-error"], "--until 5: the error of the mesh is not estimated for slow change yet"),
         (["--with", "drainage"], "drainage: permeability is missing [m4/(N s)]"),
-        (["--with", "drainage:permeability=0"], "drainage:permeability=0: permeability: found 0, expected a positive number"),
+        (
+            ["--with", "drainage:permeability=0"],
+            "drainage:permeability=0: permeability: found 0, expected a positive number",
+        ),
         (["--with", "drainage:permeability=1,drained=no"], "drainage:permeability=1,drained=no: drained: the mesh has"),
     ],
 )
