@@ -37,6 +37,7 @@ WRONG = {
     ),
     # values: of the wrong type or outside their range
     "name": (('"block"', "529"), r"\[case\] name: expected text, found 529"),
+    "key": (('title = "A block of gel"', r'"\u001b[31m" = 1'), r"\[case\] \\x1b\[31m: unknown key"),
     "title": (
         ('"A block of gel"', r'"red \u001b[31m"'),
         r"\[case\] title: expected text without control characters, found 'red \\x1b\[31m'",

@@ -12,13 +12,12 @@ import numpy as np
 
 from warpbrain.arrays import Floats
 from warpbrain.frame import Frame
+from warpbrain.problems import CONTROL
 
 #: Characters of a name, which stands in tables and names files.
 LONGEST_NAME = 100
 #: A limit that is no farther from 0 lets 0 itself pass.
 _NEXT_TO = 1e-9
-#: What would move the cursor of a terminal otherwise than by lines and tabs, or end the name of a file.
-CONTROL = r"[\x00-\x08\x0b-\x1f\x7f-\x9f]"
 #: What a value can be, and how a message calls it.
 KINDS = {
     "text": "text",

@@ -1,5 +1,6 @@
 """Everything that is wrong with a user's files, collected so that all of it can be said at once."""
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -7,6 +8,9 @@ from pathlib import Path
 from typing import NoReturn
 
 from warpbrain.errors import InputError
+
+#: What would move the cursor of a terminal otherwise than by lines and tabs, or end the name of a file.
+CONTROL = r"[\x00-\x08\x0b-\x1f\x7f-\x9f]"
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,8 @@ _PLACE, _MESSAGE = 120, 800
 
 
 def _shortened(text: str, most: int) -> str:
-    one_line = " ".join(text.split())
+    # names of keys, too, are a file's
+    one_line = re.sub(CONTROL, lambda found: ascii(found[0])[1:-1], " ".join(text.split()))
     return one_line if len(one_line) <= most else f"{one_line[: most - 20]}...{one_line[-20:]}"
 
 

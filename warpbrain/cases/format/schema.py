@@ -10,8 +10,9 @@ from collections.abc import Collection
 from typing import Any
 
 from warpbrain.cases.format.tables import PRIOR, TABLES, TISSUE
-from warpbrain.keys import CONTROL, Key, Table
+from warpbrain.keys import Key, Table
 from warpbrain.physics.laws import LAWS
+from warpbrain.problems import CONTROL
 
 _NUMBER = {"type": "number"}
 _KINDS: dict[str, dict[str, Any]] = {
