@@ -9,7 +9,7 @@ from sinking_block import OPTIONS, write_sinking
 
 from warpbrain.errors import SolveError
 from warpbrain.worlds.body.base import Base
-from warpbrain.worlds.body.fit_search import FitSearch
+from warpbrain.worlds.body.fit_search import ENOUGH, FitSearch
 from warpbrain.worlds.body.fitting import Fitter
 from warpbrain.worlds.body.hypotheses import HypothesisSearch, screened
 from warpbrain.worlds.body.nuisances import FIELD, UNKNOWN_MESH
@@ -186,7 +186,8 @@ def test_a_fit_takes_the_most_probable_size(sets):
     for start in (effect.size, 0.4 * effect.size):
         free = fit(start, effect.sizes)
         assert free.effects[0].size == pytest.approx(best)
-        assert free.log_evidence == pytest.approx(alone[best], abs=0.1)
+        # as nearly as both have come to the best point
+        assert free.log_evidence == pytest.approx(alone[best], abs=2.0 * ENOUGH)
 
 
 def test_a_fit_of_nothing_that_acts_may_begin_at_one_of_more(sets):
