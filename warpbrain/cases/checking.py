@@ -117,8 +117,8 @@ def _look_again(case: Case, quality: Quality) -> list[str]:
     return remarks
 
 
-def idle_loads(case: Case) -> list[str]:
-    """What should be said of loads that do nothing, not all that they say or what is hardly meant: a sentence each."""
+def remarks_on_loads(case: Case) -> list[str]:
+    """Remarks on loads: that none acts, implausible parameters, and what part of a load acts on nodes that are held."""
     mesh = case.remaining[0]
     moving, held = [], np.zeros(len(mesh.points), dtype=bool)
     for boundary in case.boundaries:
@@ -148,7 +148,7 @@ def _nothing_there(case: Case) -> list[str]:
     remarks = []
     if not case.boundaries and case.specimen is None:
         remarks.append("no [[boundary]]: nothing holds the body, so it cannot be simulated")
-    remarks += idle_loads(case)
+    remarks += remarks_on_loads(case)
     if case.recordings and case.specimen is None:
         fitted = [recording for recording in case.recordings if recording.role == "fit"]
         remarks += [why for recording in fitted if (why := too_few_for_noise(case, recording))]

@@ -123,7 +123,7 @@ class Diagnosing:
             blocks = confirming.held_out_for(source or best)
             predictions = {name: confirming.predict(candidate, blocks) for name, candidate in weighted_sets.items()}
             fit = self._fit(confirming, weighted_sets, blocks, predictions, checked.confirmations)
-            ranked = {cause.kind: cause for cause in Ranking(confirming).all(best)}
+            ranking = Ranking(confirming).all(best)
         confusing = beside(lambda: imitations(search.causes, nothing.marginal.model))
         with self.seconds.of("where"):
             where = map_of_search(search, options.draws, random, options.alpha)
@@ -141,7 +141,7 @@ class Diagnosing:
             seen = smallest(search.causes, nothing.marginal.model, confusion)
         self.listener.stage("what to measure next")
         with self.seconds.of("next measurement"):
-            measurements = _next(search, tuple(ranked.values()))
+            measurements = _next(search, ranking)
         return Diagnosis(
             case=self.case,
             decision=checked.decision,
@@ -150,8 +150,8 @@ class Diagnosing:
             p_value=p_value,
             alpha=options.alpha,
             p_left=checked.p_left,
-            named=tuple(ranked[name] for name in named),
-            ranking=tuple(ranked.values()),
+            named=tuple(next(cause for cause in ranking if cause.kind == name) for name in named),
+            ranking=ranking,
             rejected=dict(search.candidates.rejected) | dict.fromkeys(search.invisible, _INVISIBLE),
             combinations=_combinations(search),
             map=where,

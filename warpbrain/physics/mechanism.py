@@ -327,7 +327,7 @@ class Mechanism(Ramped, abc.ABC):
                 raise ParameterError(name, f"the {spec.kind} '{value}' is empty")
 
     def doubt(self, mesh: TetMesh) -> str:
-        """What is allowed in an imaged anatomy and hardly meant; empty if nothing is."""
+        """Why a parameter is implausible in an imaged anatomy, although it is allowed; empty if none is."""
         return ""
 
     def held(self, mesh: TetMesh) -> tuple[Ints, Floats]:

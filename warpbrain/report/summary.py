@@ -7,7 +7,7 @@ from typing import Any
 
 from warpbrain import __version__
 from warpbrain.cases.case import Case, Tissue
-from warpbrain.cases.checking import idle_loads
+from warpbrain.cases.checking import remarks_on_loads
 from warpbrain.cases.drawn import FromPrior
 from warpbrain.gp.process import Process
 from warpbrain.mesh import measure
@@ -79,7 +79,7 @@ def describe_case(case: Case, model: Model, chosen: str | None = None) -> dict[s
         },
         "assumptions": list(case.assumptions),
         "left_out": left_out(model),
-        "remarks": [*case.remarks, *idle_loads(case)],
+        "remarks": [*case.remarks, *remarks_on_loads(case)],
     }
 
 

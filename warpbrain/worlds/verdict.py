@@ -136,10 +136,9 @@ def _without_doubts(diagnosis: Verdict, words: Words) -> str:
     verdict = decision.verdict
     if verdict == NOTHING:
         seen = "; ".join(f"{name} {smallest_in_words(name, size)}" for name, size in diagnosis.smallest.items())
-        poorly = (
-            ", although these data contradict that nothing is missing" if diagnosis.p_value <= diagnosis.alpha else ""
-        )
-        return f"No missing physics is detected{poorly} ({p}). What {data} would have shown: {seen or words.nothing}."
+        contradicted = f", although {data} contradict that nothing is missing"
+        but = contradicted if diagnosis.p_value <= diagnosis.alpha else ""
+        return f"No missing physics is detected{but} ({p}). What {data} would have shown: {seen or words.nothing}."
     if decision.named:
         first, *others = words.named
         sentences = [first, *(f"Beside it: {_lower(sentence)}" for sentence in others), words.grounds]

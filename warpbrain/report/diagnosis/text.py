@@ -27,9 +27,9 @@ def shown_of(summary: Summary) -> dict[str, Any]:
     held, sets = summary["fit"][f"heldout_rmse_{suffix}"], summary.get("combinations", summary.get("hypotheses"))
     # that of a specimen is against nothing already
     nothing = summary.get("log_evidence_of_nothing", 0.0)
-    smallest, seen = [], {mechanism["mechanism"] for mechanism in summary["mechanisms"]}
+    smallest, named_kinds = [], {mechanism["mechanism"] for mechanism in summary["mechanisms"]}
     for kind, effect in summary["smallest_detectable"].items():
-        if kind in seen:
+        if kind in named_kinds:
             continue
         named = effect.get("named_from")
         # of what is there or not there is no size

@@ -44,8 +44,8 @@ _NEAR = 0.1
 _KEPT = 9
 #: Steps that are expected to gain less of the log posterior density than this end the search (half the square of
 #: Newton's decrement, Boyd and Vandenberghe 2004, section 9.5.1); the same as long as laws, error of the mesh and noise
-#: are those of another point. Of 94 fits of 14 cases of run 43 the log evidence where 0.1 was left is that where 0.02
-#: was to 0.13 (RMS; 0.69 at most).
+#: are those of another point. In 94 fits of 14 cases (run 43) the log evidence at 0.1 differs from that at 0.02 by 0.13
+#: (RMS), and by 0.69 at most.
 ENOUGH, ROUGHLY = 0.1, 1.0
 #: Part of the expected gain of a step; where less is gained, columns that were made about another point are made anew.
 _AGREES = 0.5

@@ -43,7 +43,6 @@ from warpbrain.worlds.body.parameters import log_overlap
 from warpbrain.worlds.body.placing import with_refined_places
 from warpbrain.worlds.body.states import SolvedState, States, instants_of
 from warpbrain.worlds.body.stopping import bend_of, far_from_linear, next_to_fit
-from warpbrain.worlds.body.unknown import force_patches
 from warpbrain.worlds.body.weighing import Weighing, best_of_placements, keep_better, search_of
 from warpbrain.worlds.body.weighted_set import Refit, WeightedSet
 
@@ -487,7 +486,8 @@ def screened(
     with one_thread_of_blas():
         with timed("base"):
             base = BaseFinder(states, spacing, mesh_error, without_nuisances, listener, prior).find()
-        if not force_patches(base.at, spacing)[1].any():
+        sensors = base.at.sensors
+        if not (sensors.by_displacement[:, base.at.free].count_nonzero() or sensors.by_reactions.count_nonzero()):
             raise InputError(f"{case.path}: [[recording]]: no force moves what was recorded: the body is held there")
         with timed("candidates"):
             candidates = candidates_at(
